@@ -1,0 +1,71 @@
+//! A scene as it was read: triangles, materials, point lights, cameras. Scene units throughout, nothing derived.
+//!
+//! Positions stay in f64: an offset of 10⁶ units must not eat the shape. `elements` brings them to f32 about the
+//! scene's own centre.
+
+pub mod builtin;
+mod material;
+mod obj;
+mod scene_file;
+mod texture;
+mod write;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use glam::DVec3;
+
+pub use material::Material;
+pub use texture::Texture;
+
+/// A scene that is fit to be baked: at least one triangle, every number finite, every reflectance in 0..=1.
+#[derive(Debug, Clone, Default)]
+pub struct Scene {
+    pub name: String,
+    /// The file it came from; none for a built-in scene.
+    pub path: Option<PathBuf>,
+    /// Positions in scene units. Corners that touch in the file share one index: equal positions are welded.
+    pub vertices: Vec<DVec3>,
+    /// In the order of the input.
+    pub triangles: Vec<Triangle>,
+    pub materials: Vec<Material>,
+    pub point_lights: Vec<PointLight>,
+    pub cameras: Vec<Camera>,
+    /// Triangles without area that were left out.
+    pub dropped_degenerate: usize,
+    /// What was made up or passed over while reading, one sentence each, for the person's eyes.
+    pub notes: Vec<String>,
+}
+
+/// One triangle, counter-clockwise seen from its front, the side that sends and receives light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Triangle {
+    /// Indices into [`Scene::vertices`].
+    pub vertices: [u32; 3],
+    /// Texture coordinates per corner, v up; one repeat of a texture spans 0..1.
+    pub uv: [[f32; 2]; 3],
+    /// Index into [`Scene::materials`].
+    pub material: u32,
+}
+
+/// A point light: irradiance at distance d is `intensity · cos θ / d²`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointLight {
+    pub name: String,
+    /// Scene units.
+    pub position: DVec3,
+    /// Radiant intensity, W·sr⁻¹, RGB.
+    pub intensity: [f32; 3],
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Camera {
+    pub name: String,
+    /// Scene units.
+    pub position: DVec3,
+    /// The point in the middle of the picture.
+    pub look_at: DVec3,
+    pub up: DVec3,
+    /// Vertical field of view, degrees.
+    pub fov_y: f64,
+}
