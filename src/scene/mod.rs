@@ -3,12 +3,12 @@
 //! Positions stay in f64: an offset of 10⁶ units must not eat the shape. `elements` brings them to f32 about the
 //! scene's own centre.
 
-pub mod builtin;
+// pub mod builtin;
 mod material;
-mod obj;
-mod scene_file;
+// mod obj;
+// mod scene_file;
 mod texture;
-mod write;
+// mod write;
 
 use std::path::PathBuf;
 use std::sync::Arc;

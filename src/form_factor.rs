@@ -1,0 +1,82 @@
+//! Lambert's formula: form factor from a point to a polygon, clipped to the receiver's horizon. Pure mathematics in f64;
+//! `shaders/shared/lambert.glsl` is the same in f32.
+
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+
+/// Form factor from `p` with unit normal `n` to a closed contour, counter-clockwise seen from its front:
+/// F = 1/(2π) Σ θ_e (n·γ_e) over its edges. Positive where `p` sees the front.
+pub fn to_polygon(p: DVec3, n: DVec3, contour: &[DVec3]) -> f64 {
+    let clipped = clip_to_horizon(p, n, contour);
+    let mut sum = 0.0;
+    for (i, a) in clipped.iter().enumerate() {
+        let b = clipped[(i + 1) % clipped.len()];
+        let normal = a.cross(b);
+        let length = normal.length();
+        if length > 0.0 {
+            sum += length.atan2(a.dot(b)) * n.dot(normal) / length;
+        }
+    }
+    -sum / TAU
+}
+
+/// The contour relative to `p`, cut at the plane through `p` (Sutherland–Hodgman).
+fn clip_to_horizon(p: DVec3, n: DVec3, contour: &[DVec3]) -> Vec<DVec3> {
+    let mut clipped = Vec::with_capacity(contour.len() + 2);
+    for (i, a) in contour.iter().enumerate() {
+        let a = *a - p;
+        let b = contour[(i + 1) % contour.len()] - p;
+        let (ha, hb) = (a.dot(n), b.dot(n));
+        if ha > 0.0 {
+            clipped.push(a);
+        }
+        if (ha > 0.0) != (hb > 0.0) {
+            clipped.push(a + (b - a) * (ha / (ha - hb)));
+        }
+    }
+    clipped
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A polygon in the plane z = 1 or beside, wound so that the origin sees its front.
+    fn seen(corners: &[[f64; 3]]) -> Vec<DVec3> {
+        corners.iter().rev().map(|c| DVec3::from_array(*c)).collect()
+    }
+
+    #[test]
+    fn equals_closed_forms() {
+        let f = |corners: &[[f64; 3]]| to_polygon(DVec3::ZERO, DVec3::Z, &seen(corners));
+        let close = |a: f64, b: f64| (a - b).abs() < 1e-12;
+        // Shared reference, differential element to polygon (Howell's B-3 and walls).
+        assert!(close(
+            f(&[[0., 0., 1.], [1., 0., 1.], [1., 1., 1.], [0., 1., 1.]]),
+            0.138531605994893
+        ));
+        assert!(close(
+            f(&[[-1., -1., 1.], [1., -1., 1.], [1., 1., 1.], [-1., 1., 1.]]),
+            0.554126423979572
+        ));
+        assert!(close(
+            f(&[[1., 0., 1.], [0., 1., 1.], [-0.5, -0.5, 1.]]),
+            0.21887541274623826
+        ));
+        // A wall that dips below the horizon gives what its upper half gives.
+        let wall = |low: f64| f(&[[1., -0.5, low], [1., -0.5, 1.], [1., 0.5, 1.], [1., 0.5, low]]);
+        assert!(close(wall(0.0).abs(), 0.07109343904694551));
+        assert!(close(wall(-1.0).abs(), 0.07109343904694551));
+    }
+
+    #[test]
+    fn the_back_is_negative_and_below_is_nothing() {
+        let square = [[-1., -1., 1.], [1., -1., 1.], [1., 1., 1.], [-1., 1., 1.]];
+        let front = seen(&square);
+        let back: Vec<_> = front.iter().rev().copied().collect();
+        let f = to_polygon(DVec3::ZERO, DVec3::Z, &front);
+        assert_eq!(to_polygon(DVec3::ZERO, DVec3::Z, &back), -f);
+        assert_eq!(to_polygon(DVec3::ZERO, -DVec3::Z, &front), 0.0);
+    }
+}

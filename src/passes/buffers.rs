@@ -1,0 +1,264 @@
+//! What the passes share on the device: the scene, the state of the solution, and the batch under way.
+
+use std::sync::Arc;
+
+use bytemuck::Pod;
+use glam::Vec3;
+
+use super::types::{Component, Draw, Meshlet, Progress, Slot, Source, View, contour_corners};
+use crate::charts::Connections;
+use crate::constants::{FACES, NONE};
+use crate::elements::Elements;
+use crate::error::Result;
+use crate::hemicube::pixel_count;
+use crate::meshlets;
+use crate::sources::Sources;
+use crate::vk::{
+    Buffer, BufferUse, Commands, Device, Format, Framebuffer, Image, ImageUse, RenderPass, Sampler,
+    Stage,
+};
+
+/// The scene in internal units: read by the passes, never written.
+pub struct SceneBuffers {
+    pub element_count: u32,
+    pub source_count: u32,
+    pub meshlet_count: u32,
+    pub vertices: Buffer,
+    /// Three a element, `[element][corner]`.
+    pub corners: Buffer,
+    /// Normal and n · x.
+    pub planes: Buffer,
+    /// Centroid and radius.
+    pub balls: Buffer,
+    pub areas: Buffer,
+    pub reflectance: Buffer,
+    pub sources: Buffer,
+    pub contours: Buffer,
+    pub meshlets: Buffer,
+    pub components: Buffer,
+}
+
+impl SceneBuffers {
+    pub fn new(
+        device: &Arc<Device>,
+        elements: &Elements,
+        sources: &Sources,
+        connections: &Connections,
+    ) -> Result<Self> {
+        let vertices: Vec<Vec3> = elements.vertices.iter().map(|v| v.as_vec3()).collect();
+        let planes: Vec<[f32; 4]> = (0..elements.len())
+            .map(|e| {
+                let n = elements.normal[e];
+                n.as_vec3().extend(n.dot(elements.centroid[e]) as f32).to_array()
+            })
+            .collect();
+        let balls: Vec<[f32; 4]> = (0..elements.len())
+            .map(|e| {
+                elements.centroid[e]
+                    .as_vec3()
+                    .extend(elements.radius(e) as f32)
+                    .to_array()
+            })
+            .collect();
+        let areas: Vec<f32> = elements.area.iter().map(|&a| a as f32).collect();
+        let mut contours = Vec::new();
+        let mut gpu_sources = Vec::with_capacity(sources.list.len());
+        for source in &sources.list {
+            let corners = contour_corners(source);
+            gpu_sources.push(Source::new(source, contours.len() as u32, corners.len() as u32));
+            contours.extend(corners);
+        }
+        let meshlets: Vec<Meshlet> = meshlets::build(elements, connections, &sources.chart)
+            .iter()
+            .map(Meshlet::from)
+            .collect();
+        Ok(Self {
+            element_count: elements.len() as u32,
+            source_count: sources.list.len() as u32,
+            meshlet_count: meshlets.len() as u32,
+            vertices: upload(device, "vertices", &vertices, BufferUse::Geometry)?,
+            corners: upload(device, "corners", &elements.corners, BufferUse::Geometry)?,
+            planes: upload(device, "planes", &planes, BufferUse::Storage)?,
+            balls: upload(device, "balls", &balls, BufferUse::Storage)?,
+            areas: upload(device, "areas", &areas, BufferUse::Storage)?,
+            reflectance: upload(device, "reflectance", &elements.reflectance, BufferUse::Storage)?,
+            sources: upload(device, "sources", &gpu_sources, BufferUse::Storage)?,
+            contours: upload(device, "contours", &contours, BufferUse::Storage)?,
+            meshlets: upload(device, "meshlets", &meshlets, BufferUse::Storage)?,
+            components: upload(
+                device,
+                "components",
+                &components(elements, connections),
+                BufferUse::Storage,
+            )?,
+        })
+    }
+}
+
+fn components(elements: &Elements, connections: &Connections) -> Vec<Component> {
+    let mut components: Vec<_> = connections
+        .closed
+        .iter()
+        .map(|&closed| Component {
+            low: Vec3::INFINITY,
+            closed: closed.into(),
+            high: Vec3::NEG_INFINITY,
+        })
+        .collect();
+    for (e, &c) in connections.component.iter().enumerate() {
+        for v in elements.triangle(e) {
+            let component = &mut components[c as usize];
+            component.low = component.low.min(v.as_vec3());
+            component.high = component.high.max(v.as_vec3());
+        }
+    }
+    components
+}
+
+/// The solution under way, `[element]` and `[source]`.
+pub struct State {
+    pub direct: Buffer,
+    pub direct_error: Buffer,
+    pub indirect: Buffer,
+    pub indirect_error: Buffer,
+    /// Shots that each element passed over because the source was behind it.
+    pub behind: Buffer,
+    pub shot: Buffer,
+    pub unshot: Buffer,
+    pub progress: Buffer,
+}
+
+impl State {
+    /// Everything zero: no light yet.
+    pub fn new(device: &Arc<Device>, scene: &SceneBuffers) -> Result<Self> {
+        let elements = u64::from(scene.element_count);
+        let sources = u64::from(scene.source_count);
+        let zeroed = |name, bytes| -> Result<Buffer> {
+            let buffer = Buffer::new(device, name, bytes, BufferUse::Storage)?;
+            Commands::run(device, name, |cmd| {
+                cmd.fill(&buffer, 0);
+                Ok(())
+            })?;
+            Ok(buffer)
+        };
+        Ok(Self {
+            direct: zeroed("direct", 12 * elements)?,
+            direct_error: zeroed("direct error", 12 * elements)?,
+            indirect: zeroed("indirect", 12 * elements)?,
+            indirect_error: zeroed("indirect error", 12 * elements)?,
+            behind: zeroed("behind", 4 * elements)?,
+            shot: zeroed("shot", 16 * sources)?,
+            unshot: zeroed("unshot", 16 * sources)?,
+            progress: zeroed("progress", size_of::<Progress>() as u64)?,
+        })
+    }
+}
+
+/// A batch of sources with their hemicubes.
+pub struct Batch {
+    pub slot_count: u32,
+    /// Pixels a side of a face.
+    pub face_size: u32,
+    pub slots: Buffer,
+    pub views: Buffer,
+    pub draws: Buffer,
+    pub counts: Buffer,
+    /// `[slot][face][element]`: room for every triangle in every face.
+    pub drawn_corners: Buffer,
+    pub drawn_items: Buffer,
+    /// Columns of N × 3 N texels side by side, one a slot.
+    pub items: Image,
+    pub framebuffer: Framebuffer,
+    pub sampler: Sampler,
+    _depth: Image,
+}
+
+/// Bytes of the lists of drawn triangles, for one element in one face of one slot.
+const DRAWN_BYTES: u64 = 16;
+
+impl Batch {
+    /// How many slots a batch may have: what fits the device's largest buffer, its widest image and an eighth of its
+    /// memory, and no more than `wanted`.
+    pub fn fitting_slots(device: &Device, scene: &SceneBuffers, face_size: u32, wanted: u32) -> u32 {
+        let limits = device.limits();
+        let region = u64::from(FACES) * u64::from(scene.element_count);
+        let by_buffer = limits.max_storage_buffer_range / (12 * region).max(1);
+        let by_memory = limits.heap_bytes / 8 / (DRAWN_BYTES * region + 8 * pixel_count(face_size) as u64);
+        let by_width = u64::from(limits.max_image_side / face_size);
+        u64::from(wanted)
+            .min(by_buffer)
+            .min(by_memory)
+            .min(by_width)
+            .max(1) as u32
+    }
+
+    pub fn new(
+        device: &Arc<Device>,
+        pass: &RenderPass,
+        scene: &SceneBuffers,
+        face_size: u32,
+        slot_count: u32,
+    ) -> Result<Self> {
+        let regions = u64::from(slot_count * FACES);
+        let drawn = regions * u64::from(scene.element_count);
+        let buffer = |name, bytes, usage| Buffer::new(device, name, bytes, usage);
+        let size = (slot_count * face_size, 3 * face_size);
+        let items = Image::new(device, "item buffer", size, Format::R32_UINT, ImageUse::ColourTarget)?;
+        let depth = Image::new(device, "item depth", size, Format::D32_SFLOAT, ImageUse::DepthTarget)?;
+        let empty = vec![
+            Slot {
+                emitted: Vec3::ZERO,
+                source: NONE,
+                reflected: Vec3::ZERO,
+            };
+            slot_count as usize
+        ];
+        Ok(Self {
+            slot_count,
+            face_size,
+            slots: upload(device, "slots", &empty, BufferUse::Storage)?,
+            views: buffer("views", regions * size_of::<View>() as u64, BufferUse::Storage)?,
+            draws: buffer("draws", regions * size_of::<Draw>() as u64, BufferUse::Geometry)?,
+            counts: buffer("cull counts", regions * 8, BufferUse::Storage)?,
+            drawn_corners: buffer("drawn corners", 12 * drawn, BufferUse::Geometry)?,
+            drawn_items: buffer("drawn items", 4 * drawn, BufferUse::Storage)?,
+            framebuffer: Framebuffer::new(device, "item buffer", pass, &items, &depth)?,
+            sampler: Sampler::new(device, "item buffer", false)?,
+            items,
+            _depth: depth,
+        })
+    }
+}
+
+/// A device buffer filled with `data`.
+pub fn upload<T: Pod>(
+    device: &Arc<Device>,
+    name: &str,
+    data: &[T],
+    usage: BufferUse,
+) -> Result<Buffer> {
+    let bytes = size_of_val(data) as u64;
+    let buffer = Buffer::new(device, name, bytes, usage)?;
+    if bytes > 0 {
+        let mut staging = Buffer::new(device, "staging", bytes, BufferUse::Upload)?;
+        staging.write(0, data);
+        Commands::run(device, name, |cmd| {
+            cmd.copy(&staging, 0, &buffer, 0, bytes);
+            Ok(())
+        })?;
+    }
+    Ok(buffer)
+}
+
+/// The first `count` values of a device buffer; everything submitted before is done first.
+pub fn download<T: Pod>(device: &Arc<Device>, buffer: &Buffer, count: usize) -> Result<Vec<T>> {
+    let bytes = (count * size_of::<T>()) as u64;
+    let readback = Buffer::new(device, "readback", bytes, BufferUse::Readback)?;
+    Commands::run(device, "download", |cmd| {
+        cmd.barrier(&[Stage::Compute, Stage::Transfer, Stage::Attachment], &[Stage::Transfer]);
+        cmd.copy(buffer, 0, &readback, 0, bytes);
+        cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
+        Ok(())
+    })?;
+    Ok(readback.read(0, count))
+}

@@ -1,0 +1,86 @@
+//! Lists the triangles that each hemicube face must draw. Shader: `cull.comp`; twin: [`crate::reference::cull`].
+
+use std::sync::Arc;
+
+use bytemuck::{Pod, Zeroable};
+
+use super::buffers::{Batch, SceneBuffers};
+use super::shaders;
+use crate::constants::FACES;
+use crate::error::Result;
+use crate::vk::{Bind, Binding, Commands, ComputePipeline, DescriptorSet, Device};
+
+/// What is left out of the item buffer's draws. Every level gives the same item buffer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Culling {
+    /// Every triangle is drawn in every face.
+    Off,
+    /// Meshlets outside the frustum, below the horizon, or showing their backs on a closed part.
+    Meshlets,
+    /// Also triangles that cover no pixel's centre or show their backs.
+    #[default]
+    Triangles,
+}
+
+pub struct Cull {
+    pipeline: ComputePipeline,
+}
+
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+struct Parameters {
+    meshlet_count: u32,
+    element_count: u32,
+    face_size: u32,
+}
+
+impl Cull {
+    pub fn new(device: &Arc<Device>, culling: Culling) -> Result<Self> {
+        let constants = [
+            device.limits().subgroup_size,
+            (culling != Culling::Off).into(),
+            (culling == Culling::Triangles).into(),
+        ];
+        Ok(Self {
+            pipeline: ComputePipeline::new(
+                device,
+                "cull",
+                shaders::CULL_COMP,
+                &[Binding::Storage; 12],
+                size_of::<Parameters>(),
+                &constants,
+                true,
+            )?,
+        })
+    }
+
+    pub fn bind(&self, scene: &SceneBuffers, batch: &Batch) -> Result<DescriptorSet> {
+        self.pipeline.bind(
+            "cull",
+            &[
+                &batch.slots,
+                &scene.sources,
+                &scene.meshlets,
+                &scene.components,
+                &scene.corners,
+                &scene.vertices,
+                &scene.planes,
+                &batch.drawn_corners,
+                &batch.drawn_items,
+                &batch.draws,
+                &batch.views,
+                &batch.counts,
+            ]
+            .map(Bind::Buffer),
+        )
+    }
+
+    pub fn record(&self, cmd: &Commands, set: &DescriptorSet, scene: &SceneBuffers, batch: &Batch) {
+        let parameters = Parameters {
+            meshlet_count: scene.meshlet_count,
+            element_count: scene.element_count,
+            face_size: batch.face_size,
+        };
+        cmd.dispatch(&self.pipeline, set, &parameters, [FACES, batch.slot_count, 1]);
+    }
+}

@@ -1,0 +1,93 @@
+//! Draws the hemicubes of a batch: five faces a source as element IDs. Shaders: `item_buffer.vert`, `.frag`; twin:
+//! [`crate::reference::item_buffer`].
+
+use std::sync::Arc;
+
+use bytemuck::{Pod, Zeroable};
+
+use super::buffers::{Batch, SceneBuffers};
+use super::shaders;
+use super::types::Draw;
+use crate::constants::{FACES, NONE};
+use crate::error::Result;
+use crate::hemicube::face_rectangle;
+use crate::vk::{
+    Attachment, Bind, Binding, Commands, DescriptorSet, Device, Format, GraphicsPipeline,
+    GraphicsState, RenderPass, VertexAttribute,
+};
+
+pub struct ItemBuffer {
+    pub pass: RenderPass,
+    pipeline: GraphicsPipeline,
+}
+
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+struct Parameters {
+    region: u32,
+    first_item: u32,
+    near: f32,
+}
+
+/// Distance of the near plane, internal units: nearer than any two surfaces that are not one.
+const NEAR: f32 = 1e-6;
+
+impl ItemBuffer {
+    pub fn new(device: &Arc<Device>) -> Result<Self> {
+        let pass = RenderPass::new(
+            device,
+            "item buffer",
+            Attachment::read_by_shaders(Format::R32_UINT),
+        )?;
+        let pipeline = GraphicsPipeline::new(
+            device,
+            &pass,
+            &GraphicsState {
+                name: "item buffer",
+                vertex: shaders::ITEM_BUFFER_VERT,
+                fragment: shaders::ITEM_BUFFER_FRAG,
+                bindings: &[Binding::Storage; 2],
+                push_bytes: size_of::<Parameters>(),
+                vertex_stride: 12,
+                attributes: &[VertexAttribute {
+                    format: Format::R32G32B32_SFLOAT,
+                    offset: 0,
+                }],
+            },
+        )?;
+        Ok(Self { pass, pipeline })
+    }
+
+    pub fn bind(&self, batch: &Batch) -> Result<DescriptorSet> {
+        self.pipeline.bind(
+            "item buffer",
+            &[Bind::Buffer(&batch.views), Bind::Buffer(&batch.drawn_items)],
+        )
+    }
+
+    pub fn record(&self, cmd: &Commands, set: &DescriptorSet, scene: &SceneBuffers, batch: &Batch) {
+        cmd.begin_render_pass(&self.pass, &batch.framebuffer, [NONE; 4]);
+        cmd.bind_graphics(&self.pipeline, set, &scene.vertices);
+        cmd.bind_indices(&batch.drawn_corners);
+        for slot in 0..batch.slot_count {
+            for face in 0..FACES {
+                let [x, y, width, height] = face_rectangle(face, batch.face_size);
+                let region = slot * FACES + face;
+                cmd.viewport(slot * batch.face_size + x, y, width, height);
+                cmd.push_graphics(
+                    &self.pipeline,
+                    &Parameters {
+                        region,
+                        first_item: region * scene.element_count,
+                        near: NEAR,
+                    },
+                );
+                cmd.draw_indexed_indirect(
+                    &batch.draws,
+                    u64::from(region) * size_of::<Draw>() as u64,
+                );
+            }
+        }
+        cmd.end_render_pass();
+    }
+}

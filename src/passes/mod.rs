@@ -1,0 +1,23 @@
+//! GPU passes: one a file, named as its shader and as its CPU twin in [`crate::reference`]. Passes know `vk` and mathematics,
+//! never each other; only the solver orders them.
+
+pub mod bin_pixels;
+pub mod bin_receivers;
+pub mod buffers;
+pub mod cull;
+pub mod item_buffer;
+pub mod measure;
+pub mod select;
+pub mod types;
+
+use crate::constants::GROUP;
+
+/// Compiled shaders, one constant a file.
+pub mod shaders {
+    include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
+}
+
+/// Workgroups for one invocation an item.
+fn groups(items: u32) -> u32 {
+    items.div_ceil(GROUP)
+}

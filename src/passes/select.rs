@@ -1,0 +1,59 @@
+//! Chooses the sources of a batch. Shader: `select.comp`; twin: [`crate::reference::select`].
+
+use std::sync::Arc;
+
+use bytemuck::{Pod, Zeroable};
+
+use super::buffers::{Batch, SceneBuffers, State};
+use super::shaders;
+use crate::error::Result;
+use crate::vk::{Bind, Binding, Commands, ComputePipeline, DescriptorSet, Device};
+
+pub struct Select {
+    pipeline: ComputePipeline,
+}
+
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct Parameters {
+    pub source_count: u32,
+    pub slot_count: u32,
+    /// Shots at most, from the start.
+    pub shot_limit: u32,
+    /// No more shots once all emission is shot and this much reflected power is unshot, internal units.
+    pub stop_power: f32,
+}
+
+impl Select {
+    pub fn new(device: &Arc<Device>) -> Result<Self> {
+        Ok(Self {
+            pipeline: ComputePipeline::new(
+                device,
+                "select",
+                shaders::SELECT_COMP,
+                &[Binding::Storage; 5],
+                size_of::<Parameters>(),
+                &[],
+                false,
+            )?,
+        })
+    }
+
+    pub fn bind(&self, scene: &SceneBuffers, state: &State, batch: &Batch) -> Result<DescriptorSet> {
+        self.pipeline.bind(
+            "select",
+            &[
+                &scene.sources,
+                &state.shot,
+                &state.unshot,
+                &batch.slots,
+                &state.progress,
+            ]
+            .map(Bind::Buffer),
+        )
+    }
+
+    pub fn record(&self, cmd: &Commands, set: &DescriptorSet, parameters: &Parameters) {
+        cmd.dispatch(&self.pipeline, set, parameters, [1, 1, 1]);
+    }
+}

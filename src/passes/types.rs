@@ -1,0 +1,138 @@
+//! The structs that Rust and GLSL share, scalar layout. `shaders/shared/types.glsl` has the same fields in the same order;
+//! `tests/shader_layout.rs` compares every offset.
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+use crate::constants::KIND_SURFACE;
+use crate::meshlets;
+use crate::sources;
+
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct Source {
+    pub eye: Vec3,
+    pub area: f32,
+    pub normal: Vec3,
+    pub radius: f32,
+    pub tangent: Vec3,
+    pub cone_sin: f32,
+    pub bitangent: Vec3,
+    pub cone_cos: f32,
+    pub emitted: Vec3,
+    pub kind: u32,
+    pub first_element: u32,
+    pub element_count: u32,
+    pub first_contour: u32,
+    pub contour_count: u32,
+    pub component: u32,
+}
+
+impl Source {
+    /// `first_contour` and `contour_count` count the corners of [`contour_corners`].
+    pub fn new(source: &sources::Source, first_contour: u32, contour_count: u32) -> Self {
+        Self {
+            eye: source.eye.as_vec3(),
+            area: source.area as f32,
+            normal: source.normal.as_vec3(),
+            // A little more than it is, for the rounding to f32.
+            radius: (source.radius * (1.0 + 1e-6)) as f32,
+            tangent: source.tangent.as_vec3(),
+            cone_sin: source.cone.sin() as f32,
+            bitangent: source.bitangent.as_vec3(),
+            cone_cos: source.cone.cos() as f32,
+            emitted: source.emitted,
+            kind: source.kind,
+            first_element: source.first_element,
+            element_count: source.element_count,
+            first_contour,
+            contour_count,
+            component: source.component,
+        }
+    }
+}
+
+/// A source's outline as the shader walks it: each loop's corners and its first once more; w is 1 where a loop starts.
+pub fn contour_corners(source: &sources::Source) -> Vec<[f32; 4]> {
+    let mut corners = Vec::new();
+    if source.kind != KIND_SURFACE {
+        return corners;
+    }
+    for closed in &source.contour {
+        for (i, corner) in closed.iter().chain(closed.first()).enumerate() {
+            let c = corner.as_vec3();
+            corners.push([c.x, c.y, c.z, if i == 0 { 1.0 } else { 0.0 }]);
+        }
+    }
+    corners
+}
+
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct Meshlet {
+    pub centre: Vec3,
+    pub radius: f32,
+    pub axis: Vec3,
+    pub cutoff: f32,
+    pub first: u32,
+    pub count: u32,
+    pub component: u32,
+}
+
+impl From<&meshlets::Meshlet> for Meshlet {
+    fn from(m: &meshlets::Meshlet) -> Self {
+        Self {
+            centre: m.centre.as_vec3(),
+            radius: m.radius as f32,
+            axis: m.axis.as_vec3(),
+            cutoff: m.cutoff as f32,
+            first: m.first,
+            count: m.count,
+            component: m.component,
+        }
+    }
+}
+
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct Component {
+    pub low: Vec3,
+    pub closed: u32,
+    pub high: Vec3,
+}
+
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct Slot {
+    pub emitted: Vec3,
+    pub source: u32,
+    pub reflected: Vec3,
+}
+
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct View {
+    pub eye: Vec3,
+    pub x: Vec3,
+    pub y: Vec3,
+    pub w: Vec3,
+}
+
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct Draw {
+    pub index_count: u32,
+    pub instance_count: u32,
+    pub first_index: u32,
+    pub vertex_offset: i32,
+    pub first_instance: u32,
+}
+
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+pub struct Progress {
+    pub unshot_emitted: f32,
+    pub unshot_reflected: f32,
+    pub shots: u32,
+    pub selected: u32,
+}

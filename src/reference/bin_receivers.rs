@@ -1,0 +1,117 @@
+//! Twin of the receiver estimator: form factors and visibility of one source for every element, in f64.
+
+use glam::DVec3;
+
+use crate::constants::{KIND_POINT, NONE};
+use crate::elements::Elements;
+use crate::form_factor::to_polygon;
+use crate::hemicube::{direction_of, pixel_of};
+use crate::sources::Source;
+
+/// Rounding of a plane's height at a point, as in the shader.
+const HEIGHT_EPSILON: f64 = 1e-6;
+/// Pixels' footprints that two points of one surface may lie apart, as in the shader.
+const REACH: f64 = 1.5;
+
+/// Mean over an element of form factor times visibility: irradiance from a unit of the source's radiosity.
+pub fn gather(elements: &Elements, source: &Source, items: &[u32], n: u32, element: usize) -> f64 {
+    let triangle = elements.triangle(element);
+    let centroid = elements.centroid[element];
+    let size = elements.radius(element);
+    let gap = centroid.distance(source.eye) - source.radius;
+    let points: &[[f64; 3]] = if gap > 4.0 * size {
+        &POINTS[..1]
+    } else if gap > size {
+        &POINTS[1..4]
+    } else {
+        &POINTS[4..]
+    };
+    points
+        .iter()
+        .map(|&[u, v, weight]| {
+            let p = triangle[0] + u * (triangle[1] - triangle[0]) + v * (triangle[2] - triangle[0]);
+            let f = form_factor(elements, source, p, element);
+            if f > 0.0 && visible(elements, source, items, n, p, element) {
+                weight * f
+            } else {
+                0.0
+            }
+        })
+        .sum()
+}
+
+/// Form factor from a point of an element to the source, as if nothing stood between.
+fn form_factor(elements: &Elements, source: &Source, p: DVec3, element: usize) -> f64 {
+    let normal = elements.normal[element];
+    if source.kind == KIND_POINT {
+        let d = source.eye - p;
+        let side = d.dot(source.normal);
+        let mine = if source.cone == 0.0 { side <= 0.0 } else { side < 0.0 };
+        return if mine { d.dot(normal).max(0.0) / d.length().powi(3) } else { 0.0 };
+    }
+    if source.cone == 0.0 {
+        if (p - source.eye).dot(source.normal) <= HEIGHT_EPSILON * source.radius {
+            return 0.0;
+        }
+        return source
+            .contour
+            .iter()
+            .map(|c| to_polygon(p, normal, c))
+            .sum::<f64>()
+            .max(0.0);
+    }
+    // Curved: every member that shows its front, by itself.
+    (source.first_element..source.first_element + source.element_count)
+        .map(|m| m as usize)
+        .filter(|&m| m != element && (p - elements.centroid[m]).dot(elements.normal[m]) > 0.0)
+        .map(|m| to_polygon(p, normal, &elements.triangle(m)).max(0.0))
+        .sum()
+}
+
+fn visible(elements: &Elements, source: &Source, items: &[u32], n: u32, p: DVec3, element: usize) -> bool {
+    let d = p - source.eye;
+    let local = DVec3::new(
+        d.dot(source.tangent),
+        d.dot(source.bitangent),
+        d.dot(source.normal),
+    );
+    let pixel = pixel_of(local, n);
+    let item = items[(pixel.row * n + pixel.column) as usize];
+    if item == NONE || item as usize == element {
+        return true;
+    }
+    let plane = elements.normal[item as usize];
+    let on_plane = elements.centroid[item as usize];
+    let eye_height = (source.eye - on_plane).dot(plane);
+    let height = (p - on_plane).dot(plane);
+    let depth = if eye_height >= 0.0 { -height } else { height };
+    if depth <= HEIGHT_EPSILON {
+        return true;
+    }
+    let ray = direction_of(pixel, n);
+    let ray = source.tangent * ray.x + source.bitangent * ray.y + source.normal * ray.z;
+    let seen = source.eye + ray * (-eye_height / plane.dot(ray));
+    if (seen - source.eye).dot(d) > d.length_squared() {
+        return true;
+    }
+    let apart = p.distance(seen);
+    let normal = elements.normal[element];
+    let grazing = normal.dot(d).abs().min(plane.dot(d).abs()) / d.length();
+    let footprint = d.length() * 2.0 / f64::from(n) / grazing.max(0.05);
+    apart <= REACH * footprint && depth <= apart * normal.cross(plane).length() + HEIGHT_EPSILON
+}
+
+/// Sample points of a triangle (two barycentric coordinates, weight): the centroid; degree 2; Radon's degree 5.
+const POINTS: [[f64; 3]; 11] = [
+    [1.0 / 3.0, 1.0 / 3.0, 1.0],
+    [1.0 / 6.0, 1.0 / 6.0, 1.0 / 3.0],
+    [2.0 / 3.0, 1.0 / 6.0, 1.0 / 3.0],
+    [1.0 / 6.0, 2.0 / 3.0, 1.0 / 3.0],
+    [1.0 / 3.0, 1.0 / 3.0, 0.225],
+    [0.470142064, 0.470142064, 0.132394153],
+    [0.059715872, 0.470142064, 0.132394153],
+    [0.470142064, 0.059715872, 0.132394153],
+    [0.101286507, 0.101286507, 0.125939181],
+    [0.797426985, 0.101286507, 0.125939181],
+    [0.101286507, 0.797426985, 0.125939181],
+];

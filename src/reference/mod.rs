@@ -1,0 +1,8 @@
+//! The slow, obviously right twin of each GPU pass, in f64 on the CPU.
+
+pub mod bin_pixels;
+pub mod bin_receivers;
+pub mod cull;
+pub mod item_buffer;
+pub mod measure;
+pub mod select;

@@ -1,0 +1,286 @@
+//! The progressive solver: it alone orders the passes.
+//!
+//! A batch is one submission: measure → select → cull → item buffer → binning. Two batches are under way at a time; the
+//! device chooses what to shoot and when to stop, and the CPU looks on one batch behind.
+
+mod batch;
+mod report;
+mod self_test;
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use glam::Vec3;
+
+use crate::charts::Connections;
+use crate::elements::Elements;
+use crate::error::{Error, Result};
+use crate::passes::buffers::{Batch, SceneBuffers, State, download};
+use crate::passes::cull::Culling;
+use crate::passes::item_buffer::ItemBuffer;
+use crate::passes::types::Progress;
+use crate::scene::PointLight;
+use crate::sources::{self, Grouping, Sources};
+use crate::vk::Device;
+
+use batch::BatchLoop;
+pub use report::{Report, Seconds, Skipped, StopReason};
+pub use self_test::{ids_come_back_right, open_device};
+
+/// How form factors are taken from the item buffer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Estimator {
+    /// Lambert's formula for each receiver, visibility from the item buffer.
+    #[default]
+    Receiver,
+    /// The paper's equations (1) and (2): the sum of the pixels' form factors.
+    Pixel,
+}
+
+#[derive(Debug, Clone)]
+pub struct Settings {
+    pub estimator: Estimator,
+    /// Pixels a side of a hemicube's face; even.
+    pub hemicube: u32,
+    /// Stops when the error bound is no more than this.
+    pub residual: f64,
+    /// Stops after this time.
+    pub budget: Option<Duration>,
+    /// Stops after this many shots.
+    pub shots: Option<u32>,
+    pub seed: u64,
+    pub grouping: Grouping,
+    pub culling: Culling,
+    /// Sources of a batch, at most.
+    pub batch: u32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            estimator: Estimator::default(),
+            hemicube: 128,
+            residual: 1e-3,
+            budget: None,
+            shots: None,
+            seed: 0,
+            grouping: Grouping::default(),
+            culling: Culling::default(),
+            batch: 16,
+        }
+    }
+}
+
+/// Smallest and largest hemicube.
+pub const HEMICUBE_RANGE: std::ops::RangeInclusive<u32> = 8..=2048;
+
+impl Settings {
+    fn check(&self) -> Result<()> {
+        if !HEMICUBE_RANGE.contains(&self.hemicube) || self.hemicube % 2 != 0 {
+            return Err(Error::Usage(format!(
+                "--hemicube {}: must be even and in {} to {}",
+                self.hemicube,
+                HEMICUBE_RANGE.start(),
+                HEMICUBE_RANGE.end()
+            )));
+        }
+        if !(self.residual.is_finite() && self.residual > 0.0) {
+            return Err(Error::Usage(format!(
+                "--residual {}: must be above 0",
+                self.residual
+            )));
+        }
+        Ok(())
+    }
+}
+
+/// How far a solution has come.
+#[derive(Debug, Clone, Copy)]
+pub struct Update {
+    pub shots: u32,
+    pub sources: u32,
+    /// Unshot power as a share of all that was emitted.
+    pub unshot_share: f64,
+    /// Power that can still be missing, as a share of all that was emitted; none where a reflectance is 1.
+    pub error_bound: Option<f64>,
+    /// Since the start of the solution.
+    pub elapsed: Duration,
+    /// An estimate, from how fast the bound has fallen lately.
+    pub left: Option<Duration>,
+}
+
+/// Irradiance and radiosity, `[element]` in internal order, W·m⁻², RGB.
+pub struct Light {
+    pub irradiance_direct: Vec<Vec3>,
+    pub irradiance: Vec<Vec3>,
+    pub radiosity: Vec<Vec3>,
+}
+
+/// A scene on the device with its solution under way.
+pub struct Solver {
+    device: Arc<Device>,
+    settings: Settings,
+    pub elements: Elements,
+    pub sources: Sources,
+    pub connections: Connections,
+    // Before the buffers that its commands use.
+    batches: BatchLoop,
+    scene: SceneBuffers,
+    state: State,
+    report: Report,
+    emitted_power: f64,
+    setup: Duration,
+}
+
+impl Solver {
+    /// Groups the elements into sources and brings everything to the device.
+    pub fn new(
+        device: &Arc<Device>,
+        mut elements: Elements,
+        lights: &[PointLight],
+        settings: &Settings,
+    ) -> Result<Self> {
+        settings.check()?;
+        let start = Instant::now();
+        let (sources, connections) =
+            sources::build(&mut elements, lights, &settings.grouping, settings.seed);
+        let scene = SceneBuffers::new(device, &elements, &sources, &connections)?;
+        let state = State::new(device, &scene)?;
+        let item_buffer = ItemBuffer::new(device)?;
+        let wanted = settings.batch.clamp(1, scene.source_count.max(1));
+        let slots = Batch::fitting_slots(device, &scene, settings.hemicube, wanted);
+        let batch = Batch::new(device, &item_buffer.pass, &scene, settings.hemicube, slots)?;
+        let emitted_power: f64 = sources.list.iter().map(sources::Source::emitted_power).sum();
+        let bound_factor = bound_factor(&elements);
+        // The bound is bound_factor · unshot / emitted; never stop on more unshot than the residual itself.
+        let stop_power = settings.residual * emitted_power / bound_factor.unwrap_or(1e3).max(1.0);
+        let batches = BatchLoop::new(device, settings, item_buffer, batch, &scene, &state, stop_power)?;
+        let mut report = Report::new(device, settings, &elements, &sources, slots);
+        report.set_meshlets(scene.meshlet_count);
+        Ok(Self {
+            device: Arc::clone(device),
+            settings: settings.clone(),
+            elements,
+            sources,
+            connections,
+            batches,
+            scene,
+            state,
+            report,
+            emitted_power,
+            setup: start.elapsed(),
+        })
+    }
+
+    /// Shoots until a stop rule holds, or `go_on` says no. What has been solved so far is always valid.
+    pub fn run(&mut self, mut go_on: impl FnMut(&Update) -> bool) -> Result<()> {
+        let start = Instant::now();
+        let factor = bound_factor(&self.elements);
+        let budget = self.settings.budget.unwrap_or(Duration::MAX);
+        let sources = self.scene.source_count;
+        let emitted = self.emitted_power;
+        let mut history: Vec<(f64, f64)> = Vec::new();
+        let mut stop = None;
+        let report = &mut self.report;
+        self.batches.run(|batch| {
+            report.add(batch);
+            let Progress {
+                unshot_emitted,
+                unshot_reflected,
+                shots,
+                selected,
+            } = batch.progress;
+            let unshot_share = ratio(f64::from(unshot_emitted + unshot_reflected), emitted);
+            let error_bound = factor.map(|f| unshot_share * f.max(1.0));
+            let elapsed = start.elapsed();
+            history.push((elapsed.as_secs_f64(), unshot_share));
+            report.unshot_share = unshot_share;
+            report.error_bound = error_bound;
+            if stop.is_some() {
+                return false;
+            }
+            if selected == 0 {
+                stop = Some(match self.settings.shots {
+                    Some(limit) if shots >= limit => StopReason::Shots,
+                    _ => StopReason::Residual,
+                });
+                return false;
+            }
+            let update = Update {
+                shots,
+                sources,
+                unshot_share,
+                error_bound,
+                elapsed,
+                left: time_left(&history, self.settings.residual / factor.unwrap_or(1e3).max(1.0)),
+            };
+            if !go_on(&update) {
+                stop = Some(StopReason::Interrupted);
+            } else if elapsed >= budget {
+                stop = Some(StopReason::Budget);
+            }
+            stop.is_none()
+        })?;
+        // The last batches have shot since the last look: what is left now is what a measurement finds.
+        let last = self.batches.remeasure()?;
+        report.shots = last.shots;
+        report.unshot_share = ratio(f64::from(last.unshot_emitted + last.unshot_reflected), emitted);
+        report.error_bound = factor.map(|f| report.unshot_share * f.max(1.0));
+        report.stop = stop.unwrap_or(StopReason::Residual);
+        report.seconds.setup = self.setup.as_secs_f64();
+        report.seconds.solve_wall += start.elapsed().as_secs_f64();
+        let behind: Vec<u32> = download(&self.device, &self.state.behind, self.elements.len())?;
+        report.skipped.receivers_behind_source = behind.iter().map(|&b| u64::from(b)).sum();
+        Ok(())
+    }
+
+    /// What has been solved so far.
+    pub fn light(&self) -> Result<Light> {
+        let count = self.elements.len();
+        let direct: Vec<Vec3> = download(&self.device, &self.state.direct, count)?;
+        let indirect: Vec<Vec3> = download(&self.device, &self.state.indirect, count)?;
+        let irradiance: Vec<Vec3> = direct.iter().zip(&indirect).map(|(d, i)| d + i).collect();
+        let radiosity = (0..count)
+            .map(|e| self.elements.emitted[e] + self.elements.reflectance[e] * irradiance[e])
+            .collect();
+        Ok(Light {
+            irradiance_direct: direct,
+            irradiance,
+            radiosity,
+        })
+    }
+
+    pub fn report(&self) -> &Report {
+        &self.report
+    }
+
+    /// The scene and batch buffers, for tests and benchmarks of single passes.
+    pub fn batches(&mut self) -> (&mut BatchLoop, &SceneBuffers, &State) {
+        (&mut self.batches, &self.scene, &self.state)
+    }
+}
+
+pub use batch::{BatchResult, Stages};
+
+/// Power that a unit of unshot power can still turn into: ρ + ρ² + … = ρ/(1 − ρ) for the largest ρ. None at ρ = 1.
+fn bound_factor(elements: &Elements) -> Option<f64> {
+    let rho = f64::from(elements.max_reflectance());
+    (rho < 1.0).then(|| rho / (1.0 - rho))
+}
+
+fn ratio(part: f64, whole: f64) -> f64 {
+    if whole > 0.0 { part / whole } else { 0.0 }
+}
+
+/// Time until the unshot share falls to `target`, if it goes on falling as over the last half of the run.
+fn time_left(history: &[(f64, f64)], target: f64) -> Option<Duration> {
+    let &(now, share) = history.last()?;
+    let &(then, share_then) = history.get(history.len() / 2)?;
+    if share <= 0.0 || share >= share_then || now <= then {
+        return None;
+    }
+    let rate = (share_then / share).ln() / (now - then);
+    let left = ((share / target).ln() / rate).max(0.0);
+    (left.is_finite() && left < 1e6).then(|| Duration::from_secs_f64(left))
+}
+

@@ -1,0 +1,131 @@
+//! What a bake says of itself.
+
+use serde::Serialize;
+
+use super::{BatchResult, Estimator, Settings};
+use crate::elements::Elements;
+use crate::passes::cull::Culling;
+use crate::sources::Sources;
+use crate::vk::Device;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum StopReason {
+    /// The error bound is no more than what was asked for.
+    Residual,
+    Budget,
+    Shots,
+    /// Ctrl-C.
+    Interrupted,
+}
+
+/// Seconds by stage.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct Seconds {
+    /// Wall time of grouping the elements and bringing them to the device.
+    pub setup: f64,
+    /// Wall time of all batches.
+    pub solve_wall: f64,
+    // By GPU timestamps:
+    pub select: f64,
+    pub cull: f64,
+    pub item_buffer: f64,
+    pub bin: f64,
+}
+
+/// What the scene did not need.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct Skipped {
+    /// Triangles without area, left out when the scene was read.
+    pub degenerate_triangles: u64,
+    /// Groups of elements that neither emit nor reflect.
+    pub black_sources: u64,
+    /// Hemicube faces in which nothing was to be drawn.
+    pub empty_faces: u64,
+    /// Meshlets that a face did not draw.
+    pub meshlets_culled: u64,
+    /// Triangles of the other meshlets that a face did not draw.
+    pub triangles_culled: u64,
+    /// Pairs of shot and element in which the source lay behind the element.
+    pub receivers_behind_source: u64,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct Report {
+    pub device: String,
+    pub estimator: &'static str,
+    pub hemicube: u32,
+    pub elements: u64,
+    pub sources: u64,
+    pub batch: u32,
+    pub hemicubes: u64,
+    pub triangles_drawn: u64,
+    pub shots: u32,
+    pub unshot_share: f64,
+    /// Null where a reflectance is 1: nothing bounds what is left then.
+    pub error_bound: Option<f64>,
+    pub stop: StopReason,
+    pub seconds: Seconds,
+    pub skipped: Skipped,
+    #[serde(skip)]
+    meshlets: u64,
+    #[serde(skip)]
+    culls: bool,
+}
+
+impl Report {
+    pub(super) fn new(
+        device: &Device,
+        settings: &Settings,
+        elements: &Elements,
+        sources: &Sources,
+        batch: u32,
+    ) -> Self {
+        Self {
+            device: device.name().to_owned(),
+            estimator: match settings.estimator {
+                Estimator::Receiver => "receiver",
+                Estimator::Pixel => "pixel",
+            },
+            hemicube: settings.hemicube,
+            elements: elements.len() as u64,
+            sources: sources.list.len() as u64,
+            batch,
+            hemicubes: 0,
+            triangles_drawn: 0,
+            shots: 0,
+            unshot_share: 1.0,
+            error_bound: None,
+            stop: StopReason::Residual,
+            seconds: Seconds::default(),
+            skipped: Skipped {
+                black_sources: sources.black as u64,
+                ..Skipped::default()
+            },
+            meshlets: 0,
+            culls: settings.culling != Culling::Off,
+        }
+    }
+
+    pub(super) fn set_meshlets(&mut self, meshlets: u32) {
+        self.meshlets = u64::from(meshlets);
+    }
+
+    pub(super) fn add(&mut self, batch: &BatchResult) {
+        let faces = batch.progress.selected as usize * crate::constants::FACES as usize;
+        self.hemicubes += u64::from(batch.progress.selected);
+        self.seconds.select += batch.stages.select;
+        self.seconds.cull += batch.stages.cull;
+        self.seconds.item_buffer += batch.stages.item_buffer;
+        self.seconds.bin += batch.stages.bin;
+        for (draw, counts) in batch.draws.iter().zip(&batch.counts).take(faces) {
+            let drawn = u64::from(draw.index_count / 3);
+            self.triangles_drawn += drawn;
+            self.skipped.empty_faces += u64::from(drawn == 0);
+            if self.culls {
+                self.skipped.meshlets_culled += self.meshlets - u64::from(counts[0]);
+                self.skipped.triangles_culled += u64::from(counts[1]) - drawn;
+            }
+        }
+    }
+}

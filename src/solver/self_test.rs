@@ -1,0 +1,147 @@
+//! Opening a device and testing, before anything is trusted to it, that element IDs come back right.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::Settings;
+use crate::elements::Elements;
+use crate::error::{Error, Result};
+use crate::passes::buffers::{Batch, SceneBuffers, State};
+use crate::passes::item_buffer::ItemBuffer;
+use crate::scene::{Material, Scene, Triangle};
+use crate::sources;
+use crate::vk::{Buffer, BufferUse, Commands, Device, Instance, Stage};
+
+/// Opens the device asked for, by index or part of its name, or else the best one that can run this program.
+pub fn open_device(wanted: Option<&str>, validation: bool) -> Result<Arc<Device>> {
+    let instance = Instance::new(validation)?;
+    let candidates = instance.candidates()?;
+    let chosen = match wanted {
+        None => candidates.first(),
+        Some(wanted) => {
+            let by_index = wanted
+                .parse::<usize>()
+                .ok()
+                .and_then(|i| candidates.iter().find(|c| c.index == i));
+            by_index.or_else(|| {
+                let lower = wanted.to_lowercase();
+                candidates.iter().find(|c| c.name.to_lowercase().contains(&lower))
+            })
+        }
+    };
+    let Some(candidate) = chosen else {
+        let names: Vec<_> = candidates
+            .iter()
+            .map(|c| format!("{}: {}", c.index, c.name))
+            .collect();
+        return Err(Error::Device(match wanted {
+            Some(wanted) if !names.is_empty() => {
+                format!("no device \"{wanted}\"; there are {}", names.join(", "))
+            }
+            _ => "no Vulkan device; on Debian install mesa-vulkan-drivers for a software one".into(),
+        }));
+    };
+    let device = Device::new(&instance, candidate)?;
+    if !ids_come_back_right(&device)? {
+        return Err(Error::Device(format!(
+            "device {} ({}) gives wrong primitive numbers to fragment shaders (some Mesa 25.3 to 26.1 drivers do); \
+             update the driver or choose another --device",
+            candidate.name, candidate.driver
+        )));
+    }
+    Ok(device)
+}
+
+/// Draws one hemicube inside a small box of distinct triangles and compares every pixel's ID with the triangle that the
+/// pixel's own ray meets.
+pub fn ids_come_back_right(device: &Arc<Device>) -> Result<bool> {
+    const SIZE: u32 = 16;
+    let mut elements = Elements::new(&open_box());
+    let settings = Settings::default();
+    let (sources, connections) = sources::build(&mut elements, &[], &settings.grouping, 0);
+    let scene = SceneBuffers::new(device, &elements, &sources, &connections)?;
+    let state = State::new(device, &scene)?;
+    let item_buffer = ItemBuffer::new(device)?;
+    let batch = Batch::new(device, &item_buffer.pass, &scene, SIZE, 1)?;
+    let measure = crate::passes::measure::Measure::new(device)?;
+    let select = crate::passes::select::Select::new(device)?;
+    let cull = crate::passes::cull::Cull::new(device, settings.culling)?;
+    let sets = (
+        measure.bind(&scene, &state)?,
+        select.bind(&scene, &state, &batch)?,
+        cull.bind(&scene, &batch)?,
+        item_buffer.bind(&batch)?,
+    );
+    let pixels = crate::hemicube::pixel_count(SIZE);
+    let readback = Buffer::new(device, "self-test", 4 * pixels as u64, BufferUse::Readback)?;
+    Commands::run(device, "self-test", |cmd| {
+        let then = || cmd.barrier(&[Stage::Compute], &[Stage::Compute, Stage::Draw]);
+        measure.record(cmd, &sets.0, scene.source_count);
+        then();
+        let parameters = crate::passes::select::Parameters {
+            source_count: scene.source_count,
+            slot_count: 1,
+            shot_limit: 1,
+            stop_power: 0.0,
+        };
+        select.record(cmd, &sets.1, &parameters);
+        then();
+        cull.record(cmd, &sets.2, &scene, &batch);
+        then();
+        item_buffer.record(cmd, &sets.3, &scene, &batch);
+        cmd.copy_shader_image_to_buffer(&batch.items, &readback);
+        cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
+        Ok(())
+    })?;
+    let drawn: Vec<u32> = readback.read(0, pixels);
+    // The source chosen is the only one that emits.
+    let emitter = sources
+        .list
+        .iter()
+        .find(|s| s.emitted.max_element() > 0.0)
+        .expect("the test scene has a light");
+    Ok(crate::reference::item_buffer::agrees(&elements, emitter, SIZE, &drawn))
+}
+
+/// Five walls of a box, an emitter in the floor, and a triangle afloat.
+fn open_box() -> Scene {
+    let mut scene = Scene {
+        materials: vec![
+            Material {
+                name: "wall".into(),
+                kd: [0.5; 3],
+                ..Material::default()
+            },
+            Material {
+                name: "light".into(),
+                ke: [1.0; 3],
+                ..Material::default()
+            },
+        ],
+        ..Scene::default()
+    };
+    let mut add = |corners: [[f64; 3]; 3], material| {
+        let first = scene.vertices.len() as u32;
+        scene.vertices.extend(corners.map(DVec3::from_array));
+        scene.triangles.push(Triangle {
+            vertices: [first, first + 1, first + 2],
+            uv: [[0.0; 2]; 3],
+            material,
+        });
+    };
+    add([[0.3, 0.3, 0.0], [0.7, 0.35, 0.0], [0.5, 0.6, 0.0]], 1);
+    add([[0.2, 0.3, 0.6], [0.5, 0.8, 0.7], [0.6, 0.2, 0.5]], 0);
+    // Walls as two triangles each, wound to face inward or outward alike: both sides block light.
+    for (a, b, c, d) in [
+        ([0., 0., 1.], [1., 0., 1.], [1., 1., 1.], [0., 1., 1.]),
+        ([0., 0., 0.], [1., 0., 0.], [1., 0., 1.], [0., 0., 1.]),
+        ([0., 1., 0.], [0., 1., 1.], [1., 1., 1.], [1., 1., 0.]),
+        ([0., 0., 0.], [0., 0., 1.], [0., 1., 1.], [0., 1., 0.]),
+        ([1., 0., 0.], [1., 1., 0.], [1., 1., 1.], [1., 0., 1.]),
+    ] {
+        add([a, b, c], 0);
+        add([a, c, d], 0);
+    }
+    scene
+}

@@ -1,0 +1,313 @@
+//! Sources: groups of neighbouring, nearly coplanar elements that shoot together from one hemicube.
+//!
+//! Charts are cut in two until each part is small enough in elements, area and emitted power; the parts' order becomes the
+//! elements' order, so that a source is a range of elements. An element that is itself too large or too bright is cut into
+//! several sources. A point light is two sources, one for each half of its sphere.
+
+use glam::{DVec3, Vec3};
+
+use crate::charts::{Connections, charts, morton_order};
+use crate::constants::{KIND_POINT, KIND_SURFACE, NONE};
+use crate::contour::{Loop, contour};
+use crate::elements::Elements;
+use crate::scene::PointLight;
+
+/// Where groups are cut.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grouping {
+    /// Most elements of a source.
+    pub max_elements: usize,
+    /// Most area of a source, as a share of the scene's.
+    pub max_area: f64,
+    /// Most emitted power of a source, as a share of the scene's.
+    pub max_power: f64,
+}
+
+impl Default for Grouping {
+    fn default() -> Self {
+        Self {
+            max_elements: 48,
+            max_area: 1.0 / 512.0,
+            max_power: 1.0 / 128.0,
+        }
+    }
+}
+
+/// One source, in internal units. See [`crate::passes::types::Source`] for the form the GPU reads.
+#[derive(Debug, Clone)]
+pub struct Source {
+    pub kind: u32,
+    /// Place of the hemicube: on the surface, or the point light.
+    pub eye: DVec3,
+    /// Mean normal, and the hemicube's other two axes.
+    pub normal: DVec3,
+    pub tangent: DVec3,
+    pub bitangent: DVec3,
+    pub area: f64,
+    /// Of the ball about `eye` that holds the source.
+    pub radius: f64,
+    /// Largest angle between `normal` and a member's normal; exactly 0 where all lie in one plane.
+    pub cone: f64,
+    /// Radiosity from emission; a point light's radiant intensity over the square of the internal unit.
+    pub emitted: Vec3,
+    /// Members: a range of elements.
+    pub first_element: u32,
+    pub element_count: u32,
+    /// Outline, counter-clockwise seen from the front.
+    pub contour: Vec<Loop>,
+    pub component: u32,
+}
+
+impl Source {
+    /// Emitted power, internal units, summed over the colours.
+    pub fn emitted_power(&self) -> f64 {
+        let sum = f64::from(self.emitted.element_sum());
+        match self.kind {
+            KIND_POINT => 2.0 * std::f64::consts::PI * sum,
+            _ => self.area * sum,
+        }
+    }
+}
+
+/// Sources that can ever shoot, and how many were left out because they are black.
+pub struct Sources {
+    pub list: Vec<Source>,
+    pub black: usize,
+    /// Chart of each element, for the meshlets.
+    pub chart: Vec<u32>,
+}
+
+/// Orders the elements and groups them. `seed` turns each hemicube about its axis by an angle of its own, which keeps the
+/// pixels' grids from agreeing with one another.
+pub fn build(
+    elements: &mut Elements,
+    lights: &[PointLight],
+    grouping: &Grouping,
+    seed: u64,
+) -> (Sources, Connections) {
+    let connections = Connections::new(elements);
+    let total_area: f64 = elements.area.iter().sum();
+    let power = |e: usize| elements.area[e] * f64::from(elements.emitted[e].element_sum());
+    let total_power: f64 = (0..elements.len()).map(power).sum();
+    let too_much = |area: f64, emitted: f64| {
+        area > grouping.max_area * total_area
+            || (emitted > 0.0 && emitted > grouping.max_power * total_power)
+    };
+    let mut order = Vec::with_capacity(elements.len());
+    let mut groups = Vec::new();
+    let mut chart_of = Vec::with_capacity(elements.len());
+    for (c, chart) in charts(elements, &connections, &morton_order(elements)).into_iter().enumerate() {
+        let mut stack = vec![chart];
+        while let Some(mut members) = stack.pop() {
+            let area = members.iter().map(|&e| elements.area[e as usize]).sum();
+            let emitted = members.iter().map(|&e| power(e as usize)).sum();
+            let large = members.len() > grouping.max_elements || too_much(area, emitted);
+            if large && members.len() > 1 {
+                let at = bisect(elements, &mut members);
+                stack.push(members.split_off(at));
+                stack.push(members);
+            } else {
+                groups.push((order.len() as u32, members.len() as u32));
+                chart_of.extend(std::iter::repeat_n(c as u32, members.len()));
+                order.extend(members);
+            }
+        }
+    }
+    elements.permute(&order);
+    let connections = connections.permute(&order);
+    let mut sources = Sources {
+        list: Vec::with_capacity(groups.len()),
+        black: 0,
+        chart: chart_of,
+    };
+    let can_shoot = |e: usize| (elements.reflectance[e] + elements.emitted[e]).max_element() > 0.0;
+    for (first, count) in groups {
+        let range = first as usize..(first + count) as usize;
+        if !range.clone().any(can_shoot) {
+            sources.black += 1;
+            continue;
+        }
+        if count > 1 {
+            sources.list.push(group(elements, &connections, range));
+            continue;
+        }
+        let e = first as usize;
+        let mut stack = vec![elements.triangle(e)];
+        while let Some(triangle) = stack.pop() {
+            let area = triangle_area(triangle);
+            let emitted = area * f64::from(elements.emitted[e].element_sum());
+            if too_much(area, emitted) {
+                stack.extend(halves(triangle));
+            } else {
+                sources.list.push(part(elements, &connections, e, triangle));
+            }
+        }
+    }
+    for light in lights {
+        sources.list.extend(point(light, elements));
+    }
+    for (i, source) in sources.list.iter_mut().enumerate() {
+        (source.tangent, source.bitangent) = turned_frame(source.normal, seed, i as u64);
+    }
+    (sources, connections)
+}
+
+/// Sorts the members along their longest extent and says where to cut: at the widest gap between neighbours in the middle
+/// third, which on a grid is a line of the grid.
+fn bisect(elements: &Elements, members: &mut [u32]) -> usize {
+    let centroid = |e: u32| elements.centroid[e as usize];
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for &e in members.iter() {
+        low = low.min(centroid(e));
+        high = high.max(centroid(e));
+    }
+    let extent = high - low;
+    let axis = (0..3).fold(0, |best, i| if extent[i] > extent[best] { i } else { best });
+    members.sort_by(|&a, &b| centroid(a)[axis].total_cmp(&centroid(b)[axis]));
+    let count = members.len();
+    let middle = (count / 3).max(1)..=(count - count / 3).min(count - 1);
+    let gap = |i: usize| centroid(members[i])[axis] - centroid(members[i - 1])[axis];
+    // Gaps of a grid agree to rounding only: among the widest, the one nearest to the middle.
+    let widest = middle.clone().map(gap).fold(0.0, f64::max) * (1.0 - 1e-6);
+    middle
+        .filter(|&i| gap(i) >= widest)
+        .min_by_key(|&i| i.abs_diff(count / 2))
+        .unwrap_or(count / 2)
+}
+
+/// Largest distance from the mean plane, as a share of the radius, at which a group still counts as plane.
+const FLAT: f64 = 1e-6;
+
+fn group(elements: &Elements, connections: &Connections, range: std::ops::Range<usize>) -> Source {
+    let area: f64 = range.clone().map(|e| elements.area[e]).sum();
+    let weigh = |values: &[DVec3]| -> DVec3 {
+        range.clone().map(|e| values[e] * elements.area[e]).sum::<DVec3>() / area
+    };
+    let centroid = weigh(&elements.centroid);
+    let mean = weigh(&elements.normal).normalize_or(elements.normal[range.start]);
+    let corners = || range.clone().flat_map(|e| elements.triangle(e));
+    let extent = corners().map(|v| v.distance(centroid)).fold(0.0, f64::max);
+    let flat = corners().all(|v| (v - centroid).dot(mean).abs() <= FLAT * extent)
+        && range.clone().all(|e| elements.normal[e].dot(mean) > 0.5);
+    let inside = flat && range.clone().any(|e| holds(elements.triangle(e), centroid, mean));
+    let eye = if inside {
+        centroid
+    } else {
+        let nearest = range
+            .clone()
+            .min_by(|&a, &b| {
+                let to = |e: usize| elements.centroid[e].distance_squared(centroid);
+                to(a).total_cmp(&to(b))
+            })
+            .unwrap_or(range.start);
+        elements.centroid[nearest]
+    };
+    let cone = if flat {
+        0.0
+    } else {
+        let cosine = range
+            .clone()
+            .map(|e| elements.normal[e].dot(mean))
+            .fold(1.0, f64::min);
+        cosine.clamp(-1.0, 1.0).acos().max(1e-6)
+    };
+    let emitted = range
+        .clone()
+        .map(|e| elements.emitted[e].as_dvec3() * elements.area[e])
+        .sum::<DVec3>()
+        / area;
+    Source {
+        kind: KIND_SURFACE,
+        eye,
+        normal: mean,
+        tangent: DVec3::ZERO,
+        bitangent: DVec3::ZERO,
+        area,
+        radius: corners().map(|v| v.distance(eye)).fold(0.0, f64::max),
+        cone,
+        emitted: emitted.as_vec3(),
+        first_element: range.start as u32,
+        element_count: range.len() as u32,
+        contour: contour(elements, range.clone()),
+        component: connections.component[range.start],
+    }
+}
+
+/// An element, or a piece of one.
+fn part(elements: &Elements, connections: &Connections, e: usize, triangle: [DVec3; 3]) -> Source {
+    let eye = triangle.into_iter().sum::<DVec3>() / 3.0;
+    Source {
+        kind: KIND_SURFACE,
+        eye,
+        normal: elements.normal[e],
+        tangent: DVec3::ZERO,
+        bitangent: DVec3::ZERO,
+        area: triangle_area(triangle),
+        radius: triangle.into_iter().map(|v| v.distance(eye)).fold(0.0, f64::max),
+        cone: 0.0,
+        emitted: elements.emitted[e],
+        first_element: e as u32,
+        element_count: 1,
+        contour: vec![triangle.to_vec()],
+        component: connections.component[e],
+    }
+}
+
+fn point(light: &PointLight, elements: &Elements) -> [Source; 2] {
+    let half = |normal: DVec3, cone: f64| Source {
+        kind: KIND_POINT,
+        eye: (light.position - elements.origin) / elements.unit,
+        normal,
+        tangent: DVec3::ZERO,
+        bitangent: DVec3::ZERO,
+        area: 0.0,
+        radius: 0.0,
+        // The shader gives the plane between the halves to the one whose cone is 0.
+        cone,
+        emitted: (DVec3::from_array(light.intensity.map(f64::from)) / (elements.unit * elements.unit)).as_vec3(),
+        first_element: 0,
+        element_count: 0,
+        contour: Vec::new(),
+        component: NONE,
+    };
+    [half(DVec3::Y, 0.0), half(DVec3::NEG_Y, 1.0)]
+}
+
+fn triangle_area([a, b, c]: [DVec3; 3]) -> f64 {
+    0.5 * (b - a).cross(c - a).length()
+}
+
+/// Cut at the middle of the longest edge.
+fn halves(triangle: [DVec3; 3]) -> [[DVec3; 3]; 2] {
+    let length = |i: usize| triangle[i].distance_squared(triangle[(i + 1) % 3]);
+    let longest = (0..3).fold(0, |best, i| if length(i) > length(best) { i } else { best });
+    let [a, b, c] = [0, 1, 2].map(|i| triangle[(longest + i) % 3]);
+    let middle = 0.5 * (a + b);
+    [[a, middle, c], [middle, b, c]]
+}
+
+/// Whether a point of the plane with normal `n` lies in a triangle, its edges included.
+fn holds(triangle: [DVec3; 3], p: DVec3, n: DVec3) -> bool {
+    (0..3).all(|i| {
+        let (a, b) = (triangle[i], triangle[(i + 1) % 3]);
+        (b - a).cross(p - a).dot(n) >= -1e-9 * (b - a).length_squared()
+    })
+}
+
+/// Tangent and bitangent about `normal` (Duff et al. 2017), turned by an angle drawn from the seed and the index.
+fn turned_frame(normal: DVec3, seed: u64, index: u64) -> (DVec3, DVec3) {
+    let (t, b) = normal.any_orthonormal_pair();
+    let angle = std::f64::consts::TAU * unit_random(seed, index);
+    let (sin, cos) = angle.sin_cos();
+    (t * cos + b * sin, b * cos - t * sin)
+}
+
+/// A number in 0..1 from a seed and an index (SplitMix64).
+fn unit_random(seed: u64, index: u64) -> f64 {
+    let mut z = seed
+        .wrapping_mul(0xa076_1d64_78bd_642f)
+        .wrapping_add(index.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+}

@@ -1,0 +1,183 @@
+//! The logical device, its queue and its memory.
+
+use std::ffi::CString;
+use std::mem::ManuallyDrop;
+use std::sync::{Arc, Mutex, MutexGuard};
+
+use ash::{ext, vk};
+use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+
+use super::instance::{Candidate, Instance, graphics_family};
+use crate::error::{Error, Result};
+
+/// A device with one queue for graphics and compute.
+pub struct Device {
+    pub(super) raw: ash::Device,
+    pub(super) queue: Mutex<vk::Queue>,
+    pub(super) family: u32,
+    pub(super) allocator: Mutex<ManuallyDrop<Allocator>>,
+    names: Option<ext::debug_utils::Device>,
+    candidate: Candidate,
+    limits: Limits,
+    _instance: Arc<Instance>,
+}
+
+/// What the passes size themselves by.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    pub max_storage_buffer_range: u64,
+    pub max_image_side: u32,
+    pub subgroup_size: u32,
+    /// Nanoseconds of one timestamp tick.
+    pub timestamp_period: f64,
+    /// Memory of the largest heap.
+    pub heap_bytes: u64,
+}
+
+impl Device {
+    pub fn new(instance: &Arc<Instance>, candidate: &Candidate) -> Result<Arc<Self>> {
+        if !candidate.missing.is_empty() {
+            return Err(Error::Device(format!(
+                "device {} ({}) lacks {}",
+                candidate.index,
+                candidate.name,
+                candidate.missing.join(", ")
+            )));
+        }
+        let raw_instance = &instance.raw;
+        // SAFETY: plain queries on a device of this instance.
+        let (queues, properties) = unsafe {
+            (
+                raw_instance.get_physical_device_queue_family_properties(candidate.raw),
+                raw_instance.get_physical_device_properties(candidate.raw),
+            )
+        };
+        let Some(family) = graphics_family(&queues) else {
+            return Err(Error::Device(format!("device {} has no graphics queue", candidate.name)));
+        };
+        let priorities = [1.0];
+        let queue_infos = [vk::DeviceQueueCreateInfo::default()
+            .queue_family_index(family)
+            .queue_priorities(&priorities)];
+        let mut f12 = vk::PhysicalDeviceVulkan12Features::default()
+            .scalar_block_layout(true)
+            .shader_buffer_int64_atomics(candidate.int64_atomics);
+        let mut f13 = vk::PhysicalDeviceVulkan13Features::default()
+            .synchronization2(true)
+            .subgroup_size_control(true)
+            .compute_full_subgroups(true);
+        let features = vk::PhysicalDeviceFeatures::default()
+            .geometry_shader(true)
+            .full_draw_index_uint32(true)
+            .shader_int64(candidate.int64_atomics);
+        let info = vk::DeviceCreateInfo::default()
+            .queue_create_infos(&queue_infos)
+            .enabled_features(&features)
+            .push_next(&mut f12)
+            .push_next(&mut f13);
+        let error = |what| {
+            move |source| Error::Vulkan {
+                device: candidate.name.clone(),
+                what,
+                source,
+            }
+        };
+        // SAFETY: `info` and its chain outlive the call; every feature was checked by `Instance::candidates`.
+        let raw = unsafe { raw_instance.create_device(candidate.raw, &info, None) }
+            .map_err(error("creating the device"))?;
+        let allocator = Allocator::new(&AllocatorCreateDesc {
+            instance: raw_instance.clone(),
+            device: raw.clone(),
+            physical_device: candidate.raw,
+            debug_settings: Default::default(),
+            buffer_device_address: false,
+            allocation_sizes: Default::default(),
+        });
+        let allocator = match allocator {
+            Ok(allocator) => allocator,
+            Err(e) => {
+                // SAFETY: nothing has been made from the device yet.
+                unsafe { raw.destroy_device(None) };
+                return Err(Error::Device(format!("{}: allocator: {e}", candidate.name)));
+            }
+        };
+        // SAFETY: the family and index were asked for above.
+        let queue = unsafe { raw.get_device_queue(family, 0) };
+        let names = instance
+            .debug_utils
+            .then(|| ext::debug_utils::Device::new(raw_instance, &raw));
+        Ok(Arc::new(Self {
+            raw,
+            queue: Mutex::new(queue),
+            family,
+            allocator: Mutex::new(ManuallyDrop::new(allocator)),
+            names,
+            limits: Limits {
+                max_storage_buffer_range: candidate.max_storage_buffer_range,
+                max_image_side: candidate.max_image_side,
+                subgroup_size: candidate.subgroup_size,
+                timestamp_period: f64::from(properties.limits.timestamp_period),
+                heap_bytes: candidate.heap_bytes,
+            },
+            candidate: candidate.clone(),
+            _instance: Arc::clone(instance),
+        }))
+    }
+
+    /// What the device is and can do.
+    pub fn candidate(&self) -> &Candidate {
+        &self.candidate
+    }
+
+    pub fn name(&self) -> &str {
+        &self.candidate.name
+    }
+
+    pub fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    pub(super) fn allocator(&self) -> MutexGuard<'_, ManuallyDrop<Allocator>> {
+        // A panic elsewhere leaves the allocator's own state whole.
+        self.allocator.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
+    pub(super) fn error(&self, what: &'static str) -> impl FnOnce(vk::Result) -> Error {
+        let device = self.candidate.name.clone();
+        move |source| Error::Vulkan {
+            device,
+            what,
+            source,
+        }
+    }
+
+    /// Gives an object the name that validation messages and debuggers show.
+    pub(super) fn set_name(&self, handle: impl vk::Handle, name: &str) {
+        let (Some(names), Ok(name)) = (&self.names, CString::new(name)) else {
+            return;
+        };
+        let info = vk::DebugUtilsObjectNameInfoEXT::default()
+            .object_handle(handle)
+            .object_name(&name);
+        // SAFETY: the handle belongs to this device. A name that cannot be set is no loss.
+        let _ = unsafe { names.set_debug_utils_object_name(&info) };
+    }
+
+    /// Waits until the queue is idle.
+    pub fn wait_idle(&self) -> Result<()> {
+        // SAFETY: the queue's lock keeps other threads from submitting meanwhile.
+        let _queue = self.queue.lock().unwrap_or_else(|e| e.into_inner());
+        unsafe { self.raw.device_wait_idle() }.map_err(self.error("waiting for the device"))
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        // SAFETY: every object of the device holds it by `Arc`, so none is left; the allocator goes before the device.
+        unsafe {
+            let _ = self.raw.device_wait_idle();
+            ManuallyDrop::drop(self.allocator.get_mut().unwrap_or_else(|e| e.into_inner()));
+            self.raw.destroy_device(None);
+        }
+    }
+}
