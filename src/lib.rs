@@ -1,1 +1,3 @@
-
+pub mod atomic_file;
+pub mod error;
+pub mod scene;

@@ -1,0 +1,154 @@
+//! A standing horse, sculpted from round cones: the statue where no mesh is given.
+
+use glam::DVec3;
+
+use super::surface_nets::polygonise;
+use crate::scene::assemble::{Mesh, MeshTriangle};
+
+/// A cone with round ends, metres; the head looks towards −z, y is up.
+struct RoundCone {
+    from: [f64; 3],
+    from_radius: f64,
+    to: [f64; 3],
+    to_radius: f64,
+}
+
+const fn cone(from: [f64; 3], from_radius: f64, to: [f64; 3], to_radius: f64) -> RoundCone {
+    RoundCone {
+        from,
+        from_radius,
+        to,
+        to_radius,
+    }
+}
+
+/// On the plane x = 0.
+const TRUNK: [RoundCone; 10] = [
+    // Chest, barrel, croup.
+    cone([0.0, 1.13, -0.50], 0.27, [0.0, 1.10, 0.00], 0.275),
+    cone([0.0, 1.10, 0.00], 0.275, [0.0, 1.17, 0.48], 0.27),
+    // Neck and crest.
+    cone([0.0, 1.24, -0.58], 0.22, [0.0, 1.72, -0.95], 0.115),
+    cone([0.0, 1.45, -0.52], 0.07, [0.0, 1.86, -0.86], 0.06),
+    // Skull, jaw, muzzle.
+    cone([0.0, 1.76, -0.98], 0.115, [0.0, 1.50, -1.30], 0.075),
+    cone([0.0, 1.66, -1.00], 0.105, [0.0, 1.55, -1.16], 0.08),
+    cone([0.0, 1.49, -1.29], 0.080, [0.0, 1.45, -1.34], 0.07),
+    // Tail.
+    cone([0.0, 1.34, 0.70], 0.06, [0.0, 1.22, 0.88], 0.07),
+    cone([0.0, 1.22, 0.88], 0.07, [0.0, 0.85, 0.97], 0.08),
+    cone([0.0, 0.85, 0.97], 0.08, [0.0, 0.50, 0.93], 0.045),
+];
+
+/// On the side of positive x; the other side mirrors them.
+const LIMBS: [RoundCone; 9] = [
+    // Ear.
+    cone([0.055, 1.86, -0.95], 0.045, [0.075, 1.97, -0.96], 0.030),
+    // Foreleg: shoulder, knee, fetlock, hoof.
+    cone([0.14, 1.02, -0.50], 0.150, [0.15, 0.55, -0.50], 0.080),
+    cone([0.15, 0.55, -0.50], 0.080, [0.15, 0.17, -0.48], 0.058),
+    cone([0.15, 0.17, -0.48], 0.058, [0.15, 0.075, -0.52], 0.075),
+    // Hind leg: thigh, gaskin, cannon, hoof.
+    cone([0.13, 1.12, 0.47], 0.215, [0.16, 0.80, 0.42], 0.140),
+    cone([0.16, 0.80, 0.42], 0.140, [0.16, 0.52, 0.61], 0.082),
+    cone([0.16, 0.52, 0.61], 0.082, [0.16, 0.18, 0.56], 0.060),
+    cone([0.16, 0.18, 0.56], 0.060, [0.16, 0.075, 0.52], 0.075),
+    // Chest muscle.
+    cone([0.10, 1.12, -0.62], 0.150, [0.12, 0.95, -0.56], 0.130),
+];
+
+/// Width of the fillets between parts.
+const BLEND: f64 = 0.07;
+/// A box around all of it.
+const LOW: DVec3 = DVec3::new(-0.5, -0.05, -1.5);
+const HIGH: DVec3 = DVec3::new(0.5, 2.1, 1.15);
+/// Triangles times the square of a cell's edge, measured: twice the cells that its surface crosses.
+const TRIANGLES_PER_CELL: f64 = 10.0;
+
+/// The horse in about so many triangles: closed, every edge shared by two, fronts outward, one material.
+pub(super) fn build(triangles: usize) -> Mesh {
+    let cell = (TRIANGLES_PER_CELL / triangles as f64).sqrt();
+    let surface = polygonise(distance, LOW, HIGH, cell);
+    Mesh {
+        positions: surface.positions,
+        triangles: surface
+            .triangles
+            .into_iter()
+            .map(|corners| MeshTriangle {
+                corners,
+                uv: None,
+                material: 0,
+            })
+            .collect(),
+        ..Mesh::default()
+    }
+}
+
+/// Negative inside. Nearly the distance, which is all that polygonising needs.
+fn distance(p: DVec3) -> f64 {
+    let aside = DVec3::new(p.x.abs(), p.y, p.z);
+    let trunk = TRUNK.iter().map(|part| part.distance(p));
+    let limbs = LIMBS.iter().map(|part| part.distance(aside));
+    trunk.chain(limbs).fold(f64::INFINITY, smooth_union)
+}
+
+/// Polynomial smooth minimum, Quilez.
+fn smooth_union(a: f64, b: f64) -> f64 {
+    let h = (BLEND - (a - b).abs()).max(0.0) / BLEND;
+    a.min(b) - h * h * BLEND / 4.0
+}
+
+impl RoundCone {
+    /// Distance to the spheres swept along the axis, the nearest sphere taken straight across it.
+    fn distance(&self, p: DVec3) -> f64 {
+        let (from, to) = (DVec3::from(self.from), DVec3::from(self.to));
+        let axis = to - from;
+        let along = ((p - from).dot(axis) / axis.length_squared()).clamp(0.0, 1.0);
+        let radius = self.from_radius + (self.to_radius - self.from_radius) * along;
+        p.distance(from + axis * along) - radius
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashMap;
+
+    use super::*;
+
+    /// Every resolution that a number of patches can ask for, in steps, is closed, manifold and wound outward.
+    #[test]
+    fn closed_at_every_resolution() {
+        for triangles in (3_000..=25_780).step_by(670) {
+            let mesh = build(triangles);
+            let mut edges: HashMap<[u32; 2], usize> = HashMap::new();
+            for [a, b, c] in mesh.triangles.iter().map(|t| t.corners) {
+                for edge in [[a, b], [b, c], [c, a]] {
+                    *edges.entry(edge).or_default() += 1;
+                }
+            }
+            for (&[a, b], &count) in &edges {
+                assert_eq!(count, 1, "{triangles}: edge {a}-{b} in one direction");
+                assert_eq!(
+                    edges.get(&[b, a]),
+                    Some(&1),
+                    "{triangles}: edge {a}-{b} the other way"
+                );
+            }
+            let volume: f64 = mesh
+                .triangles
+                .iter()
+                .map(|t| t.corners.map(|v| mesh.positions[v as usize]))
+                .map(|[a, b, c]| a.dot(b.cross(c)) / 6.0)
+                .sum();
+            assert!(
+                (0.4..0.8).contains(&volume),
+                "{triangles}: volume {volume} m³"
+            );
+            let share = mesh.triangles.len() as f64 / triangles as f64;
+            assert!(
+                (0.85..1.15).contains(&share),
+                "{triangles}: {share} of them"
+            );
+        }
+    }
+}
