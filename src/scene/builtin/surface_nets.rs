@@ -1,6 +1,6 @@
 //! A closed triangle mesh of an implicit surface: naive surface nets (Gibson 1998).
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use glam::{DVec3, IVec3};
 
@@ -13,7 +13,7 @@ pub(super) struct Surface {
 /// Polygonises `distance` = 0 on cubes of edge `cell`; the box from `low` to `high` must hold all of the inside.
 ///
 /// One vertex stands in each cube that the surface crosses, and each grid edge that it crosses gives a quad of the four
-/// cubes around it. So the mesh is closed; it is manifold where no feature is thinner than a cube.
+/// cubes around it. So the mesh is closed, but not always manifold: see [`Surface::is_manifold`].
 pub(super) fn polygonise(
     distance: impl Fn(DVec3) -> f64,
     low: DVec3,
@@ -54,6 +54,15 @@ pub(super) fn polygonise(
 const AXES: [IVec3; 3] = [IVec3::X, IVec3::Y, IVec3::Z];
 
 impl Surface {
+    /// Whether no edge is shared by more than two triangles.
+    pub fn is_manifold(&self) -> bool {
+        let mut edges = HashSet::new();
+        self.triangles
+            .iter()
+            .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
+            .all(|edge| edges.insert(edge))
+    }
+
     /// Two triangles along the shorter diagonal.
     fn push(&mut self, [a, b, c, d]: [u32; 4]) {
         let apart = |p: u32, q: u32| {
