@@ -143,8 +143,9 @@ pub(super) fn is_degenerate([a, b, c]: [DVec3; 3]) -> bool {
         .iter()
         .map(|e| e.abs().max_element())
         .fold(0.0, f64::max);
-    if !(size > 0.0 && size.is_finite()) {
-        return true;
+    // Too long for f64 is for the check of the whole scene to refuse.
+    if size == 0.0 || size.is_infinite() {
+        return size == 0.0;
     }
     // Scaled first, so that no square leaves the range of f64.
     let [ab, bc, ca] = edges.map(|e| e / size);

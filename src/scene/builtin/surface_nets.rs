@@ -20,7 +20,7 @@ pub(super) fn polygonise(
     high: DVec3,
     cell: f64,
 ) -> Surface {
-    let grid = Grid::sample(distance, low, high, cell);
+    let grid = Grid::sample(&distance, low, high, cell);
     let mut surface = Surface {
         positions: Vec::new(),
         triangles: Vec::new(),
@@ -29,7 +29,9 @@ pub(super) fn polygonise(
     for cube in grid.points() {
         if let Some(position) = grid.vertex(cube) {
             vertex_of.insert(cube, surface.positions.len() as u32);
-            surface.positions.push(position);
+            surface
+                .positions
+                .push(towards_surface(&distance, position, cell));
         }
     }
     for point in grid.points() {
@@ -49,6 +51,15 @@ pub(super) fn polygonise(
         }
     }
     surface
+}
+
+/// One Newton step on to the surface, at most half a cell: the mean of crossings lies inside wherever it is convex.
+fn towards_surface(distance: impl Fn(DVec3) -> f64, at: DVec3, cell: f64) -> DVec3 {
+    let h = cell / 16.0;
+    let slope = |axis: DVec3| (distance(at + axis * h) - distance(at - axis * h)) / (2.0 * h);
+    let gradient = DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z));
+    let step = gradient * (distance(at) / gradient.length_squared().max(f64::MIN_POSITIVE));
+    at - step.clamp_length_max(cell / 2.0)
 }
 
 const AXES: [IVec3; 3] = [IVec3::X, IVec3::Y, IVec3::Z];
