@@ -282,3 +282,26 @@ fn the_hash_follows_content_alone() {
         assert_ne!(base.hash(), changed.hash(), "change {index}");
     }
 }
+
+#[test]
+fn a_write_that_fails_leaves_what_was_there() {
+    use mesolux::atomic_file::write_atomically;
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("out");
+    fs::write(&path, "old").unwrap();
+    let error = write_atomically(&path, |out| {
+        out.write_all(b"half")?;
+        Err(std::io::Error::other("disk full"))
+    });
+    let error = error.unwrap_err().to_string();
+    assert!(
+        error.contains("out: cannot be written: disk full"),
+        "{error}"
+    );
+    assert_eq!(fs::read_to_string(&path).unwrap(), "old");
+    write_atomically(&path, |out| out.write_all(b"new")).unwrap();
+    assert_eq!(fs::read_to_string(&path).unwrap(), "new");
+    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+    write_atomically(dir.path(), |_| Ok(())).unwrap_err();
+    write_atomically(&dir.path().join("no/folder"), |_| Ok(())).unwrap_err();
+}

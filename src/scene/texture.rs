@@ -91,7 +91,7 @@ impl Texture {
 
     /// The area mean over a triangle in texture space, linear RGB.
     ///
-    /// The triangle is cut into n² equal ones with n twice its longest edge in texels, at most [`MOST_STRATA`], and
+    /// The triangle is cut into n² equal ones with n twice its longest edge in texels, at most 64, and
     /// each is sampled once: at its centroid, or at a fixed pseudo-random place where n had to be cut down, so that
     /// a regular texture cannot fall into step with the samples. The same input gives the same bits.
     pub fn mean_over_triangle(&self, uv: &[[f32; 2]; 3]) -> [f32; 3] {

@@ -9,6 +9,7 @@ use super::statue;
 use crate::error::{Error, Result};
 use crate::scene::assemble::{Assembly, Mesh, MeshTriangle, is_degenerate};
 use crate::scene::material::TextureCache;
+use crate::scene::uv::box_projection;
 use crate::scene::{BuiltinOptions, Camera, Material, Scene, check, obj};
 
 /// Elements if nothing else is asked for.
@@ -33,9 +34,14 @@ pub(super) fn build(options: &BuiltinOptions) -> Result<Scene> {
         }
     };
     place(&mut mesh);
-    mesh.triangles
-        .iter_mut()
-        .for_each(|t| t.material = STATUE_MATERIAL);
+    for triangle in &mut mesh.triangles {
+        triangle.material = STATUE_MATERIAL;
+        // Of a mesh from a file the person is told that coordinates were made up; here there is nothing to tell.
+        if options.statue.is_none() {
+            let corners = triangle.corners.map(|v| mesh.positions[v as usize]);
+            triangle.uv = Some(box_projection(corners));
+        }
+    }
     let statue = mesh
         .triangles
         .iter()
@@ -111,7 +117,7 @@ fn room(count: usize) -> Mesh {
         mesh.positions.extend(corners);
         mesh.triangles.push(MeshTriangle {
             corners: [first, first + 1, first + 2],
-            uv: None,
+            uv: Some(box_projection(corners)),
             material: material_of(part),
         });
     }
