@@ -10,6 +10,7 @@ use std::path::Path;
 use sha2::{Digest, Sha256};
 
 #[path = "src/constants.rs"]
+#[allow(dead_code)]
 mod constants;
 
 fn main() {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-pub type Result<T> = std::result::Result<T, Error>;
+pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// What a person can cause and mend. The text is one line and names the file, the line or the material.
 ///

@@ -1,4 +1,5 @@
 //! Mesolux.
+pub mod atomic_file;
 pub mod charts;
 pub mod constants;
 pub mod contour;

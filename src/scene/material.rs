@@ -1,9 +1,13 @@
 //! Diffuse materials.
 
+use std::collections::HashMap;
+use std::path::Path;
+
 use super::*;
+use crate::error::{Error, Result};
 
 /// A diffuse (Lambertian) material, one-sided.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Material {
     pub name: String,
     /// Reflectance ρ, RGB in 0..=1; multiplied by the texture where there is one.
@@ -12,4 +16,84 @@ pub struct Material {
     pub map_kd: Option<Arc<Texture>>,
     /// Emitted radiance Le, W·m⁻²·sr⁻¹, RGB.
     pub ke: [f32; 3],
+}
+
+/// Reflectance of a surface about which the file says nothing.
+pub(super) const DEFAULT_KD: f32 = 0.5;
+
+impl Material {
+    /// Checks reflectance in 0..=1, texture included, and emission finite and not negative; the error is one clause.
+    pub(super) fn check(&self) -> Result<(), String> {
+        if !self.kd.iter().all(|c| (0.0..=1.0).contains(c)) {
+            return Err(format!("reflectance Kd {} must be in 0..=1", rgb(self.kd)));
+        }
+        if !self.ke.iter().all(|&c| c.is_finite() && c >= 0.0) {
+            return Err(format!(
+                "emitted radiance Ke {} must be finite and not negative",
+                rgb(self.ke)
+            ));
+        }
+        let Some(texture) = &self.map_kd else {
+            return Ok(());
+        };
+        let highest = texture.highest();
+        let product: [f32; 3] = std::array::from_fn(|c| self.kd[c] * highest[c]);
+        if !product.iter().all(|c| (0.0..=1.0).contains(c)) {
+            return Err(format!(
+                "reflectance Kd times the brightest texel of {} is {}, and must be in 0..=1",
+                texture.path.display(),
+                rgb(product)
+            ));
+        }
+        Ok(())
+    }
+
+    /// Whether it sends light of its own.
+    pub fn emits(&self) -> bool {
+        self.ke.iter().any(|&c| c > 0.0)
+    }
+}
+
+fn rgb([r, g, b]: [f32; 3]) -> String {
+    format!("({r}, {g}, {b})")
+}
+
+/// A reflectance that no file gave, with the sentence that tells the person so.
+#[derive(Debug, Clone)]
+pub(super) struct MadeUp {
+    pub material: String,
+    pub kd: f32,
+}
+
+impl std::fmt::Display for MadeUp {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "material \"{}\" has no Kd: reflectance {} was used",
+            self.material, self.kd
+        )
+    }
+}
+
+/// Textures by path, so that materials share what they have in common.
+#[derive(Default)]
+pub(super) struct TextureCache(HashMap<PathBuf, Arc<Texture>>);
+
+impl TextureCache {
+    /// The texture `name`, relative to the folder of `file`, in which `material` asks for it.
+    pub fn get(&mut self, file: &Path, material: &str, name: &str) -> Result<Arc<Texture>> {
+        // Exporters on Windows write `textures\brick.png`, which no other system can open.
+        let path = file.with_file_name(name.replace('\\', "/"));
+        if let Some(texture) = self.0.get(&path) {
+            return Ok(texture.clone());
+        }
+        let texture = Texture::load(&path).map_err(|error| Error::Material {
+            path: file.to_owned(),
+            material: material.to_owned(),
+            what: format!("map_Kd: {error}"),
+        })?;
+        let texture = Arc::new(texture);
+        self.0.insert(path, texture.clone());
+        Ok(texture)
+    }
 }

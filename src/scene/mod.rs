@@ -2,21 +2,38 @@
 //!
 //! Positions stay in f64: an offset of 10⁶ units must not eat the shape. `elements` brings them to f32 about the
 //! scene's own centre.
+//!
+//! ```text
+//! .obj ─► obj_lint ─► obj + mtl ─┐
+//! scene.toml ─► scene_file ──────┼─► assemble ─► check ─► Scene ─► write
+//! cornell ─► builtin ────────────┘
+//! ```
 
-// pub mod builtin;
+mod assemble;
+pub mod builtin;
+mod camera;
+mod check;
+mod hash;
+mod load;
 mod material;
-// mod obj;
-// mod scene_file;
+mod mtl;
+mod obj;
+mod obj_lint;
+mod placement;
+mod scene_file;
 mod texture;
-// mod write;
+mod uv;
+mod write;
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::DVec3;
 
+pub use load::{BuiltinOptions, load};
 pub use material::Material;
 pub use texture::Texture;
+pub use write::write_scene;
 
 /// A scene that is fit to be baked: at least one triangle, every number finite, every reflectance in 0..=1.
 #[derive(Debug, Clone, Default)]
@@ -35,6 +52,22 @@ pub struct Scene {
     pub dropped_degenerate: usize,
     /// What was made up or passed over while reading, one sentence each, for the person's eyes.
     pub notes: Vec<String>,
+}
+
+impl Scene {
+    /// The corners of a triangle, scene units.
+    pub fn corners(&self, triangle: &Triangle) -> [DVec3; 3] {
+        triangle.vertices.map(|v| self.vertices[v as usize])
+    }
+
+    /// The least and the greatest corner of the axis-parallel box around all vertices, scene units.
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        self.vertices
+            .iter()
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &p| {
+                (low.min(p), high.max(p))
+            })
+    }
 }
 
 /// One triangle, counter-clockwise seen from its front, the side that sends and receives light.

@@ -1,6 +1,10 @@
 //! Textures in linear light.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+use image::DynamicImage;
+
+use crate::error::{Error, Result};
 
 /// A linear RGB image; repeats outside 0..1.
 #[derive(Debug, Clone, PartialEq)]
@@ -12,9 +16,161 @@ pub struct Texture {
     pub texels: Vec<[f32; 3]>,
 }
 
+/// Samples along an edge of a triangle, at most: 64² keeps the mean of one element under a millisecond.
+const MOST_STRATA: u32 = 64;
+
 impl Texture {
-    /// Area mean over a triangle of texture coordinates.
-    pub fn mean_over_triangle(&self, _uv: &[[f32; 2]; 3]) -> [f32; 3] {
-        [1.0; 3]
+    /// Reads PNG (8 and 16 bit) and JPEG as sRGB, OpenEXR as linear light. Grey is spread to RGB, alpha is ignored.
+    ///
+    /// # Errors
+    /// A file that cannot be read or decoded, or that passes the decoder's memory limit; a texel that is negative or
+    /// not finite.
+    pub fn load(path: &Path) -> Result<Self> {
+        let reader = image::ImageReader::open(path)
+            .and_then(image::ImageReader::with_guessed_format)
+            .map_err(|source| Error::read(path, source))?;
+        let decoded = reader
+            .decode()
+            .map_err(|error| Error::file(path, format!("cannot be decoded: {error}")))?;
+        let (width, height) = (decoded.width(), decoded.height());
+        let texels = match decoded {
+            DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
+                decoded.into_rgb32f().pixels().map(|p| p.0).collect()
+            }
+            coded => {
+                let linear = srgb_table();
+                coded
+                    .into_rgb16()
+                    .pixels()
+                    .map(|p| p.0.map(|code| linear[usize::from(code)]))
+                    .collect::<Vec<_>>()
+            }
+        };
+        let bad = |texel: &[f32; 3]| texel.iter().any(|c| !c.is_finite() || *c < 0.0);
+        if let Some(at) = texels.iter().position(bad) {
+            let (x, y) = (at % width as usize, at / width as usize);
+            let [r, g, b] = texels[at];
+            return Err(Error::file(
+                path,
+                format!("texel ({x}, {y}) is ({r}, {g}, {b}): must be finite and not negative"),
+            ));
+        }
+        Ok(Self {
+            path: path.to_owned(),
+            width,
+            height,
+            texels,
+        })
     }
+
+    /// The greatest value of each channel.
+    pub fn highest(&self) -> [f32; 3] {
+        self.texels.iter().fold([0.0; 3], |highest, texel| {
+            std::array::from_fn(|c| highest[c].max(texel[c]))
+        })
+    }
+
+    /// Bilinear, repeating; v is up, so v = 0 is the bottom edge. Texel centres lie at half-integers.
+    pub fn sample_bilinear(&self, u: f32, v: f32) -> [f32; 3] {
+        self.bilinear(f64::from(u), f64::from(v))
+    }
+
+    fn bilinear(&self, u: f64, v: f64) -> [f32; 3] {
+        let (columns, x) = neighbours(u, self.width);
+        let (rows, y) = neighbours(1.0 - v, self.height);
+        let texel = |row: usize, column: usize| {
+            self.texels[rows[row] * self.width as usize + columns[column]]
+        };
+        let (a, b, c, d) = (texel(0, 0), texel(0, 1), texel(1, 0), texel(1, 1));
+        std::array::from_fn(|i| {
+            let top = a[i] + (b[i] - a[i]) * x;
+            let bottom = c[i] + (d[i] - c[i]) * x;
+            top + (bottom - top) * y
+        })
+    }
+
+    /// The area mean over a triangle in texture space, linear RGB.
+    ///
+    /// The triangle is cut into n² equal ones with n twice its longest edge in texels, at most 64, and
+    /// each is sampled once: at its centroid, or at a fixed pseudo-random place where n had to be cut down, so that
+    /// a regular texture cannot fall into step with the samples. The same input gives the same bits.
+    pub fn mean_over_triangle(&self, uv: &[[f32; 2]; 3]) -> [f32; 3] {
+        let [a, b, c] = uv.map(|[u, v]| [f64::from(u), f64::from(v)]);
+        let wanted = 2.0 * self.longest_edge([a, b, c]);
+        // A float cast saturates, so an enormous triangle ends at the cap too.
+        let n = (wanted.ceil() as u32).clamp(1, MOST_STRATA);
+        let jitter = wanted > f64::from(MOST_STRATA);
+        let mut sum = [0.0_f64; 3];
+        let mut stratum = 0_u64;
+        for i in 0..n {
+            for j in 0..n - i {
+                for inverted in [false, true] {
+                    if inverted && i + j + 1 == n {
+                        continue;
+                    }
+                    let (mut s, mut t) = if jitter {
+                        place_in_triangle(stratum)
+                    } else {
+                        (1.0 / 3.0, 1.0 / 3.0)
+                    };
+                    stratum += 1;
+                    if inverted {
+                        (s, t) = (1.0 - s, 1.0 - t);
+                    }
+                    let s = (f64::from(i) + s) / f64::from(n);
+                    let t = (f64::from(j) + t) / f64::from(n);
+                    let at = |k: usize| a[k] + (b[k] - a[k]) * s + (c[k] - a[k]) * t;
+                    let texel = self.bilinear(at(0), at(1));
+                    (0..3).for_each(|k| sum[k] += f64::from(texel[k]));
+                }
+            }
+        }
+        sum.map(|total| (total / stratum as f64) as f32)
+    }
+
+    fn longest_edge(&self, [a, b, c]: [[f64; 2]; 3]) -> f64 {
+        let texels = |p: [f64; 2], q: [f64; 2]| {
+            ((p[0] - q[0]) * f64::from(self.width)).hypot((p[1] - q[1]) * f64::from(self.height))
+        };
+        texels(a, b).max(texels(b, c)).max(texels(c, a))
+    }
+}
+
+/// The two texels about a coordinate in repeats, and how far it lies towards the second.
+fn neighbours(coordinate: f64, size: u32) -> ([usize; 2], f32) {
+    let at = coordinate.rem_euclid(1.0) * f64::from(size) - 0.5;
+    let low = at.floor();
+    let first = (low as i64).rem_euclid(i64::from(size)) as usize;
+    ([first, (first + 1) % size as usize], (at - low) as f32)
+}
+
+/// A uniform place in the triangle (0,0), (1,0), (0,1), the same for the same number.
+fn place_in_triangle(number: u64) -> (f64, f64) {
+    // SplitMix64, Steele et al. 2014.
+    let mut z = (number + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^= z >> 31;
+    let unit = |bits: u64| bits as f64 / f64::from(u32::MAX);
+    let (s, t) = (unit(z >> 32), unit(z & u64::from(u32::MAX)));
+    if s + t > 1.0 {
+        (1.0 - s, 1.0 - t)
+    } else {
+        (s, t)
+    }
+}
+
+/// Linear light of each 16-bit sRGB code, IEC 61966-2-1. An 8-bit code c is the 16-bit code 257 c.
+fn srgb_table() -> Vec<f32> {
+    (0..=u16::MAX)
+        .map(|code| {
+            let c = f64::from(code) / f64::from(u16::MAX);
+            let linear = if c <= 0.04045 {
+                c / 12.92
+            } else {
+                ((c + 0.055) / 1.055).powf(2.4)
+            };
+            linear as f32
+        })
+        .collect()
 }

@@ -1,0 +1,157 @@
+//! Brings meshes together into one scene: welds, drops triangles without area, makes up texture coordinates.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::material::MadeUp;
+use super::uv::box_projection;
+use super::{Material, Scene, Triangle};
+use crate::error::{Error, Result};
+
+/// A mesh on its way into a scene.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Mesh {
+    pub positions: Vec<DVec3>,
+    pub triangles: Vec<MeshTriangle>,
+    pub materials: Vec<Material>,
+    /// Materials for which a reflectance was made up.
+    pub made_up: Vec<MadeUp>,
+    pub notes: Vec<String>,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(super) struct MeshTriangle {
+    /// Indices into [`Mesh::positions`].
+    pub corners: [u32; 3],
+    pub uv: Option<[[f32; 2]; 3]>,
+    /// Index into [`Mesh::materials`].
+    pub material: u32,
+}
+
+/// Height over longest edge below which rounding alone decides where the normal points.
+const LEAST_HEIGHT: f64 = 1e-10;
+
+/// A scene while meshes are added to it.
+pub(super) struct Assembly {
+    pub scene: Scene,
+    welded: HashMap<[u64; 3], u32>,
+    projected: usize,
+}
+
+impl Assembly {
+    pub fn new(name: String, path: Option<&Path>) -> Self {
+        Self {
+            scene: Scene {
+                name,
+                path: path.map(Path::to_owned),
+                ..Scene::default()
+            },
+            welded: HashMap::new(),
+            projected: 0,
+        }
+    }
+
+    /// Adds materials and returns their indices in the scene. An equal one is shared; one with a name that another
+    /// material has already is given a number.
+    pub fn add_materials(&mut self, materials: &[Material]) -> Vec<u32> {
+        materials.iter().map(|m| self.add_material(m)).collect()
+    }
+
+    fn add_material(&mut self, material: &Material) -> u32 {
+        let known = &mut self.scene.materials;
+        if let Some(index) = known.iter().position(|m| m == material) {
+            return index as u32;
+        }
+        let mut material = material.clone();
+        let name = material.name.clone();
+        let mut number = 2;
+        while known.iter().any(|m| m.name == material.name) {
+            material.name = format!("{name}.{number}");
+            number += 1;
+        }
+        if material.name != name {
+            self.scene.notes.push(format!(
+                "two meshes have different materials \"{name}\": the later one is \"{}\"",
+                material.name
+            ));
+        }
+        known.push(material);
+        known.len() as u32 - 1
+    }
+
+    /// Adds the triangles of a mesh in their order; `materials` gives the scene's index for each of the mesh's.
+    ///
+    /// # Errors
+    /// A position that is not finite.
+    pub fn add_mesh(&mut self, mesh: &Mesh, materials: &[u32]) -> Result<()> {
+        for triangle in &mesh.triangles {
+            let corners = triangle.corners.map(|v| mesh.positions[v as usize]);
+            if let Some(bad) = corners.iter().find(|p| !p.is_finite()) {
+                return Err(Error::Scene {
+                    scene: self.scene.name.clone(),
+                    what: format!("a vertex lies at ({}, {}, {})", bad.x, bad.y, bad.z),
+                });
+            }
+            if is_degenerate(corners) {
+                self.scene.dropped_degenerate += 1;
+                continue;
+            }
+            let uv = triangle.uv.unwrap_or_else(|| {
+                self.projected += 1;
+                box_projection(corners)
+            });
+            let vertices = corners.map(|p| self.weld(p));
+            self.scene.triangles.push(Triangle {
+                vertices,
+                uv,
+                material: materials[triangle.material as usize],
+            });
+        }
+        Ok(())
+    }
+
+    fn weld(&mut self, position: DVec3) -> u32 {
+        // Adding zero turns −0 into 0, which is the same place with other bits.
+        let position = position + DVec3::ZERO;
+        let vertices = &mut self.scene.vertices;
+        *self
+            .welded
+            .entry(position.to_array().map(f64::to_bits))
+            .or_insert_with(|| {
+                vertices.push(position);
+                vertices.len() as u32 - 1
+            })
+    }
+
+    pub fn into_scene(mut self) -> Scene {
+        if self.projected > 0 {
+            self.scene.notes.push(format!(
+                "{} triangles have no texture coordinates: box projection was used, one repeat per scene unit",
+                self.projected
+            ));
+        }
+        self.scene
+    }
+}
+
+/// Whether a triangle has no area to speak of: height over longest edge below [`LEAST_HEIGHT`].
+pub(super) fn is_degenerate([a, b, c]: [DVec3; 3]) -> bool {
+    let edges = [b - a, c - b, a - c];
+    let size = edges
+        .iter()
+        .map(|e| e.abs().max_element())
+        .fold(0.0, f64::max);
+    // Too long for f64 is for the check of the whole scene to refuse.
+    if size == 0.0 || size.is_infinite() {
+        return size == 0.0;
+    }
+    // Scaled first, so that no square leaves the range of f64.
+    let [ab, bc, ca] = edges.map(|e| e / size);
+    let longest = ab
+        .length_squared()
+        .max(bc.length_squared())
+        .max(ca.length_squared());
+    ab.cross(ca).length() < LEAST_HEIGHT * longest
+}

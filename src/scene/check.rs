@@ -1,0 +1,67 @@
+//! What must hold for a scene as a whole, however it was read.
+
+use super::{Camera, Scene};
+use crate::error::{Error, Result};
+
+/// Extents within which the squares and areas of later steps stay far from the ends of f32.
+const EXTENTS: std::ops::RangeInclusive<f64> = 1e-15..=1e15;
+
+/// Checks a scene and gives it a camera if it has none.
+pub(super) fn finish(mut scene: Scene) -> Result<Scene> {
+    let refuse = |what: String| Error::Scene {
+        scene: match &scene.path {
+            Some(path) => path.display().to_string(),
+            None => scene.name.clone(),
+        },
+        what,
+    };
+    if scene.triangles.is_empty() {
+        return Err(refuse(match scene.dropped_degenerate {
+            0 => "there is no triangle in it".into(),
+            dropped => format!("there is no triangle in it with an area ({dropped} without)"),
+        }));
+    }
+    let (low, high) = scene.bounds();
+    let extent = (high - low).max_element();
+    if !EXTENTS.contains(&extent) {
+        return Err(refuse(format!(
+            "it is {extent:e} units across: it must be between {:e} and {:e}",
+            EXTENTS.start(),
+            EXTENTS.end()
+        )));
+    }
+    for material in &scene.materials {
+        material
+            .check()
+            .map_err(|what| refuse(format!("material \"{}\": {what}", material.name)))?;
+    }
+    if !has_light(&scene) {
+        return Err(refuse(
+            "there is no light: no material in use has Ke above 0 and no point light shines".into(),
+        ));
+    }
+
+    if scene.cameras.is_empty() {
+        let camera = Camera::for_scene(&scene);
+        scene
+            .notes
+            .push("there is no camera: \"default\" looks at the whole scene".into());
+        scene.cameras.push(camera);
+    }
+    if scene.dropped_degenerate > 0 {
+        scene.notes.push(format!(
+            "{} triangles without area were left out",
+            scene.dropped_degenerate
+        ));
+    }
+    Ok(scene)
+}
+
+fn has_light(scene: &Scene) -> bool {
+    let emits: Vec<bool> = scene.materials.iter().map(|m| m.emits()).collect();
+    scene.triangles.iter().any(|t| emits[t.material as usize])
+        || scene
+            .point_lights
+            .iter()
+            .any(|light| light.intensity.iter().any(|&c| c > 0.0))
+}

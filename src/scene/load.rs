@@ -1,0 +1,70 @@
+//! Finds out what a scene argument names, and reads it.
+
+use std::path::{Path, PathBuf};
+
+use super::assemble::Assembly;
+use super::material::TextureCache;
+use super::{Scene, builtin, check, obj, scene_file};
+use crate::error::{Error, Result};
+
+/// What a person may ask of a built-in scene.
+#[derive(Debug, Clone, Default)]
+pub struct BuiltinOptions {
+    /// The exact number of elements.
+    pub patches: Option<usize>,
+    /// An OBJ mesh, y up, head towards −z, in the place of the statue made by code.
+    pub statue: Option<PathBuf>,
+}
+
+/// Reads the scene that `spec` names: a built-in one (`cornell`), an `.obj` file or a `scene.toml` file.
+///
+/// # Errors
+/// A name that is neither; a file that cannot be read or used, with the line or the material; a scene that cannot be
+/// baked.
+pub fn load(spec: &str, options: &BuiltinOptions) -> Result<Scene> {
+    if builtin::NAMES.contains(&spec) {
+        return builtin::build(spec, options);
+    }
+    let path = Path::new(spec);
+    let extension = path
+        .extension()
+        .map(|e| e.to_string_lossy().to_lowercase())
+        .unwrap_or_default();
+    if !matches!(extension.as_str(), "obj" | "toml") {
+        return Err(Error::Usage(format!(
+            "scene \"{spec}\" is neither a built-in scene ({}) nor a path that ends in .obj or .toml",
+            builtin::NAMES.join(", ")
+        )));
+    }
+    if options.patches.is_some() || options.statue.is_some() {
+        return Err(Error::Usage(format!(
+            "a number of patches and a statue belong to the built-in scene ({}), not to {spec}",
+            builtin::NAMES.join(", ")
+        )));
+    }
+    if extension == "obj" {
+        load_obj(path)
+    } else {
+        scene_file::load(path)
+    }
+}
+
+fn load_obj(path: &Path) -> Result<Scene> {
+    let mesh = obj::read(path, &mut TextureCache::default())?;
+    let mut assembly = Assembly::new(stem(path), Some(path));
+    let materials = assembly.add_materials(&mesh.materials);
+    assembly.add_mesh(&mesh, &materials)?;
+    assembly.scene.notes.extend(mesh.notes);
+    assembly
+        .scene
+        .notes
+        .extend(mesh.made_up.iter().map(|made_up| made_up.to_string()));
+    check::finish(assembly.into_scene())
+}
+
+/// The name of a scene that has none: its file's, without the extension.
+pub(super) fn stem(path: &Path) -> String {
+    path.file_stem()
+        .map(|s| s.to_string_lossy().into_owned())
+        .unwrap_or_default()
+}

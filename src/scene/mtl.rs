@@ -1,0 +1,141 @@
+//! Wavefront MTL material libraries: `Kd`, `Ke`, `map_Kd`.
+
+use std::path::Path;
+
+use super::Material;
+use super::material::{DEFAULT_KD, MadeUp, TextureCache};
+use super::obj::read_text;
+use super::obj_lint::{brief, finite, statements};
+use crate::error::{Error, Result};
+
+pub(super) struct Library {
+    /// In the order of the file.
+    pub materials: Vec<Material>,
+    pub made_up: Vec<MadeUp>,
+}
+
+/// Reads a library with its textures, whose paths are relative to it.
+///
+/// # Errors
+/// The first wrong line; a material whose numbers or texture cannot be used.
+pub(super) fn read(path: &Path, textures: &mut TextureCache) -> Result<Library> {
+    let text = check(path, &read_text(path)?)?;
+    let (read, _) = tobj::load_mtl_buf(&mut text.as_bytes())
+        .map_err(|error| Error::file(path, error.to_string()))?;
+
+    let mut library = Library {
+        materials: Vec::new(),
+        made_up: Vec::new(),
+    };
+    for material in read {
+        // With a texture and no factor the texture is the reflectance.
+        let default = if material.diffuse_texture.is_some() {
+            1.0
+        } else {
+            DEFAULT_KD
+        };
+        if material.diffuse.is_none() {
+            library.made_up.push(MadeUp {
+                material: material.name.clone(),
+                kd: default,
+            });
+        }
+        let map_kd = match &material.diffuse_texture {
+            Some(name) => Some(textures.get(path, &material.name, name)?),
+            None => None,
+        };
+        let material = Material {
+            kd: material
+                .diffuse
+                .map_or([default; 3], |kd| kd.map(|c| c as f32)),
+            ke: material
+                .emissive
+                .map_or([0.0; 3], |ke| ke.map(|c| c as f32)),
+            name: material.name,
+            map_kd,
+        };
+        material.check().map_err(|what| Error::Material {
+            path: path.to_owned(),
+            material: material.name.clone(),
+            what,
+        })?;
+        library.materials.push(material);
+    }
+    Ok(library)
+}
+
+/// Checks the text line by line and leaves what tobj is to read: it panics on a `Ka`, `Kd`, `Ks` or `Ke` that is short.
+fn check(path: &Path, text: &str) -> Result<String> {
+    let mut kept = String::new();
+    let mut names: Vec<String> = Vec::new();
+    for (line, statement) in statements(text) {
+        let statement = statement.trim();
+        let (keyword, rest) = statement
+            .split_once(char::is_whitespace)
+            .map_or((statement, ""), |(keyword, rest)| (keyword, rest.trim()));
+        let checked = match keyword {
+            "newmtl" => new_material(rest, &mut names),
+            "Kd" | "Ke" => colour(keyword, rest),
+            "map_Kd" => texture(rest),
+            _ => continue,
+        };
+        let checked = checked.and_then(|()| match names.is_empty() {
+            true => Err(format!("{keyword} stands before the first newmtl")),
+            false => Ok(()),
+        });
+        checked.map_err(|what| {
+            let what = match names.last() {
+                Some(name) if keyword != "newmtl" => format!("material \"{name}\": {what}"),
+                _ => what,
+            };
+            Error::line(path, line, what)
+        })?;
+        let operands = match keyword {
+            "Kd" | "Ke" => rest.split_once('#').map_or(rest, |(numbers, _)| numbers),
+            _ => rest,
+        };
+        kept.push_str(&format!("{keyword} {operands}\n"));
+    }
+    Ok(kept)
+}
+
+fn new_material(name: &str, names: &mut Vec<String>) -> Result<(), String> {
+    if name.is_empty() {
+        return Err("newmtl has no name".into());
+    }
+    if names.iter().any(|known| known == name) {
+        return Err(format!("material \"{}\" is defined twice", brief(name)));
+    }
+    names.push(name.to_owned());
+    Ok(())
+}
+
+fn colour(keyword: &str, rest: &str) -> Result<(), String> {
+    let numbers: Vec<&str> = rest
+        .split_whitespace()
+        .take_while(|word| !word.starts_with('#'))
+        .collect();
+    for word in &numbers {
+        let number = finite(word).map_err(|what| format!("{keyword}: {what}"))?;
+        if !(number as f32).is_finite() {
+            return Err(format!("{keyword}: \"{}\" is too large", brief(word)));
+        }
+    }
+    match numbers.len() {
+        3 => Ok(()),
+        found => Err(format!("{keyword} needs 3 numbers, found {found}")),
+    }
+}
+
+fn texture(rest: &str) -> Result<(), String> {
+    if rest.is_empty() {
+        Err("map_Kd names no file".into())
+    } else if rest.starts_with('-') {
+        Err(format!(
+            "map_Kd options are not known here: {}",
+            brief(rest)
+        ))
+    } else {
+        Ok(())
+    }
+}

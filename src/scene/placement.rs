@@ -1,0 +1,81 @@
+//! Where a mesh stands in a scene: scale, then rotate, then translate.
+
+use glam::{DAffine3, DMat3, DVec3};
+use serde::{Deserialize, Serialize};
+
+use super::assemble::Mesh;
+
+/// One factor, or one for each axis; a negative one mirrors.
+#[derive(Debug, Clone, Copy, Deserialize, Serialize)]
+#[serde(untagged, expecting = "a number or [x, y, z]")]
+pub(super) enum Scale {
+    Uniform(f64),
+    PerAxis([f64; 3]),
+}
+
+pub(super) struct Placement(DAffine3);
+
+impl Placement {
+    /// `rotate` is in degrees, about x, then y, then z. The error is one clause.
+    pub fn new(
+        scale: Option<Scale>,
+        rotate: Option<[f64; 3]>,
+        translate: Option<[f64; 3]>,
+    ) -> Result<Self, String> {
+        let scale = match scale.unwrap_or(Scale::Uniform(1.0)) {
+            Scale::Uniform(factor) => DVec3::splat(factor),
+            Scale::PerAxis(factors) => DVec3::from(factors),
+        };
+        let degrees = DVec3::from(rotate.unwrap_or_default());
+        let translation = DVec3::from(translate.unwrap_or_default());
+        for (what, value) in [
+            ("scale", scale),
+            ("rotate", degrees),
+            ("translate", translation),
+        ] {
+            if !value.is_finite() {
+                return Err(format!("{what} must be finite"));
+            }
+        }
+        if scale.to_array().contains(&0.0) {
+            return Err("scale must not be 0".into());
+        }
+        let rotation = turn(DMat3::from_rotation_z, degrees.z)
+            * turn(DMat3::from_rotation_y, degrees.y)
+            * turn(DMat3::from_rotation_x, degrees.x);
+        let matrix = rotation * DMat3::from_diagonal(scale);
+        Ok(Self(DAffine3::from_mat3_translation(matrix, translation)))
+    }
+
+    /// Moves the mesh. A mirroring placement turns the winding as well, so that fronts stay fronts; `reverse` turns it
+    /// once more.
+    pub fn apply(&self, mesh: &mut Mesh, reverse: bool) -> Result<(), String> {
+        if self.0 != DAffine3::IDENTITY {
+            for position in &mut mesh.positions {
+                *position = self.0.transform_point3(*position);
+                if !position.is_finite() {
+                    return Err("a vertex is moved beyond every number".into());
+                }
+            }
+        }
+        if (self.0.matrix3.determinant() < 0.0) != reverse {
+            for triangle in &mut mesh.triangles {
+                triangle.corners.swap(1, 2);
+                if let Some(uv) = &mut triangle.uv {
+                    uv.swap(1, 2);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Quarter turns are exact, so that what stood on the axes stays on them.
+fn turn(rotation: fn(f64) -> DMat3, degrees: f64) -> DMat3 {
+    let turned = rotation(degrees.to_radians());
+    if degrees % 90.0 == 0.0 {
+        DMat3::from_cols_array(&turned.to_cols_array().map(f64::round))
+    } else {
+        turned
+    }
+}

@@ -1,0 +1,287 @@
+//! `scene.toml`: meshes with their places, changes to materials, point lights, cameras.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+use toml::Spanned;
+
+use super::assemble::{Assembly, Mesh};
+use super::load::stem;
+use super::material::{DEFAULT_KD, MadeUp, TextureCache};
+use super::obj::read_text;
+use super::placement::{Placement, Scale};
+use super::{Camera, Material, PointLight, Scene, check, obj};
+use crate::error::{Error, Result};
+
+#[derive(Debug, Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SceneFile {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub mesh: Vec<Spanned<MeshTable>>,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub material: BTreeMap<String, Spanned<MaterialTable>>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub point_light: Vec<Spanned<PointLightTable>>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub camera: Vec<Spanned<CameraTable>>,
+}
+
+#[derive(Debug, Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct MeshTable {
+    pub file: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scale: Option<Scale>,
+    /// Degrees about x, then y, then z.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rotate: Option<[f64; 3]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub translate: Option<[f64; 3]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub material: Option<String>,
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub reverse: bool,
+}
+
+#[derive(Debug, Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct MaterialTable {
+    kd: Option<[f32; 3]>,
+    ke: Option<[f32; 3]>,
+    map_kd: Option<String>,
+}
+
+#[derive(Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PointLightTable {
+    pub name: Option<String>,
+    pub position: [f64; 3],
+    pub intensity: [f32; 3],
+}
+
+#[derive(Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CameraTable {
+    pub name: Option<String>,
+    pub position: [f64; 3],
+    pub look_at: [f64; 3],
+    #[serde(default = "y_up")]
+    pub up: [f64; 3],
+    pub fov: f64,
+}
+
+fn y_up() -> [f64; 3] {
+    DVec3::Y.to_array()
+}
+
+/// Reads a scene file and all that it names; paths are relative to it.
+///
+/// # Errors
+/// Those of the files it names, and whatever is wrong in its own text, with the line of the table.
+pub(super) fn load(path: &Path) -> Result<Scene> {
+    let text = read_text(path)?;
+    let lines = Lines { path, text: &text };
+    let file: SceneFile = toml::from_str(&text).map_err(|error| {
+        let at = error.span().map_or(0, |span| span.start);
+        lines.error(at, error.message().replace('\n', "; "))
+    })?;
+
+    let mut assembly = Assembly::new(file.name.clone().unwrap_or_else(|| stem(path)), Some(path));
+    let mut textures = TextureCache::default();
+    let mut used = Vec::new();
+    for table in &file.mesh {
+        add_mesh(
+            table,
+            &file,
+            &lines,
+            &mut textures,
+            &mut assembly,
+            &mut used,
+        )?;
+    }
+    if let Some((name, table)) = file.material.iter().find(|(name, _)| !used.contains(name)) {
+        let what = format!("material \"{name}\" is in no mesh and no mesh asks for it");
+        return Err(lines.error(table.span().start, what));
+    }
+
+    let scene = &mut assembly.scene;
+    for (index, table) in file.point_light.iter().enumerate() {
+        let light = point_light(table.get_ref(), index);
+        let problem = check_light(&light)
+            .or_else(|| taken(&light.name, scene.point_lights.iter().map(|l| &l.name)));
+        if let Some(what) = problem {
+            let what = format!("point light \"{}\": {what}", light.name);
+            return Err(lines.error(table.span().start, what));
+        }
+        scene.point_lights.push(light);
+    }
+    for (index, table) in file.camera.iter().enumerate() {
+        let camera = camera(table.get_ref(), index);
+        let problem = camera
+            .check()
+            .err()
+            .or_else(|| taken(&camera.name, scene.cameras.iter().map(|c| &c.name)));
+        if let Some(what) = problem {
+            let what = format!("camera \"{}\": {what}", camera.name);
+            return Err(lines.error(table.span().start, what));
+        }
+        scene.cameras.push(camera);
+    }
+    check::finish(assembly.into_scene())
+}
+
+/// Where a byte of the file stands.
+struct Lines<'a> {
+    path: &'a Path,
+    text: &'a str,
+}
+
+impl Lines<'_> {
+    fn error(&self, at: usize, what: String) -> Error {
+        let before = &self.text.as_bytes()[..at.min(self.text.len())];
+        let line = 1 + before.iter().filter(|&&byte| byte == b'\n').count();
+        Error::line(self.path, line, what)
+    }
+}
+
+fn add_mesh(
+    spanned: &Spanned<MeshTable>,
+    file: &SceneFile,
+    lines: &Lines,
+    textures: &mut TextureCache,
+    assembly: &mut Assembly,
+    used: &mut Vec<String>,
+) -> Result<()> {
+    let table = spanned.get_ref();
+    let refuse = |what: String| {
+        lines.error(
+            spanned.span().start,
+            format!("mesh \"{}\": {what}", table.file),
+        )
+    };
+    let placement = Placement::new(table.scale, table.rotate, table.translate).map_err(refuse)?;
+    let mut mesh = obj::read(&lines.path.with_file_name(&table.file), textures)?;
+
+    for (name, changes) in &file.material {
+        let wanted = table.material.as_ref() == Some(name);
+        if wanted || mesh.materials.iter().any(|m| m.name == *name) {
+            change_material(name, changes, lines, textures, &mut mesh)?;
+            used.push(name.clone());
+        }
+    }
+    if let Some(name) = &table.material {
+        let Some(index) = mesh.materials.iter().position(|m| m.name == *name) else {
+            return Err(refuse(format!(
+                "material \"{name}\" is neither in this file nor in the mesh"
+            )));
+        };
+        // The others belong to no triangle any more.
+        mesh.materials = vec![mesh.materials.swap_remove(index)];
+        mesh.made_up.retain(|made_up| made_up.material == *name);
+        mesh.triangles.iter_mut().for_each(|t| t.material = 0);
+    }
+    placement.apply(&mut mesh, table.reverse).map_err(refuse)?;
+
+    let materials = assembly.add_materials(&mesh.materials);
+    assembly.add_mesh(&mesh, &materials)?;
+    let notes = &mut assembly.scene.notes;
+    notes.extend(mesh.notes);
+    for made_up in mesh.made_up.iter().map(MadeUp::to_string) {
+        if !notes.contains(&made_up) {
+            notes.push(made_up);
+        }
+    }
+    Ok(())
+}
+
+/// Applies `[material.name]` to a mesh that has such a material or is to get it.
+fn change_material(
+    name: &str,
+    spanned: &Spanned<MaterialTable>,
+    lines: &Lines,
+    textures: &mut TextureCache,
+    mesh: &mut Mesh,
+) -> Result<()> {
+    let refuse =
+        |what: String| lines.error(spanned.span().start, format!("material \"{name}\": {what}"));
+    if name.trim() != name || name.is_empty() || name.contains(char::is_control) {
+        return Err(refuse("the name cannot stand in a material file".into()));
+    }
+    let changes = spanned.get_ref();
+    let index = match mesh.materials.iter().position(|m| m.name == name) {
+        Some(index) => index,
+        None => {
+            let kd = if changes.map_kd.is_some() {
+                1.0
+            } else {
+                DEFAULT_KD
+            };
+            mesh.materials.push(Material {
+                name: name.to_owned(),
+                kd: [kd; 3],
+                ..Material::default()
+            });
+            mesh.made_up.push(MadeUp {
+                material: name.to_owned(),
+                kd,
+            });
+            mesh.materials.len() - 1
+        }
+    };
+    let material = &mut mesh.materials[index];
+    if let Some(kd) = changes.kd {
+        material.kd = kd;
+        mesh.made_up.retain(|made_up| made_up.material != name);
+    }
+    if let Some(ke) = changes.ke {
+        material.ke = ke;
+    }
+    if let Some(file) = &changes.map_kd {
+        material.map_kd = Some(textures.get(lines.path, name, file)?);
+    }
+    material.check().map_err(refuse)
+}
+
+fn point_light(table: &PointLightTable, index: usize) -> PointLight {
+    PointLight {
+        name: table
+            .name
+            .clone()
+            .unwrap_or_else(|| format!("light {}", index + 1)),
+        position: DVec3::from(table.position),
+        intensity: table.intensity,
+    }
+}
+
+fn check_light(light: &PointLight) -> Option<String> {
+    if !light.position.is_finite() {
+        Some("position must be finite".into())
+    } else if !light.intensity.iter().all(|&c| c.is_finite() && c >= 0.0) {
+        Some("intensity must be finite and not negative".into())
+    } else {
+        None
+    }
+}
+
+fn camera(table: &CameraTable, index: usize) -> Camera {
+    Camera {
+        name: table
+            .name
+            .clone()
+            .unwrap_or_else(|| format!("camera {}", index + 1)),
+        position: DVec3::from(table.position),
+        look_at: DVec3::from(table.look_at),
+        up: DVec3::from(table.up),
+        fov_y: table.fov,
+    }
+}
+
+fn taken<'a>(name: &str, mut names: impl Iterator<Item = &'a String>) -> Option<String> {
+    names
+        .any(|known| known == name)
+        .then(|| "an earlier one has this name".into())
+}

@@ -1,0 +1,168 @@
+//! Scenes written out, so that reading them back gives the same bits.
+
+use std::collections::{HashMap, HashSet};
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use toml::Spanned;
+
+use super::scene_file::{CameraTable, MeshTable, PointLightTable, SceneFile};
+use super::{Scene, Texture};
+use crate::atomic_file::write_atomically;
+use crate::error::{Error, Result};
+
+const MESH: &str = "scene.obj";
+const MATERIALS: &str = "scene.mtl";
+const SCENE: &str = "scene.toml";
+
+/// Writes `scene.obj`, `scene.mtl`, copies of the textures and `scene.toml` into `dir`, and returns the path of the last.
+///
+/// Loading that gives the same triangles in the same order, the same f64 positions, materials, lights and cameras.
+///
+/// # Errors
+/// A file that cannot be written; a texture that cannot be copied; two materials of one name, or a name that a material
+/// file cannot hold, which only a scene put together by hand can have.
+pub fn write_scene(scene: &Scene, dir: &Path) -> Result<PathBuf> {
+    check_names(scene)?;
+    fs::create_dir_all(dir).map_err(|source| Error::write(dir, source))?;
+    let textures = copy_textures(scene, dir)?;
+    write_atomically(&dir.join(MATERIALS), |out| materials(scene, &textures, out))?;
+    write_atomically(&dir.join(MESH), |out| mesh(scene, out))?;
+    // Last, so that a scene file never stands beside a mesh that is not its own.
+    let path = dir.join(SCENE);
+    let text = toml::to_string(&tables(scene))
+        .map_err(|error| Error::file(&path, format!("cannot be put in words: {error}")))?;
+    write_atomically(&path, |out| out.write_all(text.as_bytes()))?;
+    Ok(path)
+}
+
+fn check_names(scene: &Scene) -> Result<()> {
+    let mut known = HashSet::new();
+    for material in &scene.materials {
+        let name = material.name.as_str();
+        let writable = !name.is_empty() && name.trim() == name && !name.contains(char::is_control);
+        if !writable || !known.insert(name) {
+            return Err(Error::Scene {
+                scene: scene.name.clone(),
+                what: format!("material name {name:?} is in use twice or cannot stand in a file"),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Copies each texture once and returns the names of the copies by the paths of the originals.
+fn copy_textures(scene: &Scene, dir: &Path) -> Result<HashMap<PathBuf, String>> {
+    let mut names: HashMap<PathBuf, String> = HashMap::new();
+    for texture in scene.materials.iter().filter_map(|m| m.map_kd.as_deref()) {
+        if names.contains_key(&texture.path) {
+            continue;
+        }
+        let name = copy_name(texture, names.len());
+        // Read whole first: the copy may replace its own original.
+        let bytes = fs::read(&texture.path).map_err(|source| Error::read(&texture.path, source))?;
+        write_atomically(&dir.join(&name), |out| out.write_all(&bytes))?;
+        names.insert(texture.path.clone(), name);
+    }
+    Ok(names)
+}
+
+/// Numbered, since textures of one name may come from several folders.
+fn copy_name(texture: &Texture, number: usize) -> String {
+    match texture.path.extension() {
+        Some(extension) => format!("texture-{number}.{}", extension.to_string_lossy()),
+        None => format!("texture-{number}"),
+    }
+}
+
+fn materials(
+    scene: &Scene,
+    textures: &HashMap<PathBuf, String>,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    for material in &scene.materials {
+        let ([r, g, b], [er, eg, eb]) = (material.kd, material.ke);
+        writeln!(
+            out,
+            "newmtl {}\nKd {r} {g} {b}\nKe {er} {eg} {eb}",
+            material.name
+        )?;
+        if let Some(texture) = &material.map_kd {
+            writeln!(out, "map_Kd {}", textures[&texture.path])?;
+        }
+    }
+    Ok(())
+}
+
+/// Rust prints the shortest decimals that read back as the same float.
+fn mesh(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
+    writeln!(out, "mtllib {MATERIALS}")?;
+    for p in &scene.vertices {
+        writeln!(out, "v {} {} {}", p.x, p.y, p.z)?;
+    }
+    let mut uvs: HashMap<[u32; 2], usize> = HashMap::new();
+    let mut material = None;
+    for triangle in &scene.triangles {
+        let mut uv_indices = [0; 3];
+        for (uv, index) in triangle.uv.iter().zip(&mut uv_indices) {
+            let next = uvs.len() + 1;
+            *index = *uvs.entry(uv.map(f32::to_bits)).or_insert(next);
+            if *index == next {
+                writeln!(out, "vt {} {}", uv[0], uv[1])?;
+            }
+        }
+        if material != Some(triangle.material) {
+            material = Some(triangle.material);
+            writeln!(
+                out,
+                "usemtl {}",
+                scene.materials[triangle.material as usize].name
+            )?;
+        }
+        let [a, b, c] = triangle.vertices.map(|v| v + 1);
+        let [ta, tb, tc] = uv_indices;
+        writeln!(out, "f {a}/{ta} {b}/{tb} {c}/{tc}")?;
+    }
+    Ok(())
+}
+
+fn tables(scene: &Scene) -> SceneFile {
+    SceneFile {
+        name: Some(scene.name.clone()),
+        mesh: vec![bare(MeshTable {
+            file: MESH.into(),
+            ..MeshTable::default()
+        })],
+        point_light: scene
+            .point_lights
+            .iter()
+            .map(|light| {
+                bare(PointLightTable {
+                    name: Some(light.name.clone()),
+                    position: light.position.to_array(),
+                    intensity: light.intensity,
+                })
+            })
+            .collect(),
+        camera: scene
+            .cameras
+            .iter()
+            .map(|camera| {
+                bare(CameraTable {
+                    name: Some(camera.name.clone()),
+                    position: camera.position.to_array(),
+                    look_at: camera.look_at.to_array(),
+                    up: camera.up.to_array(),
+                    fov: camera.fov_y,
+                })
+            })
+            .collect(),
+        ..SceneFile::default()
+    }
+}
+
+/// A table that comes from no text.
+fn bare<T>(table: T) -> Spanned<T> {
+    Spanned::new(0..0, table)
+}
