@@ -1,8 +1,7 @@
 //! The instance, its validation messages, and the devices it offers.
 
 use std::ffi::{CStr, c_void};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 
 use ash::{ext, vk};
 
@@ -11,11 +10,19 @@ use crate::error::{Error, Result};
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
 /// Messages of warning severity or above that the validation layer has sent in this process.
-static VALIDATION_MESSAGES: AtomicUsize = AtomicUsize::new(0);
+static VALIDATION_MESSAGES: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
 /// How many validation messages (warnings and errors) this process has seen; 0 is the only good answer.
 pub fn validation_messages() -> usize {
-    VALIDATION_MESSAGES.load(Ordering::SeqCst)
+    validation_log().len()
+}
+
+/// The messages themselves.
+pub fn validation_log() -> Vec<String> {
+    VALIDATION_MESSAGES
+        .lock()
+        .unwrap_or_else(|e| e.into_inner())
+        .clone()
 }
 
 pub struct Instance {
@@ -249,8 +256,11 @@ unsafe extern "system" fn on_message(
     // SAFETY: the layer passes a valid struct whose message, if any, is a C string.
     let text = unsafe { data.as_ref().and_then(|d| d.message_as_c_str()) }
         .map_or_else(String::new, |t| t.to_string_lossy().into_owned());
-    VALIDATION_MESSAGES.fetch_add(1, Ordering::SeqCst);
     tracing::error!(?severity, "validation: {text}");
+    VALIDATION_MESSAGES
+        .lock()
+        .unwrap_or_else(|e| e.into_inner())
+        .push(text);
     vk::FALSE
 }
 

@@ -25,7 +25,7 @@ pub use graphics::{
     Attachment, Framebuffer, GraphicsPipeline, GraphicsState, RenderPass, VertexAttribute,
 };
 pub use image::{Image, ImageUse, Sampler};
-pub use instance::{Candidate, Instance, validation_messages};
+pub use instance::{Candidate, Instance, validation_log, validation_messages};
 pub use timestamps::Timestamps;
 
 pub use ash::vk::Format;

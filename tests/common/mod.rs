@@ -1,0 +1,204 @@
+//! Small scenes and the device for the tests. Validation is on: one message fails the test that saw it.
+#![allow(dead_code)]
+
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+use mesolux::elements::Elements;
+use mesolux::scene::{Material, PointLight, Scene, Triangle};
+use mesolux::solver::{Light, Report, Settings, Solver, open_device};
+use mesolux::vk::{Device, validation_log};
+
+/// The device that the program itself would take, watched by the validation layer. No device is a failure.
+pub fn device() -> Arc<Device> {
+    open_device(std::env::var("MESOLUX_TEST_DEVICE").ok().as_deref(), true)
+        .expect("the tests need a Vulkan device (Debian: mesa-vulkan-drivers, vulkan-validationlayers)")
+}
+
+/// Fails on any validation message so far.
+pub fn assert_silent() {
+    let log = validation_log();
+    assert!(log.is_empty(), "validation layers must stay silent: {log:#?}");
+}
+
+/// A scene made piece by piece. Material 0 reflects half and emits nothing.
+pub struct Build {
+    pub scene: Scene,
+}
+
+impl Build {
+    pub fn new() -> Self {
+        let mut build = Self {
+            scene: Scene {
+                name: "test".into(),
+                ..Scene::default()
+            },
+        };
+        build.material(0.5, 0.0);
+        build
+    }
+
+    /// A grey material: reflectance and emitted radiance. Returns its index.
+    pub fn material(&mut self, kd: f32, ke: f32) -> u32 {
+        self.scene.materials.push(Material {
+            name: format!("m{}", self.scene.materials.len()),
+            kd: [kd; 3],
+            ke: [ke; 3],
+            ..Material::default()
+        });
+        self.scene.materials.len() as u32 - 1
+    }
+
+    pub fn triangle(&mut self, corners: [u32; 3], material: u32) {
+        self.scene.triangles.push(Triangle {
+            vertices: corners,
+            uv: [[0.0; 2]; 3],
+            material,
+        });
+    }
+
+    pub fn vertex(&mut self, v: DVec3) -> u32 {
+        self.scene.vertices.push(v);
+        self.scene.vertices.len() as u32 - 1
+    }
+
+    /// A parallelogram of n × m cells, two triangles each, facing `u` × `v`. Returns its range of triangles.
+    pub fn quad(&mut self, origin: DVec3, u: DVec3, v: DVec3, (n, m): (u32, u32), material: u32) -> std::ops::Range<usize> {
+        let first = self.scene.triangles.len();
+        let base = self.scene.vertices.len() as u32;
+        for j in 0..=m {
+            for i in 0..=n {
+                self.vertex(origin + u * (f64::from(i) / f64::from(n)) + v * (f64::from(j) / f64::from(m)));
+            }
+        }
+        for j in 0..m {
+            for i in 0..n {
+                let a = base + j * (n + 1) + i;
+                let (b, c, d) = (a + 1, a + n + 2, a + n + 1);
+                // Diagonals alternate, so that the grid has no grain.
+                if (i + j) % 2 == 0 {
+                    self.triangle([a, b, c], material);
+                    self.triangle([a, c, d], material);
+                } else {
+                    self.triangle([a, b, d], material);
+                    self.triangle([b, c, d], material);
+                }
+            }
+        }
+        first..self.scene.triangles.len()
+    }
+
+    /// The six inner sides of a box; the ranges are floor (y low), ceiling, x low, x high, z low, z high.
+    pub fn room(&mut self, low: DVec3, size: DVec3, n: u32, material: u32) -> [std::ops::Range<usize>; 6] {
+        let (x, y, z) = (DVec3::X * size.x, DVec3::Y * size.y, DVec3::Z * size.z);
+        let sides = [
+            self.quad(low, z, x, (n, n), material),
+            self.quad(low + y, x, z, (n, n), material),
+            self.quad(low, y, z, (n, n), material),
+            self.quad(low + x, z, y, (n, n), material),
+            self.quad(low, x, y, (n, n), material),
+            self.quad(low + z, y, x, (n, n), material),
+        ];
+        self.weld();
+        sides
+    }
+
+    /// A sphere of 20 · 4^levels triangles; `outward` or facing its centre.
+    pub fn sphere(&mut self, centre: DVec3, radius: f64, levels: u32, outward: bool, material: u32) -> std::ops::Range<usize> {
+        let first = self.scene.triangles.len();
+        let g = 0.5 * (1.0 + 5f64.sqrt());
+        let ico = [
+            [-1., g, 0.], [1., g, 0.], [-1., -g, 0.], [1., -g, 0.], [0., -1., g], [0., 1., g],
+            [0., -1., -g], [0., 1., -g], [g, 0., -1.], [g, 0., 1.], [-g, 0., -1.], [-g, 0., 1.],
+        ]
+        .map(|v| DVec3::from_array(v).normalize());
+        let faces = [
+            [0, 11, 5], [0, 5, 1], [0, 1, 7], [0, 7, 10], [0, 10, 11], [1, 5, 9], [5, 11, 4],
+            [11, 10, 2], [10, 7, 6], [7, 1, 8], [3, 9, 4], [3, 4, 2], [3, 2, 6], [3, 6, 8],
+            [3, 8, 9], [4, 9, 5], [2, 4, 11], [6, 2, 10], [8, 6, 7], [9, 8, 1],
+        ];
+        let mut triangles: Vec<[DVec3; 3]> = faces.iter().map(|f| f.map(|i: usize| ico[i])).collect();
+        for _ in 0..levels {
+            triangles = triangles
+                .iter()
+                .flat_map(|&[a, b, c]| {
+                    let m = |p: DVec3, q: DVec3| (p + q).normalize();
+                    let (ab, bc, ca) = (m(a, b), m(b, c), m(c, a));
+                    [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+                })
+                .collect();
+        }
+        for [a, b, c] in triangles {
+            let [a, b, c] = [a, b, c].map(|v| self.vertex(centre + radius * v));
+            let corners = if outward { [a, b, c] } else { [a, c, b] };
+            self.triangle(corners, material);
+        }
+        self.weld();
+        first..self.scene.triangles.len()
+    }
+
+    /// Joins equal positions, as reading a file does.
+    pub fn weld(&mut self) {
+        let mut places = std::collections::HashMap::new();
+        let mut vertices = Vec::new();
+        for t in &mut self.scene.triangles {
+            for v in &mut t.vertices {
+                let p = self.scene.vertices[*v as usize];
+                *v = *places.entry(p.to_array().map(f64::to_bits)).or_insert_with(|| {
+                    vertices.push(p);
+                    vertices.len() as u32 - 1
+                });
+            }
+        }
+        self.scene.vertices = vertices;
+    }
+
+    pub fn point_light(&mut self, position: DVec3, intensity: f32) {
+        self.scene.point_lights.push(PointLight {
+            name: "lamp".into(),
+            position,
+            intensity: [intensity; 3],
+        });
+    }
+
+    pub fn solve(&self, settings: &Settings) -> Solved {
+        solve(Elements::new(&self.scene), &self.scene.point_lights, settings)
+    }
+}
+
+/// A solution in the order of the input.
+pub struct Solved {
+    pub area: Vec<f64>,
+    pub irradiance: Vec<Vec3>,
+    pub direct: Vec<Vec3>,
+    pub radiosity: Vec<Vec3>,
+    pub report: Report,
+}
+
+impl Solved {
+    /// Area-weighted mean of a value over a range of triangles.
+    pub fn mean(&self, values: &[Vec3], range: std::ops::Range<usize>) -> f64 {
+        let area: f64 = range.clone().map(|e| self.area[e]).sum();
+        range.map(|e| self.area[e] * f64::from(values[e].x)).sum::<f64>() / area
+    }
+}
+
+pub fn solve(elements: Elements, lights: &[PointLight], settings: &Settings) -> Solved {
+    let mut solver = Solver::new(&device(), elements, lights, settings).expect("the scene fits the device");
+    solver.run(|_| true).expect("the device solves the scene");
+    let Light {
+        irradiance_direct,
+        irradiance,
+        radiosity,
+    } = solver.light().expect("the device gives the solution");
+    let e = &solver.elements;
+    let solved = Solved {
+        area: e.to_input_order(&e.area),
+        irradiance: e.to_input_order(&irradiance),
+        direct: e.to_input_order(&irradiance_direct),
+        radiosity: e.to_input_order(&radiosity),
+        report: solver.report().clone(),
+    };
+    assert_silent();
+    solved
+}
