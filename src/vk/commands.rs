@@ -425,9 +425,11 @@ fn whole(image: &Image) -> vk::BufferImageCopy {
 
 impl Drop for Commands {
     fn drop(&mut self) {
-        // SAFETY: an error on the way may leave a submission under way; nothing is freed before it is done.
+        // An error on the way may leave a submission under way; nothing is freed before it is done. Its own fence is waited
+        // for and not the device, which would need every other thread to keep off the queue.
+        let _ = self.wait();
+        // SAFETY: nothing recorded here is under way.
         unsafe {
-            let _ = self.device.raw.device_wait_idle();
             self.device.raw.destroy_fence(self.fence, None);
             self.device.raw.destroy_command_pool(self.pool, None);
         }
