@@ -161,7 +161,6 @@ impl Target {
     /// The first `rows` rows of the whole target's width, `[row][column]`: RGB radiance, W·m⁻²·sr⁻¹, and the meter's
     /// flag. The submission must be done.
     pub fn rows(&self, rows: u32) -> Vec<[f32; 4]> {
-        self.readback
-            .read(0, self.width as usize * rows as usize)
+        self.readback.read(0, self.width as usize * rows as usize)
     }
 }

@@ -22,7 +22,10 @@ pub fn shade(scene: &Scene, irradiance: &[Vec3], view: &View<'_>) -> Vec<Option<
     let pixel = 2.0 * (0.5 * camera.fov_y.to_radians()).tan() / f64::from(view.height);
     // A place in the picture in pixels, from its left top corner.
     let ray = |x: f64, y: f64| {
-        let (from_middle, above) = (x - 0.5 * f64::from(view.width), 0.5 * f64::from(view.height) - y);
+        let (from_middle, above) = (
+            x - 0.5 * f64::from(view.width),
+            0.5 * f64::from(view.height) - y,
+        );
         right * (from_middle * pixel) + up * (above * pixel) - back
     };
     let mut picture = Vec::with_capacity((view.width * view.height) as usize);
@@ -70,7 +73,13 @@ fn first_seen(scene: &Scene, eye: DVec3, ray: DVec3) -> Option<(usize, [f64; 3])
 }
 
 /// L = ρ · E / π + Le on the front of an element, nothing on its back.
-fn radiance(scene: &Scene, irradiance: &[Vec3; 3], e: usize, weights: [f64; 3], eye: DVec3) -> DVec3 {
+fn radiance(
+    scene: &Scene,
+    irradiance: &[Vec3; 3],
+    e: usize,
+    weights: [f64; 3],
+    eye: DVec3,
+) -> DVec3 {
     let triangle = &scene.triangles[e];
     let material = &scene.materials[triangle.material as usize];
     let [a, b, c] = scene.corners(triangle);

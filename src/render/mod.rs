@@ -63,7 +63,11 @@ pub fn render(
     irradiance: &[Vec3],
     view: &View<'_>,
 ) -> Result<Picture> {
-    assert_eq!(irradiance.len(), scene.triangles.len(), "one irradiance a triangle");
+    assert_eq!(
+        irradiance.len(),
+        scene.triangles.len(),
+        "one irradiance a triangle"
+    );
     for (name, side) in [("width", view.width), ("height", view.height)] {
         if !(1..=MOST_PIXELS).contains(&side) {
             return Err(Error::Usage(format!(
@@ -102,7 +106,11 @@ pub fn render(
                 );
                 Ok(())
             })?;
-            gathered.add(tile, &target.rows(tile.height * SAMPLES), target.width as usize);
+            gathered.add(
+                tile,
+                &target.rows(tile.height * SAMPLES),
+                target.width as usize,
+            );
         }
     }
     Ok(gathered.into_picture(view))
@@ -138,9 +146,7 @@ impl Mesh {
         order.par_sort_unstable();
         let vertices: Vec<_> = order
             .par_iter()
-            .flat_map_iter(|&(_, e)| {
-                corners(scene, &scene.triangles[e], smooth[e], projection)
-            })
+            .flat_map_iter(|&(_, e)| corners(scene, &scene.triangles[e], smooth[e], projection))
             .collect();
         let mut ranges = Vec::new();
         let mut first = 0;
@@ -272,7 +278,11 @@ impl Gathered {
             height: view.height,
             radiance: self.radiance,
             // In the dark there is nothing to expose for.
-            automatic_exposure: if bright > 0.0 { (METER_TARGET / bright).log2() } else { 0.0 },
+            automatic_exposure: if bright > 0.0 {
+                (METER_TARGET / bright).log2()
+            } else {
+                0.0
+            },
             contrasts: self.contrasts,
         }
     }

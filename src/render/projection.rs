@@ -52,7 +52,11 @@ impl Projection {
         let half = (0.5 * (high - low)).max_element();
         Ok(Self {
             eye: camera.position,
-            unit: if half > 0.0 { half.log2().ceil().exp2() } else { 1.0 },
+            unit: if half > 0.0 {
+                half.log2().ceil().exp2()
+            } else {
+                1.0
+            },
             rows: [right * (scale * size[1] / size[0]), -up * scale, forward],
             size,
         })

@@ -101,10 +101,7 @@ fn upload(
 }
 
 /// The next level of detail, half the size rounded down: each texel the mean of the area that it covers, in linear light.
-fn half(
-    texels: &[[f32; 4]],
-    (width, height): (usize, usize),
-) -> (Vec<[f32; 4]>, (usize, usize)) {
+fn half(texels: &[[f32; 4]], (width, height): (usize, usize)) -> (Vec<[f32; 4]>, (usize, usize)) {
     let (w, h) = ((width / 2).max(1), (height / 2).max(1));
     let out = (0..w * h)
         .into_par_iter()
