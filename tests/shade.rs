@@ -89,12 +89,15 @@ fn add_square(scene: &mut Scene, [x, y, z]: [f64; 3], half: f64, towards: bool, 
 
 /// Red left, green right, blue above, nothing below; a lamp in front of the green; a back in front of the red.
 fn asymmetric() -> Scene {
-    let mut scene = Scene::default();
-    scene.materials = [RED, GREEN, BLUE].map(material).to_vec();
-    scene.materials.push(Material {
+    let lamp = Material {
         ke: [7.0, 6.0, 5.0],
         ..material([0.5; 3])
-    });
+    };
+    let [red, green, blue] = [RED, GREEN, BLUE].map(material);
+    let mut scene = Scene {
+        materials: vec![red, green, blue, lamp],
+        ..Scene::default()
+    };
     add(
         &mut scene,
         [[-1.2, -0.8, 0.0], [-0.2, -0.7, 0.3], [-0.9, 0.5, -0.2]],
@@ -163,11 +166,13 @@ fn texture(width: u32, height: u32, texels: Vec<[f32; 3]>) -> Arc<Texture> {
 }
 
 fn textured(map: Arc<Texture>, half: f64) -> Scene {
-    let mut scene = Scene::default();
-    scene.materials.push(Material {
-        map_kd: Some(map),
-        ..material([0.9; 3])
-    });
+    let mut scene = Scene {
+        materials: vec![Material {
+            map_kd: Some(map),
+            ..material([0.9; 3])
+        }],
+        ..Scene::default()
+    };
     add_square(&mut scene, [0.0; 3], half, true, 0);
     scene
 }
