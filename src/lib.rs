@@ -10,6 +10,7 @@ pub mod hemicube;
 pub mod meshlets;
 pub mod passes;
 pub mod reference;
+pub mod render;
 pub mod scene;
 pub mod solver;
 pub mod sources;

@@ -8,6 +8,7 @@ pub mod cull;
 pub mod item_buffer;
 pub mod measure;
 pub mod select;
+pub mod shade;
 pub mod types;
 
 use crate::constants::GROUP;

@@ -6,3 +6,4 @@ pub mod cull;
 pub mod item_buffer;
 pub mod measure;
 pub mod select;
+pub mod shade;

@@ -335,11 +335,24 @@ impl Commands {
         self.transition(image, L::TRANSFER_SRC_OPTIMAL, L::SHADER_READ_ONLY_OPTIMAL);
     }
 
-    /// Fills a texture from tightly packed rows and makes it readable by shaders.
-    pub fn upload_texture(&self, from: &Buffer, image: &Image) {
+    /// Fills a texture from tightly packed rows, its levels of detail one after another from the largest, and makes it
+    /// readable by shaders.
+    pub fn upload_texture(&self, from: &Buffer, image: &Image, bytes_per_texel: u64) {
         use vk::ImageLayout as L;
         self.transition(image, L::UNDEFINED, L::TRANSFER_DST_OPTIMAL);
-        let regions = [whole(image)];
+        let mut offset = 0;
+        let regions: Vec<_> = (0..image.mip_levels)
+            .map(|level| {
+                let mut region = whole(image).buffer_offset(offset);
+                region.image_subresource.mip_level = level;
+                region.image_extent.width = (image.width >> level).max(1);
+                region.image_extent.height = (image.height >> level).max(1);
+                let texels = u64::from(region.image_extent.width) * u64::from(region.image_extent.height);
+                offset += texels * bytes_per_texel;
+                region
+            })
+            .collect();
+        assert!(offset <= from.bytes(), "the buffer holds every level");
         // SAFETY: the image was just brought to this layout, and the buffer holds its texels.
         unsafe {
             self.device.raw.cmd_copy_buffer_to_image(
@@ -365,7 +378,7 @@ impl Commands {
             .subresource_range(
                 vk::ImageSubresourceRange::default()
                     .aspect_mask(vk::ImageAspectFlags::COLOR)
-                    .level_count(1)
+                    .level_count(image.mip_levels)
                     .layer_count(1),
             )];
         let info = vk::DependencyInfo::default().image_memory_barriers(&barriers);
@@ -412,9 +425,11 @@ fn whole(image: &Image) -> vk::BufferImageCopy {
 
 impl Drop for Commands {
     fn drop(&mut self) {
-        // SAFETY: an error on the way may leave a submission under way; nothing is freed before it is done.
+        // An error on the way may leave a submission under way; nothing is freed before it is done. Its own fence is waited
+        // for and not the device, which would need every other thread to keep off the queue.
+        let _ = self.wait();
+        // SAFETY: nothing recorded here is under way.
         unsafe {
-            let _ = self.device.raw.device_wait_idle();
             self.device.raw.destroy_fence(self.fence, None);
             self.device.raw.destroy_command_pool(self.pool, None);
         }

@@ -64,6 +64,7 @@ impl Device {
             .shader_buffer_int64_atomics(candidate.int64_atomics);
         let mut f13 = vk::PhysicalDeviceVulkan13Features::default()
             .synchronization2(true)
+            .maintenance4(true)
             .subgroup_size_control(true)
             .compute_full_subgroups(true);
         let features = vk::PhysicalDeviceFeatures::default()

@@ -24,7 +24,6 @@ pub struct Image {
     pub(super) view: vk::ImageView,
     pub(super) width: u32,
     pub(super) height: u32,
-    pub(super) format: vk::Format,
     pub(super) mip_levels: u32,
     allocation: Option<Allocation>,
     device: Arc<Device>,
@@ -37,6 +36,28 @@ impl Image {
         (width, height): (u32, u32),
         format: vk::Format,
         usage: ImageUse,
+    ) -> Result<Self> {
+        Self::with_levels(device, name, (width, height), format, usage, 1)
+    }
+
+    /// A texture with every level of detail from its own size down to one texel.
+    pub fn mipped(
+        device: &Arc<Device>,
+        name: &str,
+        (width, height): (u32, u32),
+        format: vk::Format,
+    ) -> Result<Self> {
+        let levels = width.max(height).ilog2() + 1;
+        Self::with_levels(device, name, (width, height), format, ImageUse::Texture, levels)
+    }
+
+    fn with_levels(
+        device: &Arc<Device>,
+        name: &str,
+        (width, height): (u32, u32),
+        format: vk::Format,
+        usage: ImageUse,
+        mip_levels: u32,
     ) -> Result<Self> {
         let side = device.limits().max_image_side;
         if width > side || height > side {
@@ -71,7 +92,7 @@ impl Image {
                 height,
                 depth: 1,
             })
-            .mip_levels(1)
+            .mip_levels(mip_levels)
             .array_layers(1)
             .samples(vk::SampleCountFlags::TYPE_1)
             .tiling(vk::ImageTiling::OPTIMAL)
@@ -84,8 +105,7 @@ impl Image {
             view: vk::ImageView::null(),
             width,
             height,
-            format,
-            mip_levels: 1,
+            mip_levels,
             allocation: None,
             device: Arc::clone(device),
         };
@@ -121,7 +141,7 @@ impl Image {
             .subresource_range(
                 vk::ImageSubresourceRange::default()
                     .aspect_mask(aspect)
-                    .level_count(1)
+                    .level_count(mip_levels)
                     .layer_count(1),
             );
         // SAFETY: the image is bound to memory and outlives its view.
@@ -150,7 +170,7 @@ impl Drop for Image {
     }
 }
 
-/// A sampler that repeats, either nearest (for integer images read by texel) or linear.
+/// A sampler that repeats, either nearest (for integer images read by texel) or linear, between levels of detail too.
 pub struct Sampler {
     pub(super) raw: vk::Sampler,
     device: Arc<Device>,
@@ -163,9 +183,16 @@ impl Sampler {
         } else {
             vk::Filter::NEAREST
         };
+        let between_levels = if linear {
+            vk::SamplerMipmapMode::LINEAR
+        } else {
+            vk::SamplerMipmapMode::NEAREST
+        };
         let info = vk::SamplerCreateInfo::default()
             .mag_filter(filter)
             .min_filter(filter)
+            .mipmap_mode(between_levels)
+            .max_lod(vk::LOD_CLAMP_NONE)
             .address_mode_u(vk::SamplerAddressMode::REPEAT)
             .address_mode_v(vk::SamplerAddressMode::REPEAT);
         // SAFETY: a plain creation on a live device.

@@ -181,6 +181,7 @@ impl Instance {
                 (base_features.full_draw_index_uint32 != 0, "fullDrawIndexUint32"),
                 (f12.scalar_block_layout != 0, "scalarBlockLayout"),
                 (f13.synchronization2 != 0, "synchronization2"),
+                (f13.maintenance4 != 0, "maintenance4 (LocalSizeId in compute shaders)"),
                 (f13.subgroup_size_control != 0, "subgroupSizeControl"),
                 (f13.compute_full_subgroups != 0, "computeFullSubgroups"),
                 (subgroup.supported_operations.contains(needed_operations)

@@ -1,0 +1,166 @@
+//! Draws elements as radiance, L = ρ(u, v) · E / π + Le. Shaders: `shade.vert`, `shade.frag`; twin:
+//! [`crate::reference::shade`].
+
+use std::sync::Arc;
+
+use bytemuck::{Pod, Zeroable};
+use glam::{Vec2, Vec3};
+
+use super::shaders;
+use crate::error::Result;
+use crate::vk::{
+    Attachment, Bind, Binding, Buffer, BufferUse, Commands, DescriptorSet, Device, Format,
+    Framebuffer, GraphicsPipeline, GraphicsState, Image, ImageUse, RenderPass, Sampler, Stage,
+    VertexAttribute,
+};
+
+/// One corner of an element.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct Vertex {
+    /// From the eye, internal units, along the world's axes.
+    pub position: Vec3,
+    /// Incident power per area E, W·m⁻², RGB.
+    pub irradiance: Vec3,
+    /// Texture coordinates, v down, as images are stored.
+    pub uv: Vec2,
+}
+
+/// Push constants of one draw: rows x, y and w of the projection, and the material.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct Parameters {
+    pub x: Vec3,
+    pub y: Vec3,
+    pub w: Vec3,
+    /// Distance of the near plane, internal units.
+    pub near: f32,
+    /// ρ, or what the texture is multiplied by.
+    pub reflectance: Vec3,
+    /// Le, W·m⁻²·sr⁻¹.
+    pub emitted: Vec3,
+    /// 1 where an exposure meter looks, 0 where it does not; goes to alpha.
+    pub metered: f32,
+}
+
+/// A run of vertices of one material.
+#[derive(Clone, Copy)]
+pub struct Draw<'a> {
+    pub first_vertex: u32,
+    pub vertex_count: u32,
+    pub texture: &'a DescriptorSet,
+    pub parameters: Parameters,
+}
+
+pub struct Shade {
+    pass: RenderPass,
+    pipeline: GraphicsPipeline,
+}
+
+/// Colour, depth and readback for one size of tile.
+pub struct Target {
+    pub width: u32,
+    pub height: u32,
+    framebuffer: Framebuffer,
+    colour: Image,
+    _depth: Image,
+    readback: Buffer,
+}
+
+/// Radiance and the meter's flag.
+const FORMAT: Format = Format::R32G32B32A32_SFLOAT;
+const TEXEL_BYTES: u64 = 16;
+
+impl Shade {
+    pub fn new(device: &Arc<Device>) -> Result<Self> {
+        let pass = RenderPass::new(device, "shade", Attachment::copied(FORMAT))?;
+        let attribute = |format, offset: usize| VertexAttribute {
+            format,
+            offset: offset as u32,
+        };
+        let pipeline = GraphicsPipeline::new(
+            device,
+            &pass,
+            &GraphicsState {
+                name: "shade",
+                vertex: shaders::SHADE_VERT,
+                fragment: shaders::SHADE_FRAG,
+                bindings: &[Binding::Sampled],
+                push_bytes: size_of::<Parameters>(),
+                vertex_stride: size_of::<Vertex>() as u32,
+                attributes: &[
+                    attribute(
+                        Format::R32G32B32_SFLOAT,
+                        std::mem::offset_of!(Vertex, position),
+                    ),
+                    attribute(
+                        Format::R32G32B32_SFLOAT,
+                        std::mem::offset_of!(Vertex, irradiance),
+                    ),
+                    attribute(Format::R32G32_SFLOAT, std::mem::offset_of!(Vertex, uv)),
+                ],
+            },
+        )?;
+        Ok(Self { pass, pipeline })
+    }
+
+    /// Binds the texture of a material.
+    pub fn bind(&self, albedo: &Image, sampler: &Sampler) -> Result<DescriptorSet> {
+        self.pipeline.bind("shade", &[Bind::Image(albedo, sampler)])
+    }
+
+    /// Draws into the left top `size` of the target and copies all of it to where the CPU reads it.
+    pub fn record<'a>(
+        &self,
+        cmd: &Commands,
+        target: &Target,
+        (width, height): (u32, u32),
+        (vertices, indices): (&Buffer, &Buffer),
+        draws: impl Iterator<Item = Draw<'a>>,
+    ) {
+        cmd.begin_render_pass(&self.pass, &target.framebuffer, [0; 4]);
+        cmd.bind_indices(indices);
+        cmd.viewport(0, 0, width, height);
+        for draw in draws {
+            cmd.bind_graphics(&self.pipeline, draw.texture, vertices);
+            cmd.push_graphics(&self.pipeline, &draw.parameters);
+            cmd.draw_indexed(draw.first_vertex, draw.vertex_count);
+        }
+        cmd.end_render_pass();
+        cmd.copy_image_to_buffer(&target.colour, &target.readback);
+        cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
+    }
+}
+
+impl Target {
+    pub fn new(device: &Arc<Device>, shade: &Shade, (width, height): (u32, u32)) -> Result<Self> {
+        let size = (width, height);
+        let colour = Image::new(device, "shade", size, FORMAT, ImageUse::ColourTarget)?;
+        let depth = Image::new(
+            device,
+            "shade depth",
+            size,
+            Format::D32_SFLOAT,
+            ImageUse::DepthTarget,
+        )?;
+        Ok(Self {
+            width,
+            height,
+            framebuffer: Framebuffer::new(device, "shade", &shade.pass, &colour, &depth)?,
+            colour,
+            _depth: depth,
+            readback: Buffer::new(
+                device,
+                "shade readback",
+                u64::from(width) * u64::from(height) * TEXEL_BYTES,
+                BufferUse::Readback,
+            )?,
+        })
+    }
+
+    /// The first `rows` rows of the whole target's width, `[row][column]`: RGB radiance, W·m⁻²·sr⁻¹, and the meter's
+    /// flag. The submission must be done.
+    pub fn rows(&self, rows: u32) -> Vec<[f32; 4]> {
+        self.readback.read(0, self.width as usize * rows as usize)
+    }
+}

@@ -1,0 +1,129 @@
+//! A picture in linear light and the files that hold it.
+
+use std::io::{self, Cursor};
+use std::path::Path;
+
+use image::ImageEncoder;
+use image::codecs::openexr::OpenExrEncoder;
+use image::codecs::png::PngEncoder;
+use rayon::prelude::*;
+
+use super::tone;
+use crate::atomic_file::write_atomically;
+use crate::error::{Error, Result};
+
+/// Samples of a pixel along each side.
+pub const SAMPLES: u32 = 4;
+
+/// The samples of one pixel, W·m⁻²·sr⁻¹, RGB.
+pub type Samples = [[f32; 3]; (SAMPLES * SAMPLES) as usize];
+
+/// A rendered picture.
+#[derive(Debug, Clone)]
+pub struct Picture {
+    pub width: u32,
+    pub height: u32,
+    /// Mean radiance of each pixel, `[row][column]` from the top left, W·m⁻²·sr⁻¹, linear RGB. Black where nothing is.
+    pub radiance: Vec<[f32; 3]>,
+    /// The exposure, as a power of two, with which an unasked one is written: see [`Picture::write`].
+    pub automatic_exposure: f32,
+    /// Place in `radiance`, ascending, and samples of each pixel of strong contrast. Of the others the mean is enough, and a
+    /// picture of 16384² stays within memory.
+    pub(super) contrasts: Vec<(u32, Samples)>,
+}
+
+/// A kind of picture file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FileKind {
+    Png,
+    Exr,
+}
+
+impl FileKind {
+    /// By a path's ending, in whatever case.
+    ///
+    /// # Errors
+    /// Any other ending.
+    pub fn of(path: &Path) -> Result<Self> {
+        let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        match ending.as_deref() {
+            Some("png") => Ok(Self::Png),
+            Some("exr") => Ok(Self::Exr),
+            _ => Err(Error::Usage(format!(
+                "picture {}: the name must end in .png (8-bit sRGB, tone-mapped) or .exr (linear radiance)",
+                path.display()
+            ))),
+        }
+    }
+}
+
+impl Picture {
+    /// Writes the picture, by the ending of `path`: `.png` as 8-bit sRGB, exposed by 2^`exposure` and tone-mapped, or
+    /// `.exr` as linear 32-bit float radiance, W·m⁻²·sr⁻¹, neither exposed nor tone-mapped.
+    ///
+    /// Without `exposure`, the 90th percentile of the luminance of what shines by reflected light alone is brought to 0.6:
+    /// lamps in view do not darken the room.
+    ///
+    /// # Errors
+    /// Another ending; a file that cannot be written.
+    pub fn write(&self, path: &Path, exposure: Option<f32>) -> Result<()> {
+        match FileKind::of(path)? {
+            FileKind::Png => {
+                let codes = self.srgb_codes(exposure);
+                write_atomically(path, |out| {
+                    PngEncoder::new(out)
+                        .write_image(
+                            &codes,
+                            self.width,
+                            self.height,
+                            image::ExtendedColorType::Rgb8,
+                        )
+                        .map_err(io::Error::other)
+                })
+            }
+            FileKind::Exr => write_atomically(path, |out| {
+                // The encoder goes back to fill in its table, which a stream cannot.
+                let mut whole = Cursor::new(Vec::new());
+                OpenExrEncoder::new(&mut whole)
+                    .write_image(
+                        bytemuck::cast_slice(&self.radiance),
+                        self.width,
+                        self.height,
+                        image::ExtendedColorType::Rgb32F,
+                    )
+                    .map_err(io::Error::other)?;
+                out.write_all(whole.get_ref())
+            }),
+        }
+    }
+
+    /// 8-bit sRGB codes, `[row][column][channel]`.
+    fn srgb_codes(&self, exposure: Option<f32>) -> Vec<u8> {
+        let scale = exposure.unwrap_or(self.automatic_exposure).exp2();
+        let shown = |radiance: [f32; 3]| tone::neutral(radiance.map(|c| c * scale));
+        let mut linear: Vec<[f32; 3]> = self.radiance.par_iter().map(|&r| shown(r)).collect();
+        // Mapped before they are averaged: otherwise one sample of a lamp outshines its pixel, and the lamp's edge is jagged.
+        for (place, samples) in &self.contrasts {
+            linear[*place as usize] = mean(&samples.map(shown));
+        }
+        let width = self.width as usize;
+        let mut codes = vec![0; 3 * linear.len()];
+        codes
+            .par_chunks_mut(3 * width)
+            .zip(linear.par_chunks(width))
+            .enumerate()
+            .for_each(|(row, (codes, linear))| {
+                for (column, (code, linear)) in codes.chunks_mut(3).zip(linear).enumerate() {
+                    for channel in 0..3 {
+                        code[channel] = tone::code(linear[channel], column as u32, row as u32);
+                    }
+                }
+            });
+        codes
+    }
+}
+
+/// The mean of a pixel's samples.
+pub(super) fn mean(samples: &Samples) -> [f32; 3] {
+    std::array::from_fn(|c| samples.iter().map(|s| s[c]).sum::<f32>() / samples.len() as f32)
+}

@@ -1,0 +1,79 @@
+//! From scene units to a tile of the picture.
+
+use glam::{DVec3, Vec3};
+
+use super::View;
+use crate::error::{Error, Result};
+use crate::scene::Scene;
+
+/// Distance of the near plane, internal units.
+pub const NEAR: f32 = 1e-6;
+
+/// A rectangle of pixels.
+#[derive(Debug, Clone, Copy)]
+pub struct Tile {
+    pub column: u32,
+    pub row: u32,
+    pub width: u32,
+    pub height: u32,
+}
+
+/// A camera with its picture's shape.
+pub struct Projection {
+    /// Scene units.
+    pub eye: DVec3,
+    /// Scene units of one internal unit, a power of two: the scene's greatest half extent is at most one.
+    pub unit: f64,
+    /// Rows x, y and w over the whole picture: clip coordinates of a place seen from the eye; y is down.
+    rows: [DVec3; 3],
+    /// Pixels.
+    size: [f64; 2],
+}
+
+impl Projection {
+    /// # Errors
+    /// A camera without a direction, or with one along its up.
+    pub fn new(scene: &Scene, view: &View<'_>) -> Result<Self> {
+        let camera = view.camera;
+        let forward = (camera.look_at - camera.position).normalize_or_zero();
+        let right = forward.cross(camera.up).normalize_or_zero();
+        let half_angle = camera.fov_y.to_radians() / 2.0;
+        let open = half_angle > 0.0 && half_angle.tan() > 0.0;
+        if right == DVec3::ZERO || !camera.position.is_finite() || !open {
+            return Err(Error::Usage(format!(
+                "camera \"{}\": it must look somewhere, not along its up, with a field of view between 0 and 180 degrees",
+                camera.name
+            )));
+        }
+        let up = right.cross(forward);
+        let size = [f64::from(view.width), f64::from(view.height)];
+        let scale = 1.0 / half_angle.tan();
+        let (low, high) = scene.bounds();
+        let half = (0.5 * (high - low)).max_element();
+        Ok(Self {
+            eye: camera.position,
+            unit: if half > 0.0 {
+                half.log2().ceil().exp2()
+            } else {
+                1.0
+            },
+            rows: [right * (scale * size[1] / size[0]), -up * scale, forward],
+            size,
+        })
+    }
+
+    /// Rows x, y and w over a tile alone.
+    pub fn rows(&self, tile: Tile) -> [Vec3; 3] {
+        let [x, y, w] = self.rows;
+        // The tile's ends, as places in −1..1 of the whole, go to −1 and 1.
+        let onto = |row: DVec3, whole: f64, first: u32, length: u32| {
+            let (first, length) = (f64::from(first), f64::from(length));
+            row * (whole / length) + w * ((whole - 2.0 * first - length) / length)
+        };
+        [
+            onto(x, self.size[0], tile.column, tile.width).as_vec3(),
+            onto(y, self.size[1], tile.row, tile.height).as_vec3(),
+            w.as_vec3(),
+        ]
+    }
+}
