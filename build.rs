@@ -40,8 +40,11 @@ fn shaders() -> Result<(), String> {
             .map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]]))
             .collect();
         let constant = name.replace('.', "_").to_uppercase();
-        writeln!(module, "/// `shaders/{name}`.\npub static {constant}: &[u32] = &{words:?};")
-            .map_err(|e| e.to_string())?;
+        writeln!(
+            module,
+            "/// `shaders/{name}`.\npub static {constant}: &[u32] = &{words:?};"
+        )
+        .map_err(|e| e.to_string())?;
     }
     let out = std::env::var("OUT_DIR").map_err(|e| e.to_string())?;
     fs::write(Path::new(&out).join("shaders.rs"), module).map_err(|e| e.to_string())
@@ -53,7 +56,11 @@ fn read_all(dir: &str, endings: &[&str]) -> Result<BTreeMap<String, String>, Str
         let path = entry.map_err(|e| e.to_string())?.path();
         let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("");
         if endings.contains(&ending) {
-            let name = path.file_name().and_then(|n| n.to_str()).unwrap_or("").to_owned();
+            let name = path
+                .file_name()
+                .and_then(|n| n.to_str())
+                .unwrap_or("")
+                .to_owned();
             let text = fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
             files.insert(name, text);
         }
@@ -96,7 +103,9 @@ fn spirv(
     shared: &BTreeMap<String, String>,
     hash: &str,
 ) -> Result<Vec<u8>, String> {
-    use shaderc::{CompileOptions, Compiler, EnvVersion, OptimizationLevel, ResolvedInclude, ShaderKind};
+    use shaderc::{
+        CompileOptions, Compiler, EnvVersion, OptimizationLevel, ResolvedInclude, ShaderKind,
+    };
 
     let kind = match name.rsplit('.').next() {
         Some("comp") => ShaderKind::Compute,
@@ -122,7 +131,13 @@ fn spirv(
         }
     });
     let binary = compiler
-        .compile_into_spirv(source, kind, &format!("shaders/{name}"), "main", Some(&options))
+        .compile_into_spirv(
+            source,
+            kind,
+            &format!("shaders/{name}"),
+            "main",
+            Some(&options),
+        )
         .map_err(|e| e.to_string())?;
     let bytes = binary.as_binary_u8().to_vec();
     let kept = format!("shaders/spirv/{name}.spv");

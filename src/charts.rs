@@ -87,7 +87,10 @@ impl Connections {
             .collect();
         Self {
             neighbours,
-            component: order.iter().map(|&old| self.component[old as usize]).collect(),
+            component: order
+                .iter()
+                .map(|&old| self.component[old as usize])
+                .collect(),
             closed: self.closed.clone(),
         }
     }
@@ -117,7 +120,10 @@ pub fn charts(elements: &Elements, connections: &Connections, order: &[u32]) -> 
         let mut chart = vec![seed];
         let mut next = 0;
         while next < chart.len() {
-            for neighbour in connections.neighbours[chart[next] as usize].into_iter().flatten() {
+            for neighbour in connections.neighbours[chart[next] as usize]
+                .into_iter()
+                .flatten()
+            {
                 if !taken[neighbour as usize] && belongs(neighbour) {
                     taken[neighbour as usize] = true;
                     chart.push(neighbour);
@@ -154,7 +160,8 @@ pub fn morton_order(elements: &Elements) -> Vec<u32> {
     };
     order.sort_by(|&a, &b| {
         let ((ca, pa), (cb, pb)) = (key(a), key(b));
-        ca.cmp(&cb).then_with(|| pa.partial_cmp(&pb).unwrap_or(std::cmp::Ordering::Equal))
+        ca.cmp(&cb)
+            .then_with(|| pa.partial_cmp(&pb).unwrap_or(std::cmp::Ordering::Equal))
     });
     order
 }

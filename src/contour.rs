@@ -46,7 +46,10 @@ pub fn contour(elements: &Elements, range: std::ops::Range<usize>) -> Vec<Loop> 
                 break;
             }
         }
-        let corners: Vec<_> = vertices.iter().map(|&v| elements.vertices[v as usize]).collect();
+        let corners: Vec<_> = vertices
+            .iter()
+            .map(|&v| elements.vertices[v as usize])
+            .collect();
         loops.push(straightened(&corners));
     }
     loops

@@ -41,9 +41,17 @@ impl Elements {
             high = high.max(*v);
         }
         let half = (0.5 * (high - low)).max_element();
-        let unit = if half > 0.0 { half.log2().ceil().exp2() } else { 1.0 };
+        let unit = if half > 0.0 {
+            half.log2().ceil().exp2()
+        } else {
+            1.0
+        };
         let origin = 0.5 * (low + high);
-        let vertices: Vec<_> = scene.vertices.iter().map(|v| (*v - origin) / unit).collect();
+        let vertices: Vec<_> = scene
+            .vertices
+            .iter()
+            .map(|v| (*v - origin) / unit)
+            .collect();
         let shapes: Vec<_> = scene
             .triangles
             .par_iter()

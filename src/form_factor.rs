@@ -44,7 +44,11 @@ mod tests {
 
     /// A polygon in the plane z = 1 or beside, wound so that the origin sees its front.
     fn seen(corners: &[[f64; 3]]) -> Vec<DVec3> {
-        corners.iter().rev().map(|c| DVec3::from_array(*c)).collect()
+        corners
+            .iter()
+            .rev()
+            .map(|c| DVec3::from_array(*c))
+            .collect()
     }
 
     #[test]
@@ -65,7 +69,14 @@ mod tests {
             0.21887541274623826
         ));
         // A wall that dips below the horizon gives what its upper half gives.
-        let wall = |low: f64| f(&[[1., -0.5, low], [1., -0.5, 1.], [1., 0.5, 1.], [1., 0.5, low]]);
+        let wall = |low: f64| {
+            f(&[
+                [1., -0.5, low],
+                [1., -0.5, 1.],
+                [1., 0.5, 1.],
+                [1., 0.5, low],
+            ])
+        };
         assert!(close(wall(0.0).abs(), 0.07109343904694551));
         assert!(close(wall(-1.0).abs(), 0.07109343904694551));
     }

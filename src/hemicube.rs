@@ -139,7 +139,10 @@ mod tests {
                 }
             }
             // Neumaier-free sums of 2·10⁵ terms in f64.
-            assert!((sums[0] - 1.0).abs() < 1e-11 && (sums[1] - 1.0).abs() < 1e-11, "{sums:?}");
+            assert!(
+                (sums[0] - 1.0).abs() < 1e-11 && (sums[1] - 1.0).abs() < 1e-11,
+                "{sums:?}"
+            );
         }
     }
 

@@ -1,5 +1,7 @@
 //! Mesolux.
 pub mod atomic_file;
+pub mod bake;
+pub mod bench;
 pub mod charts;
 pub mod constants;
 pub mod contour;
@@ -12,6 +14,7 @@ pub mod passes;
 pub mod reference;
 pub mod render;
 pub mod scene;
+pub mod solution;
 pub mod solver;
 pub mod sources;
 pub mod vk;

@@ -96,7 +96,10 @@ pub fn build(
     let mut order = Vec::with_capacity(elements.len());
     let mut groups = Vec::new();
     let mut chart_of = Vec::with_capacity(elements.len());
-    for (c, chart) in charts(elements, &connections, &morton_order(elements)).into_iter().enumerate() {
+    for (c, chart) in charts(elements, &connections, &morton_order(elements))
+        .into_iter()
+        .enumerate()
+    {
         let mut stack = vec![chart];
         while let Some(mut members) = stack.pop() {
             let area = members.iter().map(|&e| elements.area[e as usize]).sum();
@@ -181,7 +184,11 @@ const FLAT: f64 = 1e-6;
 fn group(elements: &Elements, connections: &Connections, range: std::ops::Range<usize>) -> Source {
     let area: f64 = range.clone().map(|e| elements.area[e]).sum();
     let weigh = |values: &[DVec3]| -> DVec3 {
-        range.clone().map(|e| values[e] * elements.area[e]).sum::<DVec3>() / area
+        range
+            .clone()
+            .map(|e| values[e] * elements.area[e])
+            .sum::<DVec3>()
+            / area
     };
     let centroid = weigh(&elements.centroid);
     let mean = weigh(&elements.normal).normalize_or(elements.normal[range.start]);
@@ -189,7 +196,10 @@ fn group(elements: &Elements, connections: &Connections, range: std::ops::Range<
     let extent = corners().map(|v| v.distance(centroid)).fold(0.0, f64::max);
     let flat = corners().all(|v| (v - centroid).dot(mean).abs() <= FLAT * extent)
         && range.clone().all(|e| elements.normal[e].dot(mean) > 0.5);
-    let inside = flat && range.clone().any(|e| holds(elements.triangle(e), centroid, mean));
+    let inside = flat
+        && range
+            .clone()
+            .any(|e| holds(elements.triangle(e), centroid, mean));
     let eye = if inside {
         centroid
     } else {
@@ -243,7 +253,10 @@ fn part(elements: &Elements, connections: &Connections, e: usize, triangle: [DVe
         tangent: DVec3::ZERO,
         bitangent: DVec3::ZERO,
         area: triangle_area(triangle),
-        radius: triangle.into_iter().map(|v| v.distance(eye)).fold(0.0, f64::max),
+        radius: triangle
+            .into_iter()
+            .map(|v| v.distance(eye))
+            .fold(0.0, f64::max),
         cone: 0.0,
         emitted: elements.emitted[e],
         first_element: e as u32,
@@ -264,7 +277,9 @@ fn point(light: &PointLight, elements: &Elements) -> [Source; 2] {
         radius: 0.0,
         // The shader gives the plane between the halves to the one whose cone is 0.
         cone,
-        emitted: (DVec3::from_array(light.intensity.map(f64::from)) / (elements.unit * elements.unit)).as_vec3(),
+        emitted: (DVec3::from_array(light.intensity.map(f64::from))
+            / (elements.unit * elements.unit))
+            .as_vec3(),
         first_element: 0,
         element_count: 0,
         contour: Vec::new(),

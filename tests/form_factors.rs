@@ -40,7 +40,11 @@ fn parallel_rectangles() {
     ] {
         let [receiver, pixel] = c11(x, y, cells);
         let error = receiver / exact - 1.0;
-        println!("C-11 X={x} Y={y}: receiver {:+.4} %, pixel {:+.2} %", 100.0 * error, 100.0 * (pixel / exact - 1.0));
+        println!(
+            "C-11 X={x} Y={y}: receiver {:+.4} %, pixel {:+.2} %",
+            100.0 * error,
+            100.0 * (pixel / exact - 1.0)
+        );
         assert!(error.abs() <= 2e-3, "C-11 {x} {y}: {receiver} for {exact}");
     }
 }
@@ -63,7 +67,11 @@ fn perpendicular_rectangles_that_touch() {
         let receiver = form_factor(&build, base.clone(), Estimator::Receiver);
         let pixel = form_factor(&build, base, Estimator::Pixel);
         let error = receiver / exact - 1.0;
-        println!("C-14 H={h} W={w}: receiver {:+.4} %, pixel {:+.2} %", 100.0 * error, 100.0 * (pixel / exact - 1.0));
+        println!(
+            "C-14 H={h} W={w}: receiver {:+.4} %, pixel {:+.2} %",
+            100.0 * error,
+            100.0 * (pixel / exact - 1.0)
+        );
         assert!(error.abs() <= 2e-3, "C-14 {h} {w}: {receiver} for {exact}");
     }
 }

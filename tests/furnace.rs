@@ -17,7 +17,9 @@ fn furnace() -> Elements {
     let mut elements = Elements::new(&build.scene);
     let mut state = 1u64;
     let mut random = || {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
         (state >> 40) as f32 / (1u64 << 24) as f32
     };
     for e in 0..elements.len() {
@@ -54,8 +56,16 @@ fn errors(estimator: Estimator) -> (f64, f64) {
 #[test]
 fn radiosity_is_one_everywhere() {
     let (rms, max) = errors(Estimator::Receiver);
-    println!("furnace, receiver: rms {:.3} %, max {:.2} %", 100.0 * rms, 100.0 * max);
+    println!(
+        "furnace, receiver: rms {:.3} %, max {:.2} %",
+        100.0 * rms,
+        100.0 * max
+    );
     let (pixel_rms, pixel_max) = errors(Estimator::Pixel);
-    println!("furnace, pixel:    rms {:.3} %, max {:.2} %", 100.0 * pixel_rms, 100.0 * pixel_max);
+    println!(
+        "furnace, pixel:    rms {:.3} %, max {:.2} %",
+        100.0 * pixel_rms,
+        100.0 * pixel_max
+    );
     assert!(rms <= 3e-3 && max <= 2e-2, "rms {rms}, max {max}");
 }

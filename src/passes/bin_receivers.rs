@@ -39,7 +39,12 @@ impl BinReceivers {
         })
     }
 
-    pub fn bind(&self, scene: &SceneBuffers, state: &State, batch: &Batch) -> Result<DescriptorSet> {
+    pub fn bind(
+        &self,
+        scene: &SceneBuffers,
+        state: &State,
+        batch: &Batch,
+    ) -> Result<DescriptorSet> {
         let mut binds: Vec<_> = [
             &batch.slots,
             &scene.sources,
@@ -66,6 +71,11 @@ impl BinReceivers {
             slot_count: batch.slot_count,
             face_size: batch.face_size,
         };
-        cmd.dispatch(&self.pipeline, set, &parameters, [groups(scene.element_count), 1, 1]);
+        cmd.dispatch(
+            &self.pipeline,
+            set,
+            &parameters,
+            [groups(scene.element_count), 1, 1],
+        );
     }
 }

@@ -49,7 +49,9 @@ impl SceneBuffers {
         let planes: Vec<[f32; 4]> = (0..elements.len())
             .map(|e| {
                 let n = elements.normal[e];
-                n.as_vec3().extend(n.dot(elements.centroid[e]) as f32).to_array()
+                n.as_vec3()
+                    .extend(n.dot(elements.centroid[e]) as f32)
+                    .to_array()
             })
             .collect();
         let balls: Vec<[f32; 4]> = (0..elements.len())
@@ -65,7 +67,11 @@ impl SceneBuffers {
         let mut gpu_sources = Vec::with_capacity(sources.list.len());
         for source in &sources.list {
             let corners = contour_corners(source);
-            gpu_sources.push(Source::new(source, contours.len() as u32, corners.len() as u32));
+            gpu_sources.push(Source::new(
+                source,
+                contours.len() as u32,
+                corners.len() as u32,
+            ));
             contours.extend(corners);
         }
         let meshlets: Vec<Meshlet> = meshlets::build(elements, connections, &sources.chart)
@@ -81,7 +87,12 @@ impl SceneBuffers {
             planes: upload(device, "planes", &planes, BufferUse::Storage)?,
             balls: upload(device, "balls", &balls, BufferUse::Storage)?,
             areas: upload(device, "areas", &areas, BufferUse::Storage)?,
-            reflectance: upload(device, "reflectance", &elements.reflectance, BufferUse::Storage)?,
+            reflectance: upload(
+                device,
+                "reflectance",
+                &elements.reflectance,
+                BufferUse::Storage,
+            )?,
             sources: upload(device, "sources", &gpu_sources, BufferUse::Storage)?,
             contours: upload(device, "contours", &contours, BufferUse::Storage)?,
             meshlets: upload(device, "meshlets", &meshlets, BufferUse::Storage)?,
@@ -179,11 +190,17 @@ const DRAWN_BYTES: u64 = 16;
 impl Batch {
     /// How many slots a batch may have: what fits the device's largest buffer, its widest image and an eighth of its
     /// memory, and no more than `wanted`.
-    pub fn fitting_slots(device: &Device, scene: &SceneBuffers, face_size: u32, wanted: u32) -> u32 {
+    pub fn fitting_slots(
+        device: &Device,
+        scene: &SceneBuffers,
+        face_size: u32,
+        wanted: u32,
+    ) -> u32 {
         let limits = device.limits();
         let region = u64::from(FACES) * u64::from(scene.element_count);
         let by_buffer = limits.max_storage_buffer_range / (12 * region).max(1);
-        let by_memory = limits.heap_bytes / 8 / (DRAWN_BYTES * region + 8 * pixel_count(face_size) as u64);
+        let by_memory =
+            limits.heap_bytes / 8 / (DRAWN_BYTES * region + 8 * pixel_count(face_size) as u64);
         let by_width = u64::from(limits.max_image_side / face_size);
         u64::from(wanted)
             .min(by_buffer)
@@ -203,8 +220,20 @@ impl Batch {
         let drawn = regions * u64::from(scene.element_count);
         let buffer = |name, bytes, usage| Buffer::new(device, name, bytes, usage);
         let size = (slot_count * face_size, 3 * face_size);
-        let items = Image::new(device, "item buffer", size, Format::R32_UINT, ImageUse::ColourTarget)?;
-        let depth = Image::new(device, "item depth", size, Format::D32_SFLOAT, ImageUse::DepthTarget)?;
+        let items = Image::new(
+            device,
+            "item buffer",
+            size,
+            Format::R32_UINT,
+            ImageUse::ColourTarget,
+        )?;
+        let depth = Image::new(
+            device,
+            "item depth",
+            size,
+            Format::D32_SFLOAT,
+            ImageUse::DepthTarget,
+        )?;
         let empty = vec![
             Slot {
                 emitted: Vec3::ZERO,
@@ -217,8 +246,16 @@ impl Batch {
             slot_count,
             face_size,
             slots: upload(device, "slots", &empty, BufferUse::Storage)?,
-            views: buffer("views", regions * size_of::<View>() as u64, BufferUse::Storage)?,
-            draws: buffer("draws", regions * size_of::<Draw>() as u64, BufferUse::Geometry)?,
+            views: buffer(
+                "views",
+                regions * size_of::<View>() as u64,
+                BufferUse::Storage,
+            )?,
+            draws: buffer(
+                "draws",
+                regions * size_of::<Draw>() as u64,
+                BufferUse::Geometry,
+            )?,
             counts: buffer("cull counts", regions * 8, BufferUse::Storage)?,
             drawn_corners: buffer("drawn corners", 12 * drawn, BufferUse::Geometry)?,
             drawn_items: buffer("drawn items", 4 * drawn, BufferUse::Storage)?,
@@ -255,7 +292,10 @@ pub fn download<T: Pod>(device: &Arc<Device>, buffer: &Buffer, count: usize) -> 
     let bytes = (count * size_of::<T>()) as u64;
     let readback = Buffer::new(device, "readback", bytes, BufferUse::Readback)?;
     Commands::run(device, "download", |cmd| {
-        cmd.barrier(&[Stage::Compute, Stage::Transfer, Stage::Attachment], &[Stage::Transfer]);
+        cmd.barrier(
+            &[Stage::Compute, Stage::Transfer, Stage::Attachment],
+            &[Stage::Transfer],
+        );
         cmd.copy(buffer, 0, &readback, 0, bytes);
         cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
         Ok(())

@@ -81,6 +81,11 @@ impl Cull {
             element_count: scene.element_count,
             face_size: batch.face_size,
         };
-        cmd.dispatch(&self.pipeline, set, &parameters, [FACES, batch.slot_count, 1]);
+        cmd.dispatch(
+            &self.pipeline,
+            set,
+            &parameters,
+            [FACES, batch.slot_count, 1],
+        );
     }
 }

@@ -43,6 +43,11 @@ impl Measure {
     }
 
     pub fn record(&self, cmd: &Commands, set: &DescriptorSet, source_count: u32) {
-        cmd.dispatch(&self.pipeline, set, &source_count, [groups(source_count), 1, 1]);
+        cmd.dispatch(
+            &self.pipeline,
+            set,
+            &source_count,
+            [groups(source_count), 1, 1],
+        );
     }
 }

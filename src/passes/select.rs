@@ -39,7 +39,12 @@ impl Select {
         })
     }
 
-    pub fn bind(&self, scene: &SceneBuffers, state: &State, batch: &Batch) -> Result<DescriptorSet> {
+    pub fn bind(
+        &self,
+        scene: &SceneBuffers,
+        state: &State,
+        batch: &Batch,
+    ) -> Result<DescriptorSet> {
         self.pipeline.bind(
             "select",
             &[

@@ -46,8 +46,16 @@ fn form_factor(elements: &Elements, source: &Source, p: DVec3, element: usize) -
     if source.kind == KIND_POINT {
         let d = source.eye - p;
         let side = d.dot(source.normal);
-        let mine = if source.cone == 0.0 { side <= 0.0 } else { side < 0.0 };
-        return if mine { d.dot(normal).max(0.0) / d.length().powi(3) } else { 0.0 };
+        let mine = if source.cone == 0.0 {
+            side <= 0.0
+        } else {
+            side < 0.0
+        };
+        return if mine {
+            d.dot(normal).max(0.0) / d.length().powi(3)
+        } else {
+            0.0
+        };
     }
     if source.cone == 0.0 {
         if (p - source.eye).dot(source.normal) <= HEIGHT_EPSILON * source.radius {
@@ -68,7 +76,14 @@ fn form_factor(elements: &Elements, source: &Source, p: DVec3, element: usize) -
         .sum()
 }
 
-fn visible(elements: &Elements, source: &Source, items: &[u32], n: u32, p: DVec3, element: usize) -> bool {
+fn visible(
+    elements: &Elements,
+    source: &Source,
+    items: &[u32],
+    n: u32,
+    p: DVec3,
+    element: usize,
+) -> bool {
     let d = p - source.eye;
     let local = DVec3::new(
         d.dot(source.tangent),

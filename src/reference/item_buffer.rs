@@ -75,20 +75,31 @@ const SNAP: f64 = 1.0 / 16.0;
 /// rasteriser's rounding of it and no farther off than that.
 pub fn agrees(elements: &Elements, source: &Source, n: u32, drawn: &[u32]) -> bool {
     let expected = item_buffer(elements, source, n);
-    expected.iter().zip(drawn).enumerate().all(|(i, (&want, &got))| {
-        want == got || {
-            let pixel = Pixel {
-                column: i as u32 % n,
-                row: i as u32 / n,
-            };
-            explained(elements, source, n, pixel, want, got)
-        }
-    })
+    expected
+        .iter()
+        .zip(drawn)
+        .enumerate()
+        .all(|(i, (&want, &got))| {
+            want == got || {
+                let pixel = Pixel {
+                    column: i as u32 % n,
+                    row: i as u32 / n,
+                };
+                explained(elements, source, n, pixel, want, got)
+            }
+        })
 }
 
 /// Whether rounding explains that a pixel shows `got` where its centre's ray meets `want`: some ray within [`SNAP`] of the
 /// centre meets `got` first.
-fn explained(elements: &Elements, source: &Source, n: u32, pixel: Pixel, want: u32, got: u32) -> bool {
+fn explained(
+    elements: &Elements,
+    source: &Source,
+    n: u32,
+    pixel: Pixel,
+    want: u32,
+    got: u32,
+) -> bool {
     let centre = direction_of(pixel, n);
     let step = 2.0 / f64::from(n) * SNAP;
     let first = |ray: DVec3| {
@@ -101,7 +112,11 @@ fn explained(elements: &Elements, source: &Source, n: u32, pixel: Pixel, want: u
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .map_or(NONE, |(_, e)| e as u32)
     };
-    debug_assert_eq!(pixel_of(centre, n), pixel, "a pixel's direction falls in it");
+    debug_assert_eq!(
+        pixel_of(centre, n),
+        pixel,
+        "a pixel's direction falls in it"
+    );
     let _ = want;
     (0..16).any(|i| {
         let angle = f64::from(i) * std::f64::consts::TAU / 16.0;

@@ -24,11 +24,16 @@ pub fn measure(
         .iter()
         .zip(shot)
         .map(|(source, shot)| {
-            let emitted = if shot.emission { 0.0 } else { source.emitted_power() };
+            let emitted = if shot.emission {
+                0.0
+            } else {
+                source.emitted_power()
+            };
             if source.kind == KIND_POINT {
                 return (DVec3::ZERO, emitted);
             }
-            let range = source.first_element as usize..(source.first_element + source.element_count) as usize;
+            let range = source.first_element as usize
+                ..(source.first_element + source.element_count) as usize;
             let area: f64 = range.clone().map(|e| elements.area[e]).sum();
             let reflected = range
                 .map(|e| (elements.reflectance[e] * irradiance[e]).as_dvec3() * elements.area[e])

@@ -5,14 +5,15 @@ use std::sync::Arc;
 use super::{Estimator, Settings};
 use crate::constants::FACES;
 use crate::error::Result;
+use crate::hemicube::pixel_count;
 use crate::passes::bin_pixels::{self, BinPixels};
 use crate::passes::bin_receivers::BinReceivers;
-use crate::passes::buffers::{Batch, SceneBuffers, State};
+use crate::passes::buffers::{Batch, SceneBuffers, State, download};
 use crate::passes::cull::Cull;
 use crate::passes::item_buffer::ItemBuffer;
 use crate::passes::measure::Measure;
 use crate::passes::select::{Parameters, Select};
-use crate::passes::types::{Draw, Progress};
+use crate::passes::types::{Draw, Progress, Slot};
 use crate::vk::{Buffer, BufferUse, Commands, DescriptorSet, Device, Stage, Timestamps};
 
 /// Seconds of each stage of a batch, by GPU timestamps.
@@ -56,6 +57,7 @@ struct Passes {
     bin: Bin,
 }
 
+#[allow(clippy::large_enum_variant)] // one of each lives as long as the solver
 enum Bin {
     Receivers(BinReceivers),
     Pixels(BinPixels),
@@ -69,6 +71,7 @@ struct Sets {
     bin: BinSets,
 }
 
+#[allow(clippy::large_enum_variant)] // as `Bin`
 enum BinSets {
     Receivers(DescriptorSet),
     Pixels(bin_pixels::Buffers),
@@ -123,9 +126,14 @@ impl BatchLoop {
             Commands::record(device, name, |cmd| {
                 let stamps = &timestamps[i];
                 cmd.reset_timestamps(stamps);
-                cmd.barrier(&[Stage::Compute, Stage::Draw, Stage::Transfer], &[Stage::Compute]);
+                cmd.barrier(
+                    &[Stage::Compute, Stage::Draw, Stage::Transfer],
+                    &[Stage::Compute],
+                );
                 cmd.timestamp(stamps, 0);
-                passes.measure.record(cmd, &sets.measure, scene.source_count);
+                passes
+                    .measure
+                    .record(cmd, &sets.measure, scene.source_count);
                 cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
                 passes.select.record(cmd, &sets.select, &select);
                 cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
@@ -133,7 +141,9 @@ impl BatchLoop {
                 passes.cull.record(cmd, &sets.cull, scene, &batch);
                 cmd.barrier(&[Stage::Compute], &[Stage::Draw]);
                 cmd.timestamp(stamps, 2);
-                passes.item_buffer.record(cmd, &sets.item_buffer, scene, &batch);
+                passes
+                    .item_buffer
+                    .record(cmd, &sets.item_buffer, scene, &batch);
                 cmd.timestamp(stamps, 3);
                 match (&passes.bin, &sets.bin) {
                     (Bin::Receivers(bin), BinSets::Receivers(set)) => {
@@ -152,7 +162,9 @@ impl BatchLoop {
         let commands = [record("batch a", 0)?, record("batch b", 1)?];
         let measure_only = Commands::record(device, "remeasure", |cmd| {
             cmd.barrier(&[Stage::Compute, Stage::Transfer], &[Stage::Compute]);
-            passes.measure.record(cmd, &sets.measure, scene.source_count);
+            passes
+                .measure
+                .record(cmd, &sets.measure, scene.source_count);
             cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
             let none = Parameters {
                 shot_limit: 0,
@@ -217,8 +229,24 @@ impl BatchLoop {
         Ok(self.readback[0].read::<Progress>(0, 1)[0])
     }
 
-    pub fn batch(&self) -> &Batch {
-        &self.batch
+    pub(super) fn item_buffers(&self, device: &Arc<Device>) -> Result<(Vec<u32>, Vec<u32>)> {
+        let texels = pixel_count(self.batch.face_size) * self.batch.slot_count as usize;
+        let readback = Buffer::new(
+            device,
+            "item readback",
+            4 * texels as u64,
+            BufferUse::Readback,
+        )?;
+        Commands::run(device, "item readback", |cmd| {
+            cmd.copy_shader_image_to_buffer(&self.batch.items, &readback);
+            cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
+            Ok(())
+        })?;
+        let slots: Vec<Slot> = download(device, &self.batch.slots, self.batch.slot_count as usize)?;
+        Ok((
+            readback.read(0, texels),
+            slots.iter().map(|s| s.source).collect(),
+        ))
     }
 }
 

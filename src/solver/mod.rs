@@ -75,8 +75,9 @@ impl Default for Settings {
 pub const HEMICUBE_RANGE: std::ops::RangeInclusive<u32> = 8..=2048;
 
 impl Settings {
-    fn check(&self) -> Result<()> {
-        if !HEMICUBE_RANGE.contains(&self.hemicube) || self.hemicube % 2 != 0 {
+    /// Refuses numbers that make no sense.
+    pub fn check(&self) -> Result<()> {
+        if !HEMICUBE_RANGE.contains(&self.hemicube) || !self.hemicube.is_multiple_of(2) {
             return Err(Error::Usage(format!(
                 "--hemicube {}: must be even and in {} to {}",
                 self.hemicube,
@@ -150,11 +151,23 @@ impl Solver {
         let wanted = settings.batch.clamp(1, scene.source_count.max(1));
         let slots = Batch::fitting_slots(device, &scene, settings.hemicube, wanted);
         let batch = Batch::new(device, &item_buffer.pass, &scene, settings.hemicube, slots)?;
-        let emitted_power: f64 = sources.list.iter().map(sources::Source::emitted_power).sum();
+        let emitted_power: f64 = sources
+            .list
+            .iter()
+            .map(sources::Source::emitted_power)
+            .sum();
         let bound_factor = bound_factor(&elements);
         // The bound is bound_factor · unshot / emitted; never stop on more unshot than the residual itself.
         let stop_power = settings.residual * emitted_power / bound_factor.unwrap_or(1e3).max(1.0);
-        let batches = BatchLoop::new(device, settings, item_buffer, batch, &scene, &state, stop_power)?;
+        let batches = BatchLoop::new(
+            device,
+            settings,
+            item_buffer,
+            batch,
+            &scene,
+            &state,
+            stop_power,
+        )?;
         let mut report = Report::new(device, settings, &elements, &sources, slots);
         report.set_meshlets(scene.meshlet_count);
         Ok(Self {
@@ -212,7 +225,10 @@ impl Solver {
                 unshot_share,
                 error_bound,
                 elapsed,
-                left: time_left(&history, self.settings.residual / factor.unwrap_or(1e3).max(1.0)),
+                left: time_left(
+                    &history,
+                    self.settings.residual / factor.unwrap_or(1e3).max(1.0),
+                ),
             };
             if !go_on(&update) {
                 stop = Some(StopReason::Interrupted);
@@ -224,7 +240,10 @@ impl Solver {
         // The last batches have shot since the last look: what is left now is what a measurement finds.
         let last = self.batches.remeasure()?;
         report.shots = last.shots;
-        report.unshot_share = ratio(f64::from(last.unshot_emitted + last.unshot_reflected), emitted);
+        report.unshot_share = ratio(
+            f64::from(last.unshot_emitted + last.unshot_reflected),
+            emitted,
+        );
         report.error_bound = factor.map(|f| report.unshot_share * f.max(1.0));
         report.stop = stop.unwrap_or(StopReason::Residual);
         report.seconds.setup = self.setup.as_secs_f64();
@@ -254,9 +273,19 @@ impl Solver {
         &self.report
     }
 
-    /// The scene and batch buffers, for tests and benchmarks of single passes.
-    pub fn batches(&mut self) -> (&mut BatchLoop, &SceneBuffers, &State) {
-        (&mut self.batches, &self.scene, &self.state)
+    /// Runs a number of batches, for benchmarks, and shows what each did.
+    pub fn run_batches(&mut self, count: usize, mut look: impl FnMut(&BatchResult)) -> Result<()> {
+        let mut left = count;
+        self.batches.run(|batch| {
+            look(batch);
+            left = left.saturating_sub(1);
+            left > 1
+        })
+    }
+
+    /// The item buffers of the last batch, `[row][slot][column]`, and the sources that they belong to.
+    pub fn item_buffers(&self) -> Result<(Vec<u32>, Vec<u32>)> {
+        self.batches.item_buffers(&self.device)
     }
 }
 
@@ -283,4 +312,3 @@ fn time_left(history: &[(f64, f64)], target: f64) -> Option<Duration> {
     let left = ((share / target).ln() / rate).max(0.0);
     (left.is_finite() && left < 1e6).then(|| Duration::from_secs_f64(left))
 }
-

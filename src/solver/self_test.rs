@@ -26,7 +26,9 @@ pub fn open_device(wanted: Option<&str>, validation: bool) -> Result<Arc<Device>
                 .and_then(|i| candidates.iter().find(|c| c.index == i));
             by_index.or_else(|| {
                 let lower = wanted.to_lowercase();
-                candidates.iter().find(|c| c.name.to_lowercase().contains(&lower))
+                candidates
+                    .iter()
+                    .find(|c| c.name.to_lowercase().contains(&lower))
             })
         }
     };
@@ -39,7 +41,9 @@ pub fn open_device(wanted: Option<&str>, validation: bool) -> Result<Arc<Device>
             Some(wanted) if !names.is_empty() => {
                 format!("no device \"{wanted}\"; there are {}", names.join(", "))
             }
-            _ => "no Vulkan device; on Debian install mesa-vulkan-drivers for a software one".into(),
+            _ => {
+                "no Vulkan device; on Debian install mesa-vulkan-drivers for a software one".into()
+            }
         }));
     };
     let device = Device::new(&instance, candidate)?;
@@ -101,7 +105,9 @@ pub fn ids_come_back_right(device: &Arc<Device>) -> Result<bool> {
         .iter()
         .find(|s| s.emitted.max_element() > 0.0)
         .expect("the test scene has a light");
-    Ok(crate::reference::item_buffer::agrees(&elements, emitter, SIZE, &drawn))
+    Ok(crate::reference::item_buffer::agrees(
+        &elements, emitter, SIZE, &drawn,
+    ))
 }
 
 /// Five walls of a box, an emitter in the floor, and a triangle afloat.

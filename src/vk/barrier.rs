@@ -26,7 +26,11 @@ impl Stage {
                 A::SHADER_STORAGE_READ | A::SHADER_STORAGE_WRITE | A::SHADER_SAMPLED_READ,
             ),
             Self::Draw => (
-                S::DRAW_INDIRECT | S::INDEX_INPUT | S::VERTEX_INPUT | S::VERTEX_SHADER | S::FRAGMENT_SHADER,
+                S::DRAW_INDIRECT
+                    | S::INDEX_INPUT
+                    | S::VERTEX_INPUT
+                    | S::VERTEX_SHADER
+                    | S::FRAGMENT_SHADER,
                 A::INDIRECT_COMMAND_READ
                     | A::INDEX_READ
                     | A::VERTEX_ATTRIBUTE_READ

@@ -49,9 +49,12 @@ impl Commands {
         commands.raw = unsafe { device.raw.allocate_command_buffers(&info) }
             .map_err(device.error("allocating a command buffer"))?[0];
         // SAFETY: a plain creation on a live device.
-        commands.fence =
-            unsafe { device.raw.create_fence(&vk::FenceCreateInfo::default(), None) }
-                .map_err(device.error("creating a fence"))?;
+        commands.fence = unsafe {
+            device
+                .raw
+                .create_fence(&vk::FenceCreateInfo::default(), None)
+        }
+        .map_err(device.error("creating a fence"))?;
         device.set_name(commands.raw, name);
         device.set_name(commands.fence, name);
         // SAFETY: the buffer is new; it is recorded here and nowhere else.
@@ -140,10 +143,7 @@ impl Commands {
     pub fn barrier(&self, before: &[Stage], after: &[Stage]) {
         let join = |stages: &[Stage]| {
             stages.iter().fold(
-                (
-                    vk::PipelineStageFlags2::empty(),
-                    vk::AccessFlags2::empty(),
-                ),
+                (vk::PipelineStageFlags2::empty(), vk::AccessFlags2::empty()),
                 |(s, a), stage| (s | stage.masks().0, a | stage.masks().1),
             )
         };
@@ -170,7 +170,11 @@ impl Commands {
             return;
         }
         let bytes = bytemuck::bytes_of(push);
-        assert_eq!(bytes.len(), pipeline.push_bytes as usize, "push constants of the pipeline's size");
+        assert_eq!(
+            bytes.len(),
+            pipeline.push_bytes as usize,
+            "push constants of the pipeline's size"
+        );
         let raw = &self.device.raw;
         // SAFETY: pipeline, set and constants fit one another by construction of the pass.
         unsafe {
@@ -233,7 +237,12 @@ impl Commands {
         unsafe { self.device.raw.cmd_end_render_pass(self.raw) };
     }
 
-    pub fn bind_graphics(&self, pipeline: &GraphicsPipeline, set: &DescriptorSet, vertices: &Buffer) {
+    pub fn bind_graphics(
+        &self,
+        pipeline: &GraphicsPipeline,
+        set: &DescriptorSet,
+        vertices: &Buffer,
+    ) {
         let raw = &self.device.raw;
         // SAFETY: pipeline, set and vertices fit one another by construction of the pass.
         unsafe {
@@ -284,12 +293,20 @@ impl Commands {
 
     pub fn push_graphics<T: Pod>(&self, pipeline: &GraphicsPipeline, push: &T) {
         let bytes = bytemuck::bytes_of(push);
-        assert_eq!(bytes.len(), pipeline.push_bytes as usize, "push constants of the pipeline's size");
+        assert_eq!(
+            bytes.len(),
+            pipeline.push_bytes as usize,
+            "push constants of the pipeline's size"
+        );
         // SAFETY: the constants fit the pipeline's range.
         unsafe {
-            self.device
-                .raw
-                .cmd_push_constants(self.raw, pipeline.layout, GRAPHICS_STAGES, 0, bytes);
+            self.device.raw.cmd_push_constants(
+                self.raw,
+                pipeline.layout,
+                GRAPHICS_STAGES,
+                0,
+                bytes,
+            );
         }
     }
 
@@ -347,7 +364,8 @@ impl Commands {
                 region.image_subresource.mip_level = level;
                 region.image_extent.width = (image.width >> level).max(1);
                 region.image_extent.height = (image.height >> level).max(1);
-                let texels = u64::from(region.image_extent.width) * u64::from(region.image_extent.height);
+                let texels =
+                    u64::from(region.image_extent.width) * u64::from(region.image_extent.height);
                 offset += texels * bytes_per_texel;
                 region
             })

@@ -29,7 +29,13 @@ impl ComputePipeline {
         subgroups: bool,
     ) -> Result<Self> {
         let descriptors = DescriptorLayout::new(device, name, bindings)?;
-        let layout = pipeline_layout(device, name, &descriptors, push_bytes, vk::ShaderStageFlags::COMPUTE)?;
+        let layout = pipeline_layout(
+            device,
+            name,
+            &descriptors,
+            push_bytes,
+            vk::ShaderStageFlags::COMPUTE,
+        )?;
         let mut pipeline = Self {
             raw: vk::Pipeline::null(),
             layout,

@@ -59,7 +59,11 @@ impl DescriptorLayout {
 
     /// A set of its own pool, with everything bound.
     pub fn bind(&self, name: &str, binds: &[Bind<'_>]) -> Result<DescriptorSet> {
-        assert_eq!(binds.len(), self.kinds.len(), "{name}: one bind for each binding");
+        assert_eq!(
+            binds.len(),
+            self.kinds.len(),
+            "{name}: one bind for each binding"
+        );
         let device = &self.device;
         let sizes: Vec<_> = [Binding::Storage, Binding::Sampled]
             .into_iter()

@@ -53,7 +53,10 @@ impl Device {
             )
         };
         let Some(family) = graphics_family(&queues) else {
-            return Err(Error::Device(format!("device {} has no graphics queue", candidate.name)));
+            return Err(Error::Device(format!(
+                "device {} has no graphics queue",
+                candidate.name
+            )));
         };
         let priorities = [1.0];
         let queue_infos = [vk::DeviceQueueCreateInfo::default()

@@ -48,7 +48,14 @@ impl Image {
         format: vk::Format,
     ) -> Result<Self> {
         let levels = width.max(height).ilog2() + 1;
-        Self::with_levels(device, name, (width, height), format, ImageUse::Texture, levels)
+        Self::with_levels(
+            device,
+            name,
+            (width, height),
+            format,
+            ImageUse::Texture,
+            levels,
+        )
     }
 
     fn with_levels(

@@ -99,7 +99,8 @@ impl Instance {
         let mut messenger_info = messenger_info();
         // The layer's own checks of this very call need the messenger in the chain; synchronisation is checked too.
         let checks = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
-        let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&checks);
+        let mut features =
+            vk::ValidationFeaturesEXT::default().enabled_validation_features(&checks);
         let mut info = vk::InstanceCreateInfo::default()
             .application_info(&application)
             .enabled_extension_names(&extension_names);
@@ -121,10 +122,9 @@ impl Instance {
         if validation {
             let loader = ext::debug_utils::Instance::new(&instance._entry, &instance.raw);
             // SAFETY: the extension is enabled, and the callback is a plain function.
-            let messenger = unsafe {
-                loader.create_debug_utils_messenger(&self::messenger_info(), None)
-            }
-            .map_err(|e| Error::Device(format!("Vulkan debug messenger: {e}")))?;
+            let messenger =
+                unsafe { loader.create_debug_utils_messenger(&self::messenger_info(), None) }
+                    .map_err(|e| Error::Device(format!("Vulkan debug messenger: {e}")))?;
             instance.messenger = Some((loader, messenger));
         }
         Ok(Arc::new(instance))
@@ -171,22 +171,41 @@ impl Instance {
                 .push_next(&mut f13);
             // SAFETY: the device is of Vulkan 1.3, so that every struct of the chains is known to it.
             unsafe {
-                self.raw.get_physical_device_properties2(raw, &mut properties);
+                self.raw
+                    .get_physical_device_properties2(raw, &mut properties);
                 self.raw.get_physical_device_features2(raw, &mut features);
             }
             let base_features = features.features;
-            let needed_operations = vk::SubgroupFeatureFlags::BASIC | vk::SubgroupFeatureFlags::BALLOT;
+            let needed_operations =
+                vk::SubgroupFeatureFlags::BASIC | vk::SubgroupFeatureFlags::BALLOT;
             for (has, name) in [
-                (base_features.geometry_shader != 0, "geometryShader (gl_PrimitiveID in fragment shaders)"),
-                (base_features.full_draw_index_uint32 != 0, "fullDrawIndexUint32"),
+                (
+                    base_features.geometry_shader != 0,
+                    "geometryShader (gl_PrimitiveID in fragment shaders)",
+                ),
+                (
+                    base_features.full_draw_index_uint32 != 0,
+                    "fullDrawIndexUint32",
+                ),
                 (f12.scalar_block_layout != 0, "scalarBlockLayout"),
                 (f13.synchronization2 != 0, "synchronization2"),
-                (f13.maintenance4 != 0, "maintenance4 (LocalSizeId in compute shaders)"),
+                (
+                    f13.maintenance4 != 0,
+                    "maintenance4 (LocalSizeId in compute shaders)",
+                ),
                 (f13.subgroup_size_control != 0, "subgroupSizeControl"),
                 (f13.compute_full_subgroups != 0, "computeFullSubgroups"),
-                (subgroup.supported_operations.contains(needed_operations)
-                    && subgroup.supported_stages.contains(vk::ShaderStageFlags::COMPUTE), "subgroup ballot in compute"),
-                (graphics_family(&queues).is_some(), "a queue with graphics and compute"),
+                (
+                    subgroup.supported_operations.contains(needed_operations)
+                        && subgroup
+                            .supported_stages
+                            .contains(vk::ShaderStageFlags::COMPUTE),
+                    "subgroup ballot in compute",
+                ),
+                (
+                    graphics_family(&queues).is_some(),
+                    "a queue with graphics and compute",
+                ),
             ] {
                 if !has {
                     missing.push(name);
@@ -202,7 +221,10 @@ impl Instance {
             _ => ("other", 3),
         };
         let text = |s: std::result::Result<&CStr, _>| {
-            s.map_or_else(|_| String::new(), |s: &CStr| s.to_string_lossy().into_owned())
+            s.map_or_else(
+                |_| String::new(),
+                |s: &CStr| s.to_string_lossy().into_owned(),
+            )
         };
         let v = base.api_version;
         Candidate {
@@ -215,10 +237,19 @@ impl Instance {
                 vk::api_version_minor(v),
                 vk::api_version_patch(v),
             ),
-            driver: format!("{} {}", text(driver.driver_name_as_c_str()), text(driver.driver_info_as_c_str())),
+            driver: format!(
+                "{} {}",
+                text(driver.driver_name_as_c_str()),
+                text(driver.driver_info_as_c_str())
+            ),
             missing,
             int64_atomics,
-            heap_bytes: memory.memory_heaps_as_slice().iter().map(|h| h.size).max().unwrap_or(0),
+            heap_bytes: memory
+                .memory_heaps_as_slice()
+                .iter()
+                .map(|h| h.size)
+                .max()
+                .unwrap_or(0),
             max_storage_buffer_range: u64::from(base.limits.max_storage_buffer_range),
             max_image_side: base.limits.max_image_dimension2_d,
             subgroup_size: subgroup.subgroup_size,

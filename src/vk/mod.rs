@@ -21,8 +21,8 @@ pub use compute::ComputePipeline;
 pub use descriptors::{Bind, Binding, DescriptorLayout, DescriptorSet};
 pub use device::{Device, Limits};
 pub use graphics::{
-    AfterPass,
-    Attachment, Framebuffer, GraphicsPipeline, GraphicsState, RenderPass, VertexAttribute,
+    AfterPass, Attachment, Framebuffer, GraphicsPipeline, GraphicsState, RenderPass,
+    VertexAttribute,
 };
 pub use image::{Image, ImageUse, Sampler};
 pub use instance::{Candidate, Instance, validation_log, validation_messages};

@@ -11,14 +11,18 @@ use mesolux::vk::{Device, validation_log};
 
 /// The device that the program itself would take, watched by the validation layer. No device is a failure.
 pub fn device() -> Arc<Device> {
-    open_device(std::env::var("MESOLUX_TEST_DEVICE").ok().as_deref(), true)
-        .expect("the tests need a Vulkan device (Debian: mesa-vulkan-drivers, vulkan-validationlayers)")
+    open_device(std::env::var("MESOLUX_TEST_DEVICE").ok().as_deref(), true).expect(
+        "the tests need a Vulkan device (Debian: mesa-vulkan-drivers, vulkan-validationlayers)",
+    )
 }
 
 /// Fails on any validation message so far.
 pub fn assert_silent() {
     let log = validation_log();
-    assert!(log.is_empty(), "validation layers must stay silent: {log:#?}");
+    assert!(
+        log.is_empty(),
+        "validation layers must stay silent: {log:#?}"
+    );
 }
 
 /// A scene made piece by piece. Material 0 reflects half and emits nothing.
@@ -63,12 +67,21 @@ impl Build {
     }
 
     /// A parallelogram of n × m cells, two triangles each, facing `u` × `v`. Returns its range of triangles.
-    pub fn quad(&mut self, origin: DVec3, u: DVec3, v: DVec3, (n, m): (u32, u32), material: u32) -> std::ops::Range<usize> {
+    pub fn quad(
+        &mut self,
+        origin: DVec3,
+        u: DVec3,
+        v: DVec3,
+        (n, m): (u32, u32),
+        material: u32,
+    ) -> std::ops::Range<usize> {
         let first = self.scene.triangles.len();
         let base = self.scene.vertices.len() as u32;
         for j in 0..=m {
             for i in 0..=n {
-                self.vertex(origin + u * (f64::from(i) / f64::from(n)) + v * (f64::from(j) / f64::from(m)));
+                self.vertex(
+                    origin + u * (f64::from(i) / f64::from(n)) + v * (f64::from(j) / f64::from(m)),
+                );
             }
         }
         for j in 0..m {
@@ -89,7 +102,13 @@ impl Build {
     }
 
     /// The six inner sides of a box; the ranges are floor (y low), ceiling, x low, x high, z low, z high.
-    pub fn room(&mut self, low: DVec3, size: DVec3, n: u32, material: u32) -> [std::ops::Range<usize>; 6] {
+    pub fn room(
+        &mut self,
+        low: DVec3,
+        size: DVec3,
+        n: u32,
+        material: u32,
+    ) -> [std::ops::Range<usize>; 6] {
         let (x, y, z) = (DVec3::X * size.x, DVec3::Y * size.y, DVec3::Z * size.z);
         let sides = [
             self.quad(low, z, x, (n, n), material),
@@ -104,20 +123,55 @@ impl Build {
     }
 
     /// A sphere of 20 · 4^levels triangles; `outward` or facing its centre.
-    pub fn sphere(&mut self, centre: DVec3, radius: f64, levels: u32, outward: bool, material: u32) -> std::ops::Range<usize> {
+    pub fn sphere(
+        &mut self,
+        centre: DVec3,
+        radius: f64,
+        levels: u32,
+        outward: bool,
+        material: u32,
+    ) -> std::ops::Range<usize> {
         let first = self.scene.triangles.len();
         let g = 0.5 * (1.0 + 5f64.sqrt());
         let ico = [
-            [-1., g, 0.], [1., g, 0.], [-1., -g, 0.], [1., -g, 0.], [0., -1., g], [0., 1., g],
-            [0., -1., -g], [0., 1., -g], [g, 0., -1.], [g, 0., 1.], [-g, 0., -1.], [-g, 0., 1.],
+            [-1., g, 0.],
+            [1., g, 0.],
+            [-1., -g, 0.],
+            [1., -g, 0.],
+            [0., -1., g],
+            [0., 1., g],
+            [0., -1., -g],
+            [0., 1., -g],
+            [g, 0., -1.],
+            [g, 0., 1.],
+            [-g, 0., -1.],
+            [-g, 0., 1.],
         ]
         .map(|v| DVec3::from_array(v).normalize());
         let faces = [
-            [0, 11, 5], [0, 5, 1], [0, 1, 7], [0, 7, 10], [0, 10, 11], [1, 5, 9], [5, 11, 4],
-            [11, 10, 2], [10, 7, 6], [7, 1, 8], [3, 9, 4], [3, 4, 2], [3, 2, 6], [3, 6, 8],
-            [3, 8, 9], [4, 9, 5], [2, 4, 11], [6, 2, 10], [8, 6, 7], [9, 8, 1],
+            [0, 11, 5],
+            [0, 5, 1],
+            [0, 1, 7],
+            [0, 7, 10],
+            [0, 10, 11],
+            [1, 5, 9],
+            [5, 11, 4],
+            [11, 10, 2],
+            [10, 7, 6],
+            [7, 1, 8],
+            [3, 9, 4],
+            [3, 4, 2],
+            [3, 2, 6],
+            [3, 6, 8],
+            [3, 8, 9],
+            [4, 9, 5],
+            [2, 4, 11],
+            [6, 2, 10],
+            [8, 6, 7],
+            [9, 8, 1],
         ];
-        let mut triangles: Vec<[DVec3; 3]> = faces.iter().map(|f| f.map(|i: usize| ico[i])).collect();
+        let mut triangles: Vec<[DVec3; 3]> =
+            faces.iter().map(|f| f.map(|i: usize| ico[i])).collect();
         for _ in 0..levels {
             triangles = triangles
                 .iter()
@@ -144,10 +198,12 @@ impl Build {
         for t in &mut self.scene.triangles {
             for v in &mut t.vertices {
                 let p = self.scene.vertices[*v as usize];
-                *v = *places.entry(p.to_array().map(f64::to_bits)).or_insert_with(|| {
-                    vertices.push(p);
-                    vertices.len() as u32 - 1
-                });
+                *v = *places
+                    .entry(p.to_array().map(f64::to_bits))
+                    .or_insert_with(|| {
+                        vertices.push(p);
+                        vertices.len() as u32 - 1
+                    });
             }
         }
         self.scene.vertices = vertices;
@@ -162,7 +218,11 @@ impl Build {
     }
 
     pub fn solve(&self, settings: &Settings) -> Solved {
-        solve(Elements::new(&self.scene), &self.scene.point_lights, settings)
+        solve(
+            Elements::new(&self.scene),
+            &self.scene.point_lights,
+            settings,
+        )
     }
 }
 
@@ -179,12 +239,16 @@ impl Solved {
     /// Area-weighted mean of a value over a range of triangles.
     pub fn mean(&self, values: &[Vec3], range: std::ops::Range<usize>) -> f64 {
         let area: f64 = range.clone().map(|e| self.area[e]).sum();
-        range.map(|e| self.area[e] * f64::from(values[e].x)).sum::<f64>() / area
+        range
+            .map(|e| self.area[e] * f64::from(values[e].x))
+            .sum::<f64>()
+            / area
     }
 }
 
 pub fn solve(elements: Elements, lights: &[PointLight], settings: &Settings) -> Solved {
-    let mut solver = Solver::new(&device(), elements, lights, settings).expect("the scene fits the device");
+    let mut solver =
+        Solver::new(&device(), elements, lights, settings).expect("the scene fits the device");
     solver.run(|_| true).expect("the device solves the scene");
     let Light {
         irradiance_direct,

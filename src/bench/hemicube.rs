@@ -1,0 +1,70 @@
+//! `mesolux bench hemicube`: how fast item buffers are drawn, culled and not.
+
+use std::sync::Arc;
+
+use super::spread;
+use crate::elements::Elements;
+use crate::error::Result;
+use crate::passes::cull::Culling;
+use crate::scene::Scene;
+use crate::solver::{Settings, Solver};
+use crate::vk::Device;
+
+/// Batches of each kind in a round.
+const BATCHES: [(Culling, usize); 3] = [
+    (Culling::Triangles, 4),
+    (Culling::Meshlets, 2),
+    (Culling::Off, 1),
+];
+
+/// Prints hemicubes a second, drawing alone (culling and item buffer) and with everything (choosing and binning too).
+pub fn run(device: &Arc<Device>, scene: &Scene, hemicube: u32, rounds: usize) -> Result<()> {
+    let mut solvers = Vec::new();
+    for (culling, _) in BATCHES {
+        let settings = Settings {
+            culling,
+            hemicube,
+            // Never reached: the benchmark stops by itself.
+            residual: 1e-12,
+            ..Settings::default()
+        };
+        solvers.push(Solver::new(
+            device,
+            Elements::new(scene),
+            &scene.point_lights,
+            &settings,
+        )?);
+    }
+    let mut draw = [const { Vec::new() }; 3];
+    let mut whole = [const { Vec::new() }; 3];
+    for _ in 0..rounds.max(1) {
+        for (i, (_, batches)) in BATCHES.iter().enumerate() {
+            solvers[i].run_batches(*batches, |batch| {
+                let stages = batch.stages;
+                let count = f64::from(batch.progress.selected);
+                let drawing = stages.cull + stages.item_buffer;
+                draw[i].push(count / drawing);
+                whole[i].push(count / (drawing + stages.select + stages.bin));
+            })?;
+        }
+    }
+    println!(
+        "{}: {} elements, {} sources, hemicube {hemicube}, {}",
+        scene.name,
+        scene.triangles.len(),
+        solvers[0].sources.list.len(),
+        device.name()
+    );
+    println!("hemicubes a second      drawn (10 % to 90 %)         with choosing and binning");
+    for (i, (culling, _)) in BATCHES.iter().enumerate() {
+        let (d, d10, d90) = spread(&mut draw[i]);
+        let (w, w10, w90) = spread(&mut whole[i]);
+        let name = match culling {
+            Culling::Off => "no culling",
+            Culling::Meshlets => "meshlets culled",
+            Culling::Triangles => "triangles culled too",
+        };
+        println!("{name:<22}{d:>8.1} ({d10:.1} to {d90:.1}){w:>18.1} ({w10:.1} to {w90:.1})");
+    }
+    Ok(())
+}

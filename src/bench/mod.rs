@@ -1,0 +1,10 @@
+//! Benchmarks: release builds, median and spread, alternatives side by side.
+
+pub mod hemicube;
+
+/// Median, and the 10 % and 90 % points.
+pub fn spread(values: &mut [f64]) -> (f64, f64, f64) {
+    values.sort_by(f64::total_cmp);
+    let at = |share: f64| values[((values.len() - 1) as f64 * share).round() as usize];
+    (at(0.5), at(0.1), at(0.9))
+}

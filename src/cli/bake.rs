@@ -1,0 +1,285 @@
+//! `mesolux bake`.
+
+use std::io::IsTerminal;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use clap::{Args, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+
+use super::{Builtin, DeviceOptions};
+use mesolux::error::{Error, Result};
+use mesolux::solution::Origin;
+use mesolux::solver::{Estimator, Report, Settings, Update};
+
+/// Solve a scene and write the light on every element
+///
+/// The result is a safetensors file: vertices [E,3,3], area [E], normal [E,3], material [E], irradiance [E,3],
+/// irradiance_direct [E,3], radiosity [E,3], in scene units and in the order of the input. Ctrl-C stops the solver and
+/// keeps what it has.
+#[derive(Args)]
+pub struct Options {
+    /// A built-in name (cornell), an .obj file, or a scene.toml
+    scene: String,
+    /// The file to write
+    #[arg(short, long, value_name = "OUT.safetensors")]
+    output: PathBuf,
+    #[command(flatten)]
+    solve: SolveOptions,
+    #[command(flatten)]
+    builtin: Builtin,
+    #[command(flatten)]
+    device: DeviceOptions,
+    /// Threads of the CPU's own work; the result does not depend on it
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    /// Print one JSON object on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+/// How the scene is solved.
+#[derive(Args, Clone, Serialize)]
+pub struct SolveOptions {
+    /// Form factors by Lambert's formula for each receiver, or by the pixels' sums as in the paper
+    #[arg(long, value_enum, default_value = "receiver")]
+    estimator: EstimatorName,
+    /// Pixels a side of a hemicube face
+    #[arg(long, value_name = "N", default_value_t = 128)]
+    hemicube: u32,
+    /// Stop when the error bound, as a share of the emitted power, is no more than this
+    #[arg(long, value_name = "X", default_value_t = 1e-3)]
+    residual: f64,
+    /// Stop after this many seconds
+    #[arg(long, value_name = "SECONDS")]
+    budget: Option<f64>,
+    /// Stop after this many shots
+    #[arg(long, value_name = "N")]
+    shots: Option<u32>,
+    /// Turns the hemicubes about their axes: another seed, other aliasing
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+}
+
+#[derive(Clone, Copy, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+enum EstimatorName {
+    Receiver,
+    Pixel,
+}
+
+impl SolveOptions {
+    pub fn settings(&self) -> Result<Settings> {
+        let budget = match self.budget {
+            None => None,
+            Some(seconds) if (0.0..=1e9).contains(&seconds) => {
+                Some(Duration::from_secs_f64(seconds))
+            }
+            Some(seconds) => {
+                return Err(Error::Usage(format!(
+                    "--budget {seconds}: must be seconds, 0 or more"
+                )));
+            }
+        };
+        Ok(Settings {
+            estimator: match self.estimator {
+                EstimatorName::Receiver => Estimator::Receiver,
+                EstimatorName::Pixel => Estimator::Pixel,
+            },
+            hemicube: self.hemicube,
+            residual: self.residual,
+            budget,
+            shots: self.shots,
+            seed: self.seed,
+            ..Settings::default()
+        })
+    }
+}
+
+/// What `--json` prints beside the solver's report.
+#[derive(Serialize)]
+struct Printed<'a> {
+    scene: &'a str,
+    scene_hash: &'a str,
+    output: &'a std::path::Path,
+    read_seconds: f64,
+    wall_seconds: f64,
+    peak_resident_bytes: Option<u64>,
+    #[serde(flatten)]
+    report: &'a Report,
+}
+
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+pub fn run(options: &Options) -> Result<()> {
+    let start = Instant::now();
+    set_threads(options.threads)?;
+    let settings = options.solve.settings()?;
+    settings.check()?;
+    writable(&options.output)?;
+    let scene = options.builtin.load(&options.scene)?;
+    let read_seconds = start.elapsed().as_secs_f64();
+    let device = options.device.open()?;
+    catch_interrupts();
+    let bar = Bar::new();
+    let solution = mesolux::bake::bake(&device, &scene, &settings, |update| {
+        bar.show(update);
+        !INTERRUPTED.load(Ordering::SeqCst)
+    });
+    bar.finish();
+    let solution = solution?;
+    options.device.check()?;
+    let origin = origin(&options.scene, &options.builtin, scene.hash());
+    solution.save(&options.output, &origin, &options.solve)?;
+    let report = &solution.report;
+    tracing::info!(
+        "{}: {} elements, {} sources, {} hemicubes in {:.1} s; unshot {:.3} %, stopped by {:?}",
+        options.output.display(),
+        report.elements,
+        report.sources,
+        report.hemicubes,
+        report.seconds.solve_wall,
+        100.0 * report.unshot_share,
+        report.stop
+    );
+    if options.json {
+        let printed = Printed {
+            scene: &options.scene,
+            scene_hash: &origin.hash,
+            output: &options.output,
+            read_seconds,
+            wall_seconds: start.elapsed().as_secs_f64(),
+            peak_resident_bytes: peak_resident_bytes(),
+            report,
+        };
+        let text = serde_json::to_string(&printed).map_err(|e| Error::Usage(e.to_string()))?;
+        println!("{text}");
+    }
+    Ok(())
+}
+
+/// Where the scene came from, for the bake's metadata; paths are made absolute.
+fn origin(scene: &str, builtin: &Builtin, hash: String) -> Origin {
+    let absolute =
+        |path: &std::path::Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let named = mesolux::scene::builtin::NAMES.contains(&scene);
+    Origin {
+        scene: if named {
+            scene.to_owned()
+        } else {
+            absolute(scene.as_ref()).to_string_lossy().into_owned()
+        },
+        patches: builtin.patches,
+        statue: builtin.statue.as_deref().map(absolute),
+        hash,
+    }
+}
+
+fn set_threads(threads: Option<usize>) -> Result<()> {
+    let Some(threads) = threads else {
+        return Ok(());
+    };
+    if threads == 0 {
+        return Err(Error::Usage("--threads 0: must be at least 1".into()));
+    }
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build_global()
+        .map_err(|e| Error::Usage(format!("--threads {threads}: {e}")))
+}
+
+/// Refuses an output that cannot be written before the work, not after it.
+pub fn writable(path: &std::path::Path) -> Result<()> {
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => std::path::Path::new("."),
+    };
+    if path.is_dir() {
+        return Err(Error::write(path, std::io::ErrorKind::IsADirectory.into()));
+    }
+    tempfile::Builder::new()
+        .prefix(".mesolux")
+        .tempfile_in(folder)
+        .map(|_| ())
+        .map_err(|e| Error::write(path, e))
+}
+
+/// The first Ctrl-C asks the solver to stop and keep its result, the second ends the program.
+fn catch_interrupts() {
+    let caught = ctrlc::set_handler(|| {
+        if INTERRUPTED.swap(true, Ordering::SeqCst) {
+            std::process::exit(130);
+        }
+        eprintln!("stopping after this batch; the result so far is kept (again: stop at once)");
+    });
+    if let Err(error) = caught {
+        tracing::warn!("Ctrl-C will not keep the result: {error}");
+    }
+}
+
+fn peak_resident_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
+    let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kib * 1024)
+}
+
+/// Progress on stderr: a live line on a terminal, a line now and then elsewhere.
+struct Bar {
+    bar: Option<ProgressBar>,
+    last: std::cell::Cell<Option<Instant>>,
+}
+
+/// Between two lines of progress where there is no terminal.
+const QUIET: Duration = Duration::from_secs(10);
+
+impl Bar {
+    fn new() -> Self {
+        let bar = std::io::stderr().is_terminal().then(|| {
+            let bar = ProgressBar::new_spinner();
+            if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}") {
+                bar.set_style(style);
+            }
+            bar
+        });
+        Self {
+            bar,
+            last: std::cell::Cell::new(Some(Instant::now())),
+        }
+    }
+
+    fn show(&self, update: &Update) {
+        let bound = update
+            .error_bound
+            .map_or("none".to_owned(), |b| format!("{:.2} %", 100.0 * b));
+        let left = update.left.map_or(String::new(), |left| {
+            format!(", about {:.0} s left", left.as_secs_f64())
+        });
+        let text = format!(
+            "{} shots from {} sources in {:.0} s, unshot {:.3} %, error bound {bound}{left}",
+            update.shots,
+            update.sources,
+            update.elapsed.as_secs_f64(),
+            100.0 * update.unshot_share
+        );
+        match &self.bar {
+            Some(bar) => {
+                bar.set_message(text);
+                bar.tick();
+            }
+            None if self.last.get().is_none_or(|last| last.elapsed() >= QUIET) => {
+                self.last.set(Some(Instant::now()));
+                tracing::info!("{text}");
+            }
+            None => {}
+        }
+    }
+
+    fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}

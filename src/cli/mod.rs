@@ -1,0 +1,122 @@
+//! Commands and what they share.
+
+mod bake;
+mod bench;
+mod info;
+mod render;
+mod scene;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+use mesolux::error::{Error, Result};
+use mesolux::scene::{BuiltinOptions, Scene};
+
+/// Bake and draw global illumination with Vulkan: progressive radiosity through hemicube item buffers.
+///
+/// SCENE is a built-in name (cornell), an .obj file, or a scene.toml. Results go to files and stdout, everything else to
+/// stderr. Exit code 2 says that something given was wrong; nothing is written then.
+#[derive(Parser)]
+#[command(version, about)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Bake(bake::Options),
+    Render(render::Options),
+    Scene(scene::Options),
+    Info(info::Options),
+    Bench(bench::Options),
+}
+
+/// Options of the built-in scenes.
+#[derive(Args, Clone)]
+struct Builtin {
+    /// Built-in scenes: exactly this many elements
+    #[arg(long, value_name = "N")]
+    patches: Option<usize>,
+    /// Built-in scenes: this mesh as the statue
+    #[arg(long, value_name = "MESH.obj")]
+    statue: Option<PathBuf>,
+}
+
+impl Builtin {
+    fn load(&self, scene: &str) -> Result<Scene> {
+        let scene = mesolux::scene::load(
+            scene,
+            &BuiltinOptions {
+                patches: self.patches,
+                statue: self.statue.clone(),
+            },
+        )?;
+        for note in &scene.notes {
+            tracing::info!("{note}");
+        }
+        if scene.dropped_degenerate > 0 {
+            tracing::warn!(
+                "{} triangles without area were left out",
+                scene.dropped_degenerate
+            );
+        }
+        Ok(scene)
+    }
+}
+
+/// Which device, and whether it is watched.
+#[derive(Args, Clone)]
+struct DeviceOptions {
+    /// Vulkan device by its index or a part of its name (see `mesolux info`); the best one if not given
+    #[arg(long, value_name = "INDEX|NAME")]
+    device: Option<String>,
+    /// Watch every Vulkan call with the validation layer
+    #[arg(long)]
+    validate: bool,
+}
+
+impl DeviceOptions {
+    fn open(&self) -> Result<std::sync::Arc<mesolux::vk::Device>> {
+        let device = mesolux::solver::open_device(self.device.as_deref(), self.validate)?;
+        tracing::info!("device: {}", device.name());
+        Ok(device)
+    }
+
+    /// Fails when the validation layer had something to say.
+    fn check(&self) -> Result<()> {
+        match mesolux::vk::validation_messages() {
+            0 => Ok(()),
+            n => Err(Error::Device(format!(
+                "the validation layer sent {n} messages"
+            ))),
+        }
+    }
+}
+
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let filter = tracing_subscriber::EnvFilter::try_from_env("MESOLUX_LOG")
+        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("info"));
+    tracing_subscriber::fmt()
+        .with_writer(std::io::stderr)
+        .with_env_filter(filter)
+        .without_time()
+        .with_target(false)
+        .init();
+    let done = match &cli.command {
+        Command::Bake(options) => bake::run(options),
+        Command::Render(options) => render::run(options),
+        Command::Scene(options) => scene::run(options),
+        Command::Info(options) => info::run(options),
+        Command::Bench(options) => bench::run(options),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("mesolux: {error}");
+            ExitCode::from(2)
+        }
+    }
+}

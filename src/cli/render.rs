@@ -1,0 +1,124 @@
+//! `mesolux render`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::bake::{SolveOptions, writable};
+use super::{Builtin, DeviceOptions};
+use mesolux::error::{Error, Result};
+use mesolux::render::{FileKind, View, render};
+use mesolux::scene::{Camera, Scene};
+use mesolux::solution::Bake;
+
+/// Draw a scene or a bake to a picture
+///
+/// A PNG is exposed and tone-mapped; an EXR holds linear radiance. A SCENE is baked first, with the options of `bake`.
+#[derive(Args)]
+pub struct Options {
+    /// A scene (see `bake`) or a bake (.safetensors)
+    #[arg(value_name = "SCENE|BAKE")]
+    input: String,
+    /// The picture to write: .png or .exr
+    #[arg(short, long, value_name = "IMAGE.png|.exr")]
+    output: PathBuf,
+    /// Pixels across and down
+    #[arg(long, value_name = "WxH", default_value = "800x800", value_parser = size)]
+    size: (u32, u32),
+    /// A camera of the scene, by name; the first one if not given
+    #[arg(long, value_name = "NAME")]
+    camera: Option<String>,
+    /// Multiplies the light by 2^EV; found from the picture if not given
+    #[arg(long, value_name = "EV", allow_hyphen_values = true)]
+    exposure: Option<f32>,
+    #[command(flatten)]
+    solve: SolveOptions,
+    #[command(flatten)]
+    builtin: Builtin,
+    #[command(flatten)]
+    device: DeviceOptions,
+}
+
+fn size(text: &str) -> std::result::Result<(u32, u32), String> {
+    let wrong = || "must be like 1280x720".to_owned();
+    let (w, h) = text.split_once(['x', 'X', '×']).ok_or_else(wrong)?;
+    Ok((
+        w.parse().map_err(|_| wrong())?,
+        h.parse().map_err(|_| wrong())?,
+    ))
+}
+
+pub fn run(options: &Options) -> Result<()> {
+    FileKind::of(&options.output)?;
+    if let Some(ev) = options.exposure
+        && !(-64.0..=64.0).contains(&ev)
+    {
+        return Err(Error::Usage(format!(
+            "--exposure {ev}: must be in -64 to 64"
+        )));
+    }
+    writable(&options.output)?;
+    let path = Path::new(&options.input);
+    let is_bake = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("safetensors"));
+    let (scene, irradiance, device) = if is_bake {
+        let bake = Bake::load(path)?;
+        let builtin = Builtin {
+            patches: bake.origin.patches,
+            statue: bake.origin.statue.clone(),
+        };
+        let scene = builtin.load(&bake.origin.scene)?;
+        if scene.hash() != bake.origin.hash || scene.triangles.len() != bake.irradiance.len() {
+            return Err(Error::file(
+                path,
+                format!(
+                    "its scene {} has changed since; bake it again",
+                    bake.origin.scene
+                ),
+            ));
+        }
+        camera(&scene, options.camera.as_deref())?;
+        let device = options.device.open()?;
+        (scene, bake.irradiance, device)
+    } else {
+        let settings = options.solve.settings()?;
+        let scene = options.builtin.load(&options.input)?;
+        camera(&scene, options.camera.as_deref())?;
+        let device = options.device.open()?;
+        let solution = mesolux::bake::bake(&device, &scene, &settings, |_| true)?;
+        (scene, solution.irradiance, device)
+    };
+    let view = View {
+        camera: camera(&scene, options.camera.as_deref())?,
+        width: options.size.0,
+        height: options.size.1,
+    };
+    let picture = render(&device, &scene, &irradiance, &view)?;
+    options.device.check()?;
+    picture.write(&options.output, options.exposure)?;
+    tracing::info!(
+        "{}: {}x{}, camera {}",
+        options.output.display(),
+        view.width,
+        view.height,
+        view.camera.name
+    );
+    Ok(())
+}
+
+fn camera<'a>(scene: &'a Scene, name: Option<&str>) -> Result<&'a Camera> {
+    let found = match name {
+        None => scene.cameras.first(),
+        Some(name) => scene.cameras.iter().find(|c| c.name == name),
+    };
+    found.ok_or_else(|| {
+        let names: Vec<_> = scene.cameras.iter().map(|c| c.name.as_str()).collect();
+        Error::Usage(format!(
+            "scene {} has no camera \"{}\"; it has {}",
+            scene.name,
+            name.unwrap_or("default"),
+            names.join(", ")
+        ))
+    })
+}

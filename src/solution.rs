@@ -1,0 +1,198 @@
+//! What a bake holds, and its file: safetensors with every tensor in scene units and in the order of the input.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use glam::{DVec3, Vec3};
+use safetensors::{Dtype, SafeTensors, tensor::TensorView};
+use serde::{Deserialize, Serialize};
+
+use crate::atomic_file::write_atomically;
+use crate::elements::Elements;
+use crate::error::{Error, Result};
+use crate::scene::Scene;
+use crate::solver::{Light, Report};
+
+/// Version of the file's layout.
+pub const VERSION: &str = "1";
+
+/// A solution, `[triangle]` in the order of the input.
+pub struct Solution {
+    /// Corners, scene units.
+    pub vertices: Vec<[DVec3; 3]>,
+    /// Scene units squared.
+    pub area: Vec<f64>,
+    pub normal: Vec<DVec3>,
+    /// Index into the scene's materials.
+    pub material: Vec<u32>,
+    /// W·m⁻², RGB, direct and indirect.
+    pub irradiance: Vec<Vec3>,
+    /// W·m⁻², RGB, straight from emitters and point lights.
+    pub irradiance_direct: Vec<Vec3>,
+    /// W·m⁻², RGB: πLe + ρE.
+    pub radiosity: Vec<Vec3>,
+    pub report: Report,
+}
+
+/// Where a bake's scene came from: enough to read it again.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Origin {
+    /// As on the command line: a built-in name, or a path made absolute.
+    pub scene: String,
+    pub patches: Option<usize>,
+    pub statue: Option<std::path::PathBuf>,
+    /// [`Scene::hash`].
+    pub hash: String,
+}
+
+impl Solution {
+    pub fn new(scene: &Scene, elements: &Elements, light: &Light, report: Report) -> Self {
+        let unit = elements.unit;
+        let area: Vec<f64> = elements.area.iter().map(|a| a * unit * unit).collect();
+        Self {
+            vertices: scene.triangles.iter().map(|t| scene.corners(t)).collect(),
+            area: elements.to_input_order(&area),
+            normal: elements.to_input_order(&elements.normal),
+            material: elements.to_input_order(&elements.material),
+            irradiance: elements.to_input_order(&light.irradiance),
+            irradiance_direct: elements.to_input_order(&light.irradiance_direct),
+            radiosity: elements.to_input_order(&light.radiosity),
+            report,
+        }
+    }
+
+    /// Writes the solution beside `path`, syncs it, and renames it there.
+    pub fn save(&self, path: &Path, origin: &Origin, settings: &impl Serialize) -> Result<()> {
+        let json = |value: serde_json::Result<String>| {
+            value.map_err(|e| Error::file(path, format!("metadata: {e}")))
+        };
+        let metadata = HashMap::from([
+            ("version".to_owned(), VERSION.to_owned()),
+            (
+                "program".to_owned(),
+                format!("mesolux {}", env!("CARGO_PKG_VERSION")),
+            ),
+            ("scene_hash".to_owned(), origin.hash.clone()),
+            ("scene".to_owned(), json(serde_json::to_string(origin))?),
+            (
+                "settings".to_owned(),
+                json(serde_json::to_string(settings))?,
+            ),
+            (
+                "report".to_owned(),
+                json(serde_json::to_string(&self.report))?,
+            ),
+        ]);
+        let count = self.area.len();
+        let floats = |values: &mut dyn Iterator<Item = f32>| -> Vec<u8> {
+            values.flat_map(f32::to_le_bytes).collect()
+        };
+        let rgb = |values: &[Vec3]| floats(&mut values.iter().flat_map(Vec3::to_array));
+        let material: Vec<u8> = self.material.iter().flat_map(|m| m.to_le_bytes()).collect();
+        let parts: [(&str, Dtype, Vec<usize>, Vec<u8>); 7] = [
+            (
+                "vertices",
+                Dtype::F32,
+                vec![count, 3, 3],
+                floats(
+                    &mut self
+                        .vertices
+                        .iter()
+                        .flatten()
+                        .flat_map(|v| v.as_vec3().to_array()),
+                ),
+            ),
+            (
+                "area",
+                Dtype::F32,
+                vec![count],
+                floats(&mut self.area.iter().map(|&a| a as f32)),
+            ),
+            (
+                "normal",
+                Dtype::F32,
+                vec![count, 3],
+                floats(&mut self.normal.iter().flat_map(|n| n.as_vec3().to_array())),
+            ),
+            ("material", Dtype::U32, vec![count], material),
+            (
+                "irradiance",
+                Dtype::F32,
+                vec![count, 3],
+                rgb(&self.irradiance),
+            ),
+            (
+                "irradiance_direct",
+                Dtype::F32,
+                vec![count, 3],
+                rgb(&self.irradiance_direct),
+            ),
+            (
+                "radiosity",
+                Dtype::F32,
+                vec![count, 3],
+                rgb(&self.radiosity),
+            ),
+        ];
+        let tensors = parts
+            .iter()
+            .map(|(name, dtype, shape, bytes)| {
+                TensorView::new(*dtype, shape.clone(), bytes).map(|view| (*name, view))
+            })
+            .collect::<std::result::Result<Vec<_>, _>>()
+            .map_err(|e| Error::file(path, e.to_string()))?;
+        let bytes = safetensors::serialize(tensors, Some(metadata))
+            .map_err(|e| Error::file(path, e.to_string()))?;
+        write_atomically(path, |file| file.write_all(&bytes))
+    }
+}
+
+/// What drawing needs of a bake file.
+pub struct Bake {
+    pub origin: Origin,
+    /// W·m⁻², RGB, `[triangle]` in the order of the input.
+    pub irradiance: Vec<Vec3>,
+}
+
+impl Bake {
+    /// Reads a bake; refuses files of another make or version.
+    pub fn load(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).map_err(|e| Error::read(path, e))?;
+        let bad = |what: String| Error::file(path, what);
+        let (_, header) = SafeTensors::read_metadata(&bytes)
+            .map_err(|e| bad(format!("not a safetensors file: {e}")))?;
+        let metadata = header.metadata().clone().unwrap_or_default();
+        match metadata.get("version").map(String::as_str) {
+            Some(VERSION) => {}
+            Some(other) => {
+                return Err(bad(format!(
+                    "a bake of version {other}; this program reads version {VERSION}"
+                )));
+            }
+            None => return Err(bad("not a bake: it has no version".into())),
+        }
+        let origin = metadata
+            .get("scene")
+            .and_then(|s| serde_json::from_str(s).ok())
+            .ok_or_else(|| bad("not a bake: it does not name its scene".into()))?;
+        let file = SafeTensors::deserialize(&bytes).map_err(|e| bad(e.to_string()))?;
+        let tensor = file
+            .tensor("irradiance")
+            .map_err(|e| bad(format!("irradiance: {e}")))?;
+        if tensor.dtype() != Dtype::F32 || tensor.shape().len() != 2 || tensor.shape()[1] != 3 {
+            return Err(bad("irradiance: not f32 [E, 3]".into()));
+        }
+        let values: Vec<f32> = tensor
+            .data()
+            .chunks_exact(4)
+            .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+            .collect();
+        if values.iter().any(|v| !v.is_finite()) {
+            return Err(bad("irradiance: not all numbers are finite".into()));
+        }
+        Ok(Self {
+            origin,
+            irradiance: values.chunks_exact(3).map(Vec3::from_slice).collect(),
+        })
+    }
+}
