@@ -31,9 +31,14 @@ layout(push_constant, scalar) uniform Parameters {
     uint face_size;      // pixels
 };
 
+// Most pixel centres that are tried one by one.
+const float FEW = 4.0;
 const float SQRT_2 = 1.41421357;
-// Half of a subpixel step of the coarsest rasteriser allowed (4 bits), rounded up, in pixels.
-const float SNAP = 1.0 / 16.0;
+layout(constant_id = 3) const uint SUBPIXEL_BITS = 4;
+// How far the rasteriser's rounding may move a corner, in pixels, with some room for that of the projection.
+float snap() {
+    return 1.0 / float(1u << SUBPIXEL_BITS) + 1.0 / 1024.0;
+}
 
 View face_view(Source s, uint face) {
     vec3 n = s.normal;
@@ -87,9 +92,39 @@ bool triangle_seen(View v, vec2 size, vec3 a, vec3 b, vec3 c) {
     vec3 col = (x / w * 0.5 + 0.5) * size.x - 0.5;
     vec3 row = (y / w * 0.5 + 0.5) * size.y - 0.5;
     // Pixel centres are the whole numbers now: is there one in the box?
-    vec2 low = vec2(min(col.x, min(col.y, col.z)), min(row.x, min(row.y, row.z))) - SNAP;
-    vec2 high = vec2(max(col.x, max(col.y, col.z)), max(row.x, max(row.y, row.z))) + SNAP;
-    return all(greaterThanEqual(floor(high), ceil(low)));
+    vec2 low = vec2(min(col.x, min(col.y, col.z)), min(row.x, min(row.y, row.z))) - snap();
+    vec2 high = vec2(max(col.x, max(col.y, col.z)), max(row.x, max(row.y, row.z))) + snap();
+    vec2 first = ceil(low);
+    vec2 last = floor(high);
+    if (any(lessThan(last, first))) {
+        return false;
+    }
+    vec2 count = last - first + 1.0;
+    if (count.x * count.y > FEW) {
+        return true;
+    }
+    // Few centres: is one of them inside the three edges?
+    vec2 pa = vec2(col.x, row.x);
+    vec2 pb = vec2(col.y, row.y);
+    vec2 pc = vec2(col.z, row.z);
+    vec2 ab = pb - pa;
+    vec2 bc = pc - pb;
+    vec2 ca = pa - pc;
+    float side = ab.x * bc.y - ab.y * bc.x >= 0.0 ? 1.0 : -1.0;
+    vec3 slack = 2.0 * snap() * vec3(abs(ab.x) + abs(ab.y), abs(bc.x) + abs(bc.y), abs(ca.x) + abs(ca.y));
+    bool covered = false;
+    for (float r = first.y; r <= last.y; r += 1.0) {
+        for (float c = first.x; c <= last.x; c += 1.0) {
+            vec2 p = vec2(c, r);
+            vec3 inside = side * vec3(
+                ab.x * (p.y - pa.y) - ab.y * (p.x - pa.x),
+                bc.x * (p.y - pb.y) - bc.y * (p.x - pb.x),
+                ca.x * (p.y - pc.y) - ca.y * (p.x - pc.x)
+            );
+            covered = covered || all(greaterThanEqual(inside, -slack));
+        }
+    }
+    return covered;
 }
 
 void main() {

@@ -39,6 +39,8 @@ pub struct Source {
     pub kind: u32,
     /// Place of the hemicube: on the surface, or the point light.
     pub eye: DVec3,
+    /// Of the area.
+    pub centroid: DVec3,
     /// Mean normal, and the hemicube's other two axes.
     pub normal: DVec3,
     pub tangent: DVec3,
@@ -229,6 +231,7 @@ fn group(elements: &Elements, connections: &Connections, range: std::ops::Range<
     Source {
         kind: KIND_SURFACE,
         eye,
+        centroid,
         normal: mean,
         tangent: DVec3::ZERO,
         bitangent: DVec3::ZERO,
@@ -249,6 +252,7 @@ fn part(elements: &Elements, connections: &Connections, e: usize, triangle: [DVe
     Source {
         kind: KIND_SURFACE,
         eye,
+        centroid: eye,
         normal: elements.normal[e],
         tangent: DVec3::ZERO,
         bitangent: DVec3::ZERO,
@@ -267,9 +271,11 @@ fn part(elements: &Elements, connections: &Connections, e: usize, triangle: [DVe
 }
 
 fn point(light: &PointLight, elements: &Elements) -> [Source; 2] {
+    let eye = (light.position - elements.origin) / elements.unit;
     let half = |normal: DVec3, cone: f64| Source {
         kind: KIND_POINT,
-        eye: (light.position - elements.origin) / elements.unit,
+        eye,
+        centroid: eye,
         normal,
         tangent: DVec3::ZERO,
         bitangent: DVec3::ZERO,

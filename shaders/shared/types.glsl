@@ -20,6 +20,7 @@ struct Source {
     uint first_contour;
     uint contour_count;
     uint component;    // the connected component it lies on
+    vec3 middle;       // centroid of the area
 };
 
 // Up to MESHLET_TRIANGLES consecutive elements.

@@ -24,8 +24,8 @@ struct Parameters {
 
 impl BinReceivers {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
-        let mut bindings = [Binding::Storage; 13];
-        bindings[12] = Binding::Sampled;
+        let mut bindings = [Binding::Storage; 14];
+        bindings[13] = Binding::Sampled;
         Ok(Self {
             pipeline: ComputePipeline::new(
                 device,
@@ -58,6 +58,7 @@ impl BinReceivers {
             &state.indirect,
             &state.indirect_error,
             &state.behind,
+            &scene.areas,
         ]
         .map(Bind::Buffer)
         .to_vec();

@@ -40,6 +40,7 @@ impl Cull {
             device.limits().subgroup_size,
             (culling != Culling::Off).into(),
             (culling == Culling::Triangles).into(),
+            device.limits().subpixel_bits,
         ];
         Ok(Self {
             pipeline: ComputePipeline::new(

@@ -26,6 +26,8 @@ pub struct Source {
     pub first_contour: u32,
     pub contour_count: u32,
     pub component: u32,
+    /// Centroid of the area.
+    pub middle: Vec3,
 }
 
 impl Source {
@@ -48,6 +50,7 @@ impl Source {
             first_contour,
             contour_count,
             component: source.component,
+            middle: source.centroid.as_vec3(),
         }
     }
 }

@@ -28,6 +28,8 @@ pub struct Limits {
     pub max_storage_buffer_range: u64,
     pub max_image_side: u32,
     pub subgroup_size: u32,
+    /// Binary digits of a rasterised corner's place within a pixel.
+    pub subpixel_bits: u32,
     /// Nanoseconds of one timestamp tick.
     pub timestamp_period: f64,
     /// Memory of the largest heap.
@@ -120,6 +122,7 @@ impl Device {
                 max_storage_buffer_range: candidate.max_storage_buffer_range,
                 max_image_side: candidate.max_image_side,
                 subgroup_size: candidate.subgroup_size,
+                subpixel_bits: properties.limits.sub_pixel_precision_bits.clamp(4, 16),
                 timestamp_period: f64::from(properties.limits.timestamp_period),
                 heap_bytes: candidate.heap_bytes,
             },
