@@ -13,7 +13,8 @@ layout(scalar, binding = 1) readonly buffer Sources { Source sources[]; };
 // Fixed point, FIXED_POINT_BITS: of a surface's form factor, then of a point's share of half the sphere; each [3 n][n].
 layout(scalar, binding = 2) readonly buffer Deltas { uint64_t deltas[]; };
 layout(scalar, binding = 3) buffer FormFactors { uint64_t form_factors[]; };
-layout(binding = 4) uniform usampler2D items;
+layout(scalar, binding = 4) readonly buffer Planes { vec4 planes[]; };
+layout(binding = 5) uniform usampler2D items;
 
 layout(push_constant, scalar) uniform Parameters {
     uint element_count;
@@ -32,6 +33,12 @@ void main() {
     if (item == NONE) {
         return;
     }
-    uint table = sources[slots[slot].source].kind == KIND_POINT ? count : 0;
+    // A back blocks light and takes none.
+    uint source = slots[slot].source;
+    vec4 plane = planes[item];
+    if (dot(plane.xyz, sources[source].eye) <= plane.w) {
+        return;
+    }
+    uint table = sources[source].kind == KIND_POINT ? count : 0;
     atomicAdd(form_factors[slot * element_count + item], deltas[table + pixel]);
 }

@@ -31,6 +31,8 @@ layout(push_constant, scalar) uniform Parameters {
     uint face_size;      // pixels
 };
 
+// Rounding of a plane's height at a point: a few steps of f32 at coordinates up to 1.
+const float EYE_EPSILON = 1e-6;
 // Most pixel centres that are tried one by one.
 const float FEW = 4.0;
 const float SQRT_2 = 1.41421357;
@@ -165,12 +167,17 @@ void main() {
                     uvec3 corner = uvec3(0);
                     if (draw) {
                         corner = uvec3(corners[3 * element], corners[3 * element + 1], corners[3 * element + 2]);
+                        // The member that the eye stands on is seen edge-on, if at all: rounding must not draw it.
+                        bool member = s.kind == KIND_SURFACE && element - s.first_element < s.element_count;
+                        vec4 plane = vec4(0.0);
+                        if (member || (CULL_TRIANGLES == 1 && m_away)) {
+                            plane = planes[element];
+                        }
+                        float height = dot(plane.xyz, view.eye) - plane.w;
+                        draw = !(member && abs(height) <= EYE_EPSILON);
                         if (CULL_TRIANGLES == 1) {
-                            draw = triangle_seen(view, size, vertices[corner.x], vertices[corner.y], vertices[corner.z]);
-                            if (draw && m_away) {
-                                vec4 plane = planes[element];
-                                draw = dot(plane.xyz, view.eye) > plane.w;
-                            }
+                            draw = draw && !(m_away && height <= 0.0)
+                                && triangle_seen(view, size, vertices[corner.x], vertices[corner.y], vertices[corner.z]);
                         }
                     }
                     uvec4 drawn = subgroupBallot(draw);

@@ -11,6 +11,14 @@ use rayon::prelude::*;
 
 use crate::scene::Scene;
 
+/// Steps of an internal coordinate in a unit: finer than f32, coarser than what an offset of 10⁶ units leaves of f64, so
+/// that a scene far away is ordered and grouped as the same scene at the origin is.
+const STEPS: f64 = (1u64 << 26) as f64;
+
+fn snapped(v: DVec3) -> DVec3 {
+    (v * STEPS).round() / STEPS
+}
+
 /// Structure of arrays, `[element]`, in internal order (see [`Elements::permute`]) and internal units.
 #[derive(Debug, Clone, Default)]
 pub struct Elements {
@@ -50,7 +58,7 @@ impl Elements {
         let vertices: Vec<_> = scene
             .vertices
             .iter()
-            .map(|v| (*v - origin) / unit)
+            .map(|v| snapped((*v - origin) / unit))
             .collect();
         let shapes: Vec<_> = scene
             .triangles

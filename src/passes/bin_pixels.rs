@@ -50,8 +50,8 @@ impl BinPixels {
             )));
         }
         let push = size_of::<Parameters>();
-        let mut bindings = [Binding::Storage; 5];
-        bindings[4] = Binding::Sampled;
+        let mut bindings = [Binding::Storage; 6];
+        bindings[5] = Binding::Sampled;
         Ok(Self {
             bin: ComputePipeline::new(
                 device,
@@ -96,6 +96,7 @@ impl BinPixels {
                 Bind::Buffer(&scene.sources),
                 Bind::Buffer(&deltas),
                 Bind::Buffer(&form_factors),
+                Bind::Buffer(&scene.planes),
                 Bind::Image(&batch.items, &batch.sampler),
             ],
         )?;

@@ -1,15 +1,20 @@
 //! Twin of the pixel estimator: the paper's equations (1) and (2).
 
 use crate::constants::{KIND_POINT, NONE};
+use crate::elements::Elements;
 use crate::hemicube::{Pixel, delta_form_factor, solid_angle_share};
 use crate::sources::Source;
 
 /// Form factor from a source to each element, equation (1): the sum of the delta form factors of its pixels. For a point
-/// light, the element's share of half the sphere.
-pub fn form_factors(source: &Source, items: &[u32], elements: usize, n: u32) -> Vec<f64> {
-    let mut sums = vec![0.0; elements];
+/// light, the element's share of half the sphere. A back blocks light and takes none.
+pub fn form_factors(elements: &Elements, source: &Source, items: &[u32], n: u32) -> Vec<f64> {
+    let mut sums = vec![0.0; elements.len()];
     for (i, &item) in items.iter().enumerate() {
         if item == NONE {
+            continue;
+        }
+        let e = item as usize;
+        if (source.eye - elements.centroid[e]).dot(elements.normal[e]) <= 0.0 {
             continue;
         }
         let pixel = Pixel {

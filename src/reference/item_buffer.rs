@@ -2,10 +2,13 @@
 
 use glam::DVec3;
 
-use crate::constants::NONE;
+use crate::constants::{KIND_SURFACE, NONE};
 use crate::elements::Elements;
-use crate::hemicube::{Pixel, direction_of, pixel_of};
+use crate::hemicube::{Pixel, direction_of};
 use crate::sources::Source;
+
+/// Distance of the near plane, as in the pass; a ray's largest component in the source's frame is 1.
+const NEAR: f64 = 1e-6;
 
 /// Where a ray meets the plane of a triangle.
 #[derive(Debug, Clone, Copy)]
@@ -28,7 +31,7 @@ pub fn intersect(origin: DVec3, ray: DVec3, [a, b, c]: [DVec3; 3]) -> Option<Hit
     let q = t.cross(u);
     let (x, y) = (t.dot(p) / determinant, ray.dot(q) / determinant);
     let along = v.dot(q) / determinant;
-    (along > 0.0).then_some(Hit {
+    (along > NEAR).then_some(Hit {
         along,
         inside: x.min(y).min(1.0 - x - y),
     })
@@ -59,47 +62,45 @@ pub fn item_buffer(elements: &Elements, source: &Source, n: u32) -> Vec<u32> {
     items
 }
 
-/// Whether an element rises above the source's own plane.
+/// Whether an element rises above the source's own plane, and is not the member that the eye stands on.
 fn above(elements: &Elements, source: &Source, e: usize) -> bool {
-    elements
-        .triangle(e)
-        .iter()
-        .any(|v| (*v - source.eye).dot(source.normal) > 1e-9)
+    let first = source.first_element as usize;
+    let member =
+        source.kind == KIND_SURFACE && (first..first + source.element_count as usize).contains(&e);
+    let height = (source.eye - elements.centroid[e]).dot(elements.normal[e]);
+    let rises = |v: &DVec3| (*v - source.eye).dot(source.normal) > 1e-9;
+    !(member && height.abs() <= 1e-6) && elements.triangle(e).iter().any(rises)
 }
 
 /// How far outside a triangle, in pixels, a pixel's centre may lie and still be drawn: a rasteriser with 4 subpixel bits
 /// moves a corner by at most 1/32 of a pixel.
 const SNAP: f64 = 1.0 / 16.0;
 
-/// Whether an item buffer is right: each pixel has the element that its ray meets first, or one that passes within a
-/// rasteriser's rounding of it and no farther off than that.
-pub fn agrees(elements: &Elements, source: &Source, n: u32, drawn: &[u32]) -> bool {
+/// Pixels of an item buffer that are wrong, each with the element that its ray meets first and the one drawn. A pixel is
+/// right also with the element that some ray within a rasteriser's rounding of its centre meets first.
+pub fn disagreements(
+    elements: &Elements,
+    source: &Source,
+    n: u32,
+    drawn: &[u32],
+) -> Vec<(Pixel, u32, u32)> {
     let expected = item_buffer(elements, source, n);
-    expected
-        .iter()
-        .zip(drawn)
-        .enumerate()
-        .all(|(i, (&want, &got))| {
-            want == got || {
-                let pixel = Pixel {
-                    column: i as u32 % n,
-                    row: i as u32 / n,
-                };
-                explained(elements, source, n, pixel, want, got)
-            }
+    (0..)
+        .zip(expected.iter().zip(drawn))
+        .map(|(i, (&want, &got))| {
+            let pixel = Pixel {
+                column: i % n,
+                row: i / n,
+            };
+            (pixel, want, got)
         })
+        .filter(|&(pixel, want, got)| want != got && !explained(elements, source, n, pixel, got))
+        .collect()
 }
 
 /// Whether rounding explains that a pixel shows `got` where its centre's ray meets `want`: some ray within [`SNAP`] of the
 /// centre meets `got` first.
-fn explained(
-    elements: &Elements,
-    source: &Source,
-    n: u32,
-    pixel: Pixel,
-    want: u32,
-    got: u32,
-) -> bool {
+fn explained(elements: &Elements, source: &Source, n: u32, pixel: Pixel, got: u32) -> bool {
     let centre = direction_of(pixel, n);
     let step = 2.0 / f64::from(n) * SNAP;
     let first = |ray: DVec3| {
@@ -112,12 +113,6 @@ fn explained(
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .map_or(NONE, |(_, e)| e as u32)
     };
-    debug_assert_eq!(
-        pixel_of(centre, n),
-        pixel,
-        "a pixel's direction falls in it"
-    );
-    let _ = want;
     (0..16).any(|i| {
         let angle = f64::from(i) * std::f64::consts::TAU / 16.0;
         let (du, dv) = (step * angle.cos(), step * angle.sin());

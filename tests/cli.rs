@@ -1,0 +1,299 @@
+//! The program as a person meets it: good runs, and every kind of bad input with one clear line and exit code 2.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn mesolux(args: &[&str], folder: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_mesolux"))
+        .args(args)
+        .current_dir(folder)
+        .output()
+        .expect("the program runs")
+}
+
+const ROOM: &str = "mtllib room.mtl\nv 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nv 0 1 0\nv 1 1 0\nv 1 1 1\nv 0 1 1\n\
+    usemtl floor\nf 1 4 3 2\nusemtl light\nf 5 6 7 8\n";
+const MATERIALS: &str = "newmtl floor\nKd 0.5 0.5 0.5\nnewmtl light\nKd 0 0 0\nKe 1 1 1\n";
+
+#[test]
+fn bad_input_is_one_line_and_exit_code_2() {
+    let room = |change: (&str, &str)| ROOM.replace(change.0, change.1);
+    let mtl = |change: (&str, &str)| MATERIALS.replace(change.0, change.1);
+    // What is wrong, the OBJ, the MTL, more arguments, and what the one line must say.
+    let cases: [(&str, String, String, &[&str], &[&str]); 15] = [
+        (
+            "nan",
+            room(("v 1 0 0", "v nan 0 0")),
+            MATERIALS.into(),
+            &[],
+            &["room.obj:3"],
+        ),
+        (
+            "infinite",
+            room(("v 1 0 0", "v 1e999 0 0")),
+            MATERIALS.into(),
+            &[],
+            &["room.obj:3"],
+        ),
+        (
+            "index out of range",
+            room(("f 5 6 7 8", "f 5 6 7 99")),
+            MATERIALS.into(),
+            &[],
+            &["room.obj:13", "99"],
+        ),
+        (
+            "face of two",
+            room(("f 5 6 7 8", "f 5 6")),
+            MATERIALS.into(),
+            &[],
+            &["room.obj:13"],
+        ),
+        (
+            "unknown material",
+            room(("usemtl light", "usemtl lamp")),
+            MATERIALS.into(),
+            &[],
+            &["lamp"],
+        ),
+        (
+            "reflectance above 1",
+            ROOM.into(),
+            mtl(("Kd 0.5 0.5 0.5", "Kd 0.5 1.5 0.5")),
+            &[],
+            &["floor"],
+        ),
+        (
+            "reflectance below 0",
+            ROOM.into(),
+            mtl(("Kd 0.5 0.5 0.5", "Kd 0.5 -1 0.5")),
+            &[],
+            &["floor"],
+        ),
+        (
+            "no light",
+            ROOM.into(),
+            mtl(("Ke 1 1 1", "Ke 0 0 0")),
+            &[],
+            &["light"],
+        ),
+        ("empty", String::new(), MATERIALS.into(), &[], &["room.obj"]),
+        (
+            "device",
+            ROOM.into(),
+            MATERIALS.into(),
+            &["--device", "nosuch"],
+            &["nosuch"],
+        ),
+        (
+            "hemicube",
+            ROOM.into(),
+            MATERIALS.into(),
+            &["--hemicube", "7"],
+            &["--hemicube 7"],
+        ),
+        (
+            "residual",
+            ROOM.into(),
+            MATERIALS.into(),
+            &["--residual", "nan"],
+            &["--residual"],
+        ),
+        (
+            "budget",
+            ROOM.into(),
+            MATERIALS.into(),
+            &["--budget=-1"],
+            &["--budget"],
+        ),
+        (
+            "threads",
+            ROOM.into(),
+            MATERIALS.into(),
+            &["--threads", "0"],
+            &["--threads 0"],
+        ),
+        (
+            "patches of a file",
+            ROOM.into(),
+            MATERIALS.into(),
+            &["--patches", "9"],
+            &["patches"],
+        ),
+    ];
+    for (what, obj, materials, more, said) in cases {
+        let folder = tempfile::tempdir().expect("a folder for the test");
+        std::fs::write(folder.path().join("room.obj"), obj).expect("written");
+        std::fs::write(folder.path().join("room.mtl"), materials).expect("written");
+        let mut args = vec!["bake", "room.obj", "-o", "out.safetensors"];
+        args.extend(more);
+        let run = mesolux(&args, folder.path());
+        let text = String::from_utf8_lossy(&run.stderr);
+        assert_eq!(run.status.code(), Some(2), "{what}: {text}");
+        let lines: Vec<_> = text
+            .lines()
+            .filter(|l| l.starts_with("mesolux: "))
+            .collect();
+        assert_eq!(lines.len(), 1, "{what}: {text}");
+        assert!(
+            said.iter().all(|s| lines[0].contains(s)),
+            "{what}: {}",
+            lines[0]
+        );
+        assert!(!text.contains("panicked"), "{what}: {text}");
+        let left: Vec<_> = std::fs::read_dir(folder.path()).expect("listed").collect();
+        assert_eq!(left.len(), 2, "{what}: nothing is written");
+    }
+}
+
+#[test]
+fn bad_names_and_outputs() {
+    let folder = tempfile::tempdir().expect("a folder for the test");
+    for (args, said) in [
+        (&["bake", "nosuch", "-o", "o.safetensors"][..], "nosuch"),
+        (
+            &["bake", "missing.obj", "-o", "o.safetensors"],
+            "missing.obj",
+        ),
+        (
+            &["bake", "missing.toml", "-o", "o.safetensors"],
+            "missing.toml",
+        ),
+        (
+            &["bake", "cornell", "-o", "no/such/folder/o.safetensors"],
+            "no/such/folder",
+        ),
+        (
+            &["bake", "cornell", "--patches", "3", "-o", "o.safetensors"],
+            "patches",
+        ),
+        (
+            &[
+                "bake",
+                "cornell",
+                "--statue",
+                "none.obj",
+                "-o",
+                "o.safetensors",
+            ],
+            "none.obj",
+        ),
+        (&["render", "cornell", "-o", "picture.bmp"], "picture.bmp"),
+        (
+            &["render", "missing.safetensors", "-o", "p.png"],
+            "missing.safetensors",
+        ),
+        (
+            &["render", "cornell", "--camera", "nosuch", "-o", "p.png"],
+            "nosuch",
+        ),
+        (&["scene", "nosuch", "-o", "folder"], "nosuch"),
+    ] {
+        let run = mesolux(args, folder.path());
+        let text = String::from_utf8_lossy(&run.stderr);
+        assert_eq!(run.status.code(), Some(2), "{args:?}: {text}");
+        let lines: Vec<_> = text
+            .lines()
+            .filter(|l| l.starts_with("mesolux: "))
+            .collect();
+        assert!(
+            lines.len() == 1 && lines[0].contains(said),
+            "{args:?}: {text}"
+        );
+        let left: Vec<_> = std::fs::read_dir(folder.path()).expect("listed").collect();
+        assert!(
+            left.is_empty(),
+            "{args:?}: nothing is written, but {left:?} is"
+        );
+    }
+    // No Vulkan driver at all.
+    let run = Command::new(env!("CARGO_BIN_EXE_mesolux"))
+        .args(["bake", "cornell", "-o", "o.safetensors"])
+        .env("VK_DRIVER_FILES", "/nonexistent.json")
+        .env("VK_ICD_FILENAMES", "/nonexistent.json")
+        .current_dir(folder.path())
+        .output()
+        .expect("the program runs");
+    assert_eq!(run.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&run.stderr).contains("Vulkan"));
+}
+
+#[test]
+fn bakes_and_renders_files_of_every_kind() {
+    let folder = tempfile::tempdir().expect("a folder for the test");
+    std::fs::write(folder.path().join("room.obj"), ROOM).expect("written");
+    std::fs::write(folder.path().join("room.mtl"), MATERIALS).expect("written");
+    let bake = mesolux(
+        &[
+            "bake",
+            "room.obj",
+            "-o",
+            "o.safetensors",
+            "--json",
+            "--validate",
+        ],
+        folder.path(),
+    );
+    assert!(
+        bake.status.success(),
+        "{}",
+        String::from_utf8_lossy(&bake.stderr)
+    );
+    let report: serde_json::Value =
+        serde_json::from_slice(&bake.stdout).expect("one JSON object on stdout");
+    assert_eq!(report["elements"], 4);
+    assert_eq!(report["stop"], "residual");
+    for key in [
+        "device",
+        "sources",
+        "hemicubes",
+        "unshot_share",
+        "error_bound",
+        "seconds",
+        "skipped",
+    ] {
+        assert!(!report[key].is_null(), "{key}");
+    }
+    for picture in ["p.png", "p.exr"] {
+        let args = [
+            "render",
+            "o.safetensors",
+            "-o",
+            picture,
+            "--size",
+            "64x48",
+            "--validate",
+        ];
+        let run = mesolux(&args, folder.path());
+        assert!(
+            run.status.success(),
+            "{}",
+            String::from_utf8_lossy(&run.stderr)
+        );
+        let image = image::open(folder.path().join(picture)).expect("a picture");
+        assert_eq!((image.width(), image.height()), (64, 48));
+    }
+    // A scene that has changed is not drawn with an old bake's light.
+    std::fs::write(
+        folder.path().join("room.obj"),
+        ROOM.replace("v 0 1 0", "v 0 2 0"),
+    )
+    .expect("written");
+    let run = mesolux(&["render", "o.safetensors", "-o", "q.png"], folder.path());
+    assert_eq!(run.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&run.stderr).contains("changed"));
+    // A bake cut short is an error, not a panic.
+    let bytes = std::fs::read(folder.path().join("o.safetensors")).expect("read");
+    std::fs::write(
+        folder.path().join("cut.safetensors"),
+        &bytes[..bytes.len() / 2],
+    )
+    .expect("written");
+    let run = mesolux(&["render", "cut.safetensors", "-o", "q.png"], folder.path());
+    assert_eq!(
+        run.status.code(),
+        Some(2),
+        "{}",
+        String::from_utf8_lossy(&run.stderr)
+    );
+}

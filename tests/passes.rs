@@ -1,0 +1,225 @@
+//! Each GPU pass against its CPU twin, on tiny input.
+
+mod common;
+
+use std::collections::BTreeSet;
+
+use common::{Build, assert_silent, device};
+use glam::{DVec3, Vec3};
+use mesolux::constants::NONE;
+use mesolux::elements::Elements;
+use mesolux::passes::cull::Culling;
+use mesolux::reference;
+use mesolux::solver::{Estimator, Settings, Solver};
+
+const FACE: u32 = 32;
+
+/// An open room with a sphere, a sheet seen from behind, an emitter and a point light.
+fn scene() -> Build {
+    let mut build = Build::new();
+    let light = build.material(0.2, 2.0);
+    build.room(DVec3::ZERO, DVec3::new(1.0, 0.9, 1.1), 5, 0);
+    build.sphere(DVec3::new(0.6, 0.35, 0.5), 0.22, 2, true, 0);
+    build.quad(
+        DVec3::new(0.2, 0.2, 0.2),
+        DVec3::new(0.2, 0.1, 0.0),
+        DVec3::Y * 0.3,
+        (2, 2),
+        0,
+    );
+    build.quad(
+        DVec3::new(0.3, 0.85, 0.3),
+        DVec3::X * 0.3,
+        DVec3::Z * 0.3,
+        (2, 2),
+        light,
+    );
+    build.point_light(DVec3::new(0.3, 0.5, 0.8), 0.4);
+    build
+}
+
+fn solver(estimator: Estimator, culling: Culling, shots: u32) -> Solver {
+    let build = scene();
+    let settings = Settings {
+        estimator,
+        culling,
+        hemicube: FACE,
+        shots: Some(shots),
+        batch: 6,
+        ..Settings::default()
+    };
+    Solver::new(
+        &device(),
+        Elements::new(&build.scene),
+        &build.scene.point_lights,
+        &settings,
+    )
+    .expect("the scene fits the device")
+}
+
+/// The slots' item buffers one by one.
+fn columns(items: &[u32], slots: usize) -> Vec<Vec<u32>> {
+    let n = FACE as usize;
+    (0..slots)
+        .map(|slot| {
+            (0..3 * n * n)
+                .map(|i| items[(i / n * slots + slot) * n + i % n])
+                .collect()
+        })
+        .collect()
+}
+
+#[test]
+fn item_buffers_equal_rays_and_culling_changes_nothing() {
+    let mut first: Option<Vec<u32>> = None;
+    for culling in [Culling::Off, Culling::Meshlets, Culling::Triangles] {
+        let mut solver = solver(Estimator::Receiver, culling, 200);
+        let mut drawn = Vec::new();
+        let mut buffers = Vec::new();
+        for _ in 0..8 {
+            solver
+                .run_batches(1, |batch| drawn = batch.draws.clone())
+                .expect("a batch runs");
+            let (items, sources) = solver.item_buffers().expect("the item buffers come back");
+            for (column, &source) in columns(&items, sources.len()).iter().zip(&sources) {
+                if source == NONE {
+                    assert!(
+                        column.iter().all(|&i| i == NONE),
+                        "an empty slot draws nothing"
+                    );
+                    continue;
+                }
+                let source = &solver.sources.list[source as usize];
+                let wrong =
+                    reference::item_buffer::disagreements(&solver.elements, source, FACE, column);
+                assert!(
+                    wrong.is_empty(),
+                    "{culling:?}: pixels differ from what rays meet (pixel, expected, drawn): {wrong:?} {source:?}"
+                );
+            }
+            buffers.extend(items);
+        }
+        assert!(buffers.iter().any(|&i| i != NONE));
+        match &first {
+            None => first = Some(buffers),
+            Some(first) => {
+                // Where two surfaces meet to rounding, either may win; nowhere else.
+                let differing = first.iter().zip(&buffers).filter(|(a, b)| a != b).count();
+                assert_eq!(differing, 0, "{culling:?} changes {differing} pixels");
+            }
+        }
+        if culling == Culling::Off {
+            // All but the members that an eye stands on.
+            let least = 3 * (solver.elements.len() - solver.sources.list.len().min(48)) as u32;
+            assert!(
+                drawn
+                    .iter()
+                    .all(|d| d.index_count == 0 || d.index_count >= least)
+            );
+        }
+    }
+    assert_silent();
+}
+
+#[test]
+fn culling_keeps_every_element_that_owns_a_pixel() {
+    let mut solver = solver(Estimator::Receiver, Culling::Triangles, 6);
+    let mut draws = Vec::new();
+    solver
+        .run_batches(1, |batch| {
+            if batch.progress.selected > 0 {
+                draws = batch.draws.clone();
+            }
+        })
+        .expect("a batch runs");
+    // The second batch found the shots used up: sources come from the twin of the selection.
+    let irradiance = vec![Vec3::ZERO; solver.elements.len()];
+    let shot = vec![reference::measure::Shot::default(); solver.sources.list.len()];
+    let unshot =
+        reference::measure::measure(&solver.elements, &solver.sources.list, &irradiance, &shot);
+    let powers: Vec<f32> = unshot.iter().map(|u| u.1 as f32).collect();
+    for (slot, &source) in reference::select::select(&powers, 6).iter().enumerate() {
+        let source = &solver.sources.list[source as usize];
+        for face in 0..5 {
+            let shown: BTreeSet<u32> = reference::cull::shown(&solver.elements, source, face, FACE);
+            let drawn = draws[slot * 5 + face as usize].index_count / 3;
+            assert!(
+                drawn as usize >= shown.len(),
+                "slot {slot}, face {face}: {drawn} drawn, {} shown",
+                shown.len()
+            );
+            assert!(
+                (drawn as usize) < solver.elements.len(),
+                "something is culled"
+            );
+        }
+    }
+    assert_silent();
+}
+
+/// One batch of emission: irradiance by the GPU and by the twin from the GPU's own item buffers.
+#[test]
+fn estimators_equal_their_twins() {
+    for estimator in [Estimator::Receiver, Estimator::Pixel] {
+        // One batch of sources exactly; the batch after it shoots nothing, so the item buffers are drawn again.
+        let mut solver = solver(estimator, Culling::Triangles, 6);
+        solver.run(|_| true).expect("the batch runs");
+        let light = solver.light().expect("the light comes back");
+        let elements = &solver.elements;
+        let shot = vec![reference::measure::Shot::default(); solver.sources.list.len()];
+        let zero = vec![Vec3::ZERO; elements.len()];
+        let unshot = reference::measure::measure(elements, &solver.sources.list, &zero, &shot);
+        let powers: Vec<f32> = unshot.iter().map(|u| u.1 as f32).collect();
+        let chosen = reference::select::select(&powers, 6);
+        let mut expected = vec![0.0; elements.len()];
+        for &s in &chosen {
+            let source = &solver.sources.list[s as usize];
+            let items = reference::item_buffer::item_buffer(elements, source, FACE);
+            let emitted = f64::from(source.emitted.x);
+            let sums = reference::bin_pixels::form_factors(elements, source, &items, FACE);
+            for (e, sum) in expected.iter_mut().enumerate() {
+                *sum += emitted
+                    * match estimator {
+                        Estimator::Receiver => {
+                            reference::bin_receivers::gather(elements, source, &items, FACE, e)
+                        }
+                        Estimator::Pixel => {
+                            reference::bin_pixels::irradiance(source, sums[e], elements.area[e])
+                        }
+                    };
+            }
+        }
+        let scale = expected.iter().copied().fold(0.0, f64::max);
+        assert!(scale > 0.0);
+        // Pixels on the edge of two triangles may go to either, which moves a pixel's worth of light between neighbours:
+        // nearly all elements must agree to rounding (far sources: 0.07 %), the sum of all to less.
+        let agree = |e: usize| {
+            (f64::from(light.irradiance[e].x) - expected[e]).abs()
+                <= 1.5e-3 * expected[e] + 1e-5 * scale
+        };
+        let wrong = (0..elements.len()).filter(|&e| !agree(e)).count();
+        println!(
+            "{estimator:?}: {wrong} of {} elements differ",
+            elements.len()
+        );
+        assert!(
+            wrong * 50 <= elements.len(),
+            "{estimator:?}: {wrong} of {} differ",
+            elements.len()
+        );
+        let power = |value: &dyn Fn(usize) -> f64| {
+            (0..elements.len())
+                .map(|e| elements.area[e] * value(e))
+                .sum::<f64>()
+        };
+        let (got, want) = (
+            power(&|e| f64::from(light.irradiance[e].x)),
+            power(&|e| expected[e]),
+        );
+        assert!(
+            (got / want - 1.0).abs() < 2e-3,
+            "{estimator:?}: power {got} for {want}"
+        );
+    }
+    assert_silent();
+}
