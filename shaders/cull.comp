@@ -160,6 +160,7 @@ void main() {
                 kept[bit / 32] &= ~(1u << (bit % 32));
                 Meshlet m = meshlets[first + bit];
                 bool m_away = faces_away(s, m.component);
+                bool own = s.kind == KIND_SURFACE && m.component == s.component && components[m.component].closed == 1;
                 triangles_tested += m.count;
                 for (uint t = 0; t < m.count; t += gl_SubgroupSize) {
                     uint element = m.first + t + lane;
@@ -167,14 +168,15 @@ void main() {
                     uvec3 corner = uvec3(0);
                     if (draw) {
                         corner = uvec3(corners[3 * element], corners[3 * element + 1], corners[3 * element + 2]);
-                        // The member that the eye stands on is seen edge-on, if at all: rounding must not draw it.
+                        // The member that the eye stands on is seen edge-on, if at all: rounding must not draw it. Nor
+                        // does an eye on a closed part see that part's backs, which its group does not stand behind.
                         bool member = s.kind == KIND_SURFACE && element - s.first_element < s.element_count;
                         vec4 plane = vec4(0.0);
-                        if (member || (CULL_TRIANGLES == 1 && m_away)) {
+                        if (member || own || (CULL_TRIANGLES == 1 && m_away)) {
                             plane = planes[element];
                         }
                         float height = dot(plane.xyz, view.eye) - plane.w;
-                        draw = !(member && abs(height) <= EYE_EPSILON);
+                        draw = !(member && abs(height) <= EYE_EPSILON) && !(own && height <= 0.0);
                         if (CULL_TRIANGLES == 1) {
                             draw = draw && !(m_away && height <= 0.0)
                                 && triangle_seen(view, size, vertices[corner.x], vertices[corner.y], vertices[corner.z]);

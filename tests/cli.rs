@@ -20,7 +20,8 @@ fn bad_input_is_one_line_and_exit_code_2() {
     let room = |change: (&str, &str)| ROOM.replace(change.0, change.1);
     let mtl = |change: (&str, &str)| MATERIALS.replace(change.0, change.1);
     // What is wrong, the OBJ, the MTL, more arguments, and what the one line must say.
-    let cases: [(&str, String, String, &[&str], &[&str]); 15] = [
+    type Case<'a> = (&'a str, String, String, &'a [&'a str], &'a [&'a str]);
+    let cases: [Case; 15] = [
         (
             "nan",
             room(("v 1 0 0", "v nan 0 0")),

@@ -90,11 +90,16 @@ fn item_buffers_equal_rays_and_culling_changes_nothing() {
                     continue;
                 }
                 let source = &solver.sources.list[source as usize];
-                let wrong =
-                    reference::item_buffer::disagreements(&solver.elements, source, FACE, column);
+                let wrong = reference::item_buffer::disagreements(
+                    &solver.elements,
+                    &solver.connections,
+                    source,
+                    FACE,
+                    column,
+                );
                 assert!(
                     wrong.is_empty(),
-                    "{culling:?}: pixels differ from what rays meet (pixel, expected, drawn): {wrong:?} {source:?}"
+                    "{culling:?}: pixels differ from what rays meet (pixel, expected, drawn): {wrong:?}"
                 );
             }
             buffers.extend(items);
@@ -141,7 +146,8 @@ fn culling_keeps_every_element_that_owns_a_pixel() {
     for (slot, &source) in reference::select::select(&powers, 6).iter().enumerate() {
         let source = &solver.sources.list[source as usize];
         for face in 0..5 {
-            let shown: BTreeSet<u32> = reference::cull::shown(&solver.elements, source, face, FACE);
+            let shown: BTreeSet<u32> =
+                reference::cull::shown(&solver.elements, &solver.connections, source, face, FACE);
             let drawn = draws[slot * 5 + face as usize].index_count / 3;
             assert!(
                 drawn as usize >= shown.len(),
@@ -174,7 +180,8 @@ fn estimators_equal_their_twins() {
         let mut expected = vec![0.0; elements.len()];
         for &s in &chosen {
             let source = &solver.sources.list[s as usize];
-            let items = reference::item_buffer::item_buffer(elements, source, FACE);
+            let items =
+                reference::item_buffer::item_buffer(elements, &solver.connections, source, FACE);
             let emitted = f64::from(source.emitted.x);
             let sums = reference::bin_pixels::form_factors(elements, source, &items, FACE);
             for (e, sum) in expected.iter_mut().enumerate() {

@@ -10,7 +10,8 @@ use mesolux::passes::{shaders, types};
 fn glsl() -> BTreeMap<String, Vec<(String, u32)>> {
     let text = include_str!("../shaders/shared/types.glsl");
     let mut structs = BTreeMap::new();
-    let mut current: Option<(String, Vec<(String, u32)>, u32)> = None;
+    type Members = Vec<(String, u32)>;
+    let mut current: Option<(String, Members, u32)> = None;
     for line in text.lines() {
         let words: Vec<_> = line.split([' ', ';']).filter(|w| !w.is_empty()).collect();
         match (&mut current, &words[..]) {

@@ -2,15 +2,22 @@
 
 use std::collections::BTreeSet;
 
+use crate::charts::Connections;
 use crate::constants::NONE;
 use crate::elements::Elements;
 use crate::hemicube::{Pixel, face_rectangle};
 use crate::sources::Source;
 
 /// Elements that own a pixel of a face.
-pub fn shown(elements: &Elements, source: &Source, face: u32, n: u32) -> BTreeSet<u32> {
+pub fn shown(
+    elements: &Elements,
+    connections: &Connections,
+    source: &Source,
+    face: u32,
+    n: u32,
+) -> BTreeSet<u32> {
     let [x0, y0, width, height] = face_rectangle(face, n);
-    let items = super::item_buffer::item_buffer(elements, source, n);
+    let items = super::item_buffer::item_buffer(elements, connections, source, n);
     (y0..y0 + height)
         .flat_map(|row| (x0..x0 + width).map(move |column| Pixel { column, row }))
         .map(|p| items[(p.row * n + p.column) as usize])

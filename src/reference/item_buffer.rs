@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use crate::charts::Connections;
 use crate::constants::{KIND_SURFACE, NONE};
 use crate::elements::Elements;
 use crate::hemicube::{Pixel, direction_of};
@@ -44,13 +45,18 @@ pub fn ray(source: &Source, pixel: Pixel, n: u32) -> DVec3 {
 }
 
 /// The element that each pixel sees, `[row][column]` of the hemicube's column, or [`NONE`].
-pub fn item_buffer(elements: &Elements, source: &Source, n: u32) -> Vec<u32> {
+pub fn item_buffer(
+    elements: &Elements,
+    connections: &Connections,
+    source: &Source,
+    n: u32,
+) -> Vec<u32> {
     let mut items = Vec::with_capacity(3 * (n * n) as usize);
     for row in 0..3 * n {
         for column in 0..n {
             let ray = ray(source, Pixel { column, row }, n);
             let nearest = (0..elements.len())
-                .filter(|&e| above(elements, source, e))
+                .filter(|&e| above(elements, connections, source, e))
                 .filter_map(|e| {
                     let hit = intersect(source.eye, ray, elements.triangle(e))?;
                     (hit.inside >= 0.0).then_some((hit.along, e))
@@ -62,14 +68,19 @@ pub fn item_buffer(elements: &Elements, source: &Source, n: u32) -> Vec<u32> {
     items
 }
 
-/// Whether an element rises above the source's own plane, and is not the member that the eye stands on.
-fn above(elements: &Elements, source: &Source, e: usize) -> bool {
+/// Whether an element can be seen at all: it rises above the source's own plane, is not the member that the eye stands
+/// on, and is no back of the closed part that the eye stands on.
+fn above(elements: &Elements, connections: &Connections, source: &Source, e: usize) -> bool {
     let first = source.first_element as usize;
-    let member =
-        source.kind == KIND_SURFACE && (first..first + source.element_count as usize).contains(&e);
+    let surface = source.kind == KIND_SURFACE;
+    let member = surface && (first..first + source.element_count as usize).contains(&e);
+    let component = connections.component[e];
+    let own = surface && component == source.component && connections.closed[component as usize];
     let height = (source.eye - elements.centroid[e]).dot(elements.normal[e]);
     let rises = |v: &DVec3| (*v - source.eye).dot(source.normal) > 1e-9;
-    !(member && height.abs() <= 1e-6) && elements.triangle(e).iter().any(rises)
+    let edge_on = member && height.abs() <= 1e-6;
+    let own_back = own && height <= 0.0;
+    !edge_on && !own_back && elements.triangle(e).iter().any(rises)
 }
 
 /// How far outside a triangle, in pixels, a pixel's centre may lie and still be drawn: a rasteriser with 4 subpixel bits
@@ -80,11 +91,12 @@ const SNAP: f64 = 1.0 / 16.0;
 /// right also with the element that some ray within a rasteriser's rounding of its centre meets first.
 pub fn disagreements(
     elements: &Elements,
+    connections: &Connections,
     source: &Source,
     n: u32,
     drawn: &[u32],
 ) -> Vec<(Pixel, u32, u32)> {
-    let expected = item_buffer(elements, source, n);
+    let expected = item_buffer(elements, connections, source, n);
     (0..)
         .zip(expected.iter().zip(drawn))
         .map(|(i, (&want, &got))| {
@@ -94,18 +106,27 @@ pub fn disagreements(
             };
             (pixel, want, got)
         })
-        .filter(|&(pixel, want, got)| want != got && !explained(elements, source, n, pixel, got))
+        .filter(|&(pixel, want, got)| {
+            want != got && !explained(elements, connections, source, n, pixel, got)
+        })
         .collect()
 }
 
 /// Whether rounding explains that a pixel shows `got` where its centre's ray meets `want`: some ray within [`SNAP`] of the
 /// centre meets `got` first.
-fn explained(elements: &Elements, source: &Source, n: u32, pixel: Pixel, got: u32) -> bool {
+fn explained(
+    elements: &Elements,
+    connections: &Connections,
+    source: &Source,
+    n: u32,
+    pixel: Pixel,
+    got: u32,
+) -> bool {
     let centre = direction_of(pixel, n);
     let step = 2.0 / f64::from(n) * SNAP;
     let first = |ray: DVec3| {
         (0..elements.len())
-            .filter(|&e| above(elements, source, e))
+            .filter(|&e| above(elements, connections, source, e))
             .filter_map(|e| {
                 let hit = intersect(source.eye, ray, elements.triangle(e))?;
                 (hit.inside >= 0.0).then_some((hit.along, e))

@@ -105,7 +105,16 @@ pub fn ids_come_back_right(device: &Arc<Device>) -> Result<bool> {
         .iter()
         .find(|s| s.emitted.max_element() > 0.0)
         .expect("the test scene has a light");
-    Ok(crate::reference::item_buffer::disagreements(&elements, emitter, SIZE, &drawn).is_empty())
+    Ok(
+        crate::reference::item_buffer::disagreements(
+            &elements,
+            &connections,
+            emitter,
+            SIZE,
+            &drawn,
+        )
+        .is_empty(),
+    )
 }
 
 /// Five walls of a box, an emitter in the floor, and a triangle afloat.
