@@ -1,4 +1,24 @@
-//! Mesolux.
+//! Radiosity by hemicube item buffers on Vulkan.
+//!
+//! ```text
+//! scene ─► elements ─► sources, meshlets ─┐
+//!                                         ▼
+//!           ┌───────────────────────── solver ──────────────────────────┐
+//!           │ measure ─► select ─► cull ─► item buffer ─► bin receivers │
+//!           └───────────────────────────────────────────────────────────┘
+//!                                         ▼
+//!                        light ─► solution (file) ─► render (picture)
+//! ```
+//!
+//! | of the paper | where |
+//! | --- | --- |
+//! | equation (1), F_ij = Σ ΔF_q | `shaders/bin_pixels.comp`, [`hemicube::delta_form_factor`] |
+//! | equation (2), ΔIrrad = ΔB ΔF A_i / A_j | `shaders/apply_pixels.comp`, [`reference::bin_pixels`] |
+//! | the same by reciprocity and Lambert's formula | `shaders/bin_receivers.comp`, [`form_factor`] |
+//! | hemicubes | [`hemicube`], [`passes::item_buffer`] |
+//!
+//! [`bake::bake`] is the main road; [`solver::Solver`] gives each step.
+
 pub mod atomic_file;
 pub mod bake;
 pub mod bench;
