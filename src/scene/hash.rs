@@ -55,6 +55,22 @@ fn material(hash: &mut Sha256, material: &Material) {
             texture.texels.iter().for_each(|texel| floats(hash, texel));
         }
     }
+    relief(hash, material);
+}
+
+fn relief(hash: &mut Sha256, material: &Material) {
+    // A material without relief is hashed as it was before there was any, so that its bakes stay valid.
+    if let Some(map) = &material.map_height {
+        hash.update(b"height");
+        hash.update(map.width.to_le_bytes());
+        floats(hash, &map.values);
+        floats(hash, &[material.height_scale]);
+    }
+    if let Some(map) = &material.map_normal {
+        hash.update(b"normal");
+        hash.update(map.width.to_le_bytes());
+        map.normals.iter().for_each(|n| floats(hash, n));
+    }
 }
 
 fn floats(hash: &mut Sha256, values: &[f32]) {

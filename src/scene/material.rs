@@ -7,15 +7,36 @@ use super::*;
 use crate::error::{Error, Result};
 
 /// A diffuse (Lambertian) material, one-sided.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Material {
     pub name: String,
     /// Reflectance ρ, RGB in 0..=1; multiplied by the texture where there is one.
     pub kd: [f32; 3],
     /// Reflectance texture, linear RGB.
     pub map_kd: Option<Arc<Texture>>,
+    /// Relief: heights times `height_scale` stand on the surface.
+    pub map_height: Option<Arc<HeightMap>>,
+    /// Scene units that a value of 1 in the height map stands above a value of 0.
+    pub height_scale: f32,
+    /// Normals of the relief; derived from the heights where there is none.
+    pub map_normal: Option<Arc<NormalMap>>,
     /// Emitted radiance Le, W·m⁻²·sr⁻¹, RGB.
     pub ke: [f32; 3],
+}
+
+impl Default for Material {
+    /// Black, without a name; a height map, once given, is in scene units.
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            kd: [0.0; 3],
+            map_kd: None,
+            map_height: None,
+            height_scale: 1.0,
+            map_normal: None,
+            ke: [0.0; 3],
+        }
+    }
 }
 
 /// Reflectance of a surface about which the file says nothing.
@@ -46,6 +67,15 @@ impl Material {
             ));
         }
         Ok(())
+    }
+
+    /// Whether it has a relief: a height map that is not flat.
+    pub fn has_relief(&self) -> bool {
+        self.height_scale != 0.0
+            && self
+                .map_height
+                .as_ref()
+                .is_some_and(|map| !map.is_constant())
     }
 
     /// Whether it sends light of its own.

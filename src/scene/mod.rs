@@ -15,6 +15,7 @@ mod camera;
 mod check;
 mod hash;
 mod load;
+mod maps;
 mod material;
 mod mtl;
 mod obj;
@@ -31,6 +32,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 pub use load::{BuiltinOptions, load};
+pub use maps::{HeightMap, NormalMap};
 pub use material::Material;
 pub use texture::Texture;
 pub use write::write_scene;

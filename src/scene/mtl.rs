@@ -53,6 +53,7 @@ pub(super) fn read(path: &Path, textures: &mut TextureCache) -> Result<Library> 
                 .map_or([0.0; 3], |ke| ke.map(|c| c as f32)),
             name: material.name,
             map_kd,
+            ..Material::default()
         };
         material.check().map_err(|what| Error::Material {
             path: path.to_owned(),
