@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::elements::Elements;
 use crate::error::Result;
+use crate::meso::Relief;
 use crate::scene::Scene;
 use crate::solution::Solution;
 use crate::solver::{Settings, Solver, Update};
@@ -16,7 +17,8 @@ pub fn bake(
     settings: &Settings,
     go_on: impl FnMut(&Update) -> bool,
 ) -> Result<Solution> {
-    let mut solver = Solver::new(device, Elements::new(scene), &scene.point_lights, settings)?;
+    let elements = elements(device, scene, settings)?;
+    let mut solver = Solver::new(device, elements, &scene.point_lights, settings)?;
     solver.run(go_on)?;
     let mut report = solver.report().clone();
     report.skipped.degenerate_triangles = scene.dropped_degenerate as u64;
@@ -26,4 +28,12 @@ pub fn bake(
         &solver.light()?,
         report,
     ))
+}
+
+/// The elements of a scene, with their relief where `settings` want it.
+pub fn elements(device: &Arc<Device>, scene: &Scene, settings: &Settings) -> Result<Elements> {
+    let mut elements = Elements::new(scene);
+    let relief = Relief::new(device, scene, &elements, &settings.relief)?;
+    elements.set_relief(relief);
+    Ok(elements)
 }

@@ -100,7 +100,8 @@ impl Connections {
 const CHART_ANGLE_COSINE: f64 = 0.93969; // 20°
 
 /// Charts, each a list of elements: grown over edges from the first free element in `order` while the normals stay near
-/// the first one's. Elements that emit never share a chart with those that do not, nor with another material.
+/// the first one's. Elements that emit never share a chart with those that do not, nor with another
+/// material; nor do elements with a relief with those without.
 pub fn charts(elements: &Elements, connections: &Connections, order: &[u32]) -> Vec<Vec<u32>> {
     let mut taken = vec![false; elements.len()];
     let mut charts = Vec::new();
@@ -113,6 +114,7 @@ pub fn charts(elements: &Elements, connections: &Connections, order: &[u32]) -> 
             let (e, s) = (e as usize, seed as usize);
             let emits = |i: usize| elements.emitted[i].max_element() > 0.0;
             elements.normal[e].dot(axis) >= CHART_ANGLE_COSINE
+                && elements.is_meso(e) == elements.is_meso(s)
                 && emits(e) == emits(s)
                 && (!emits(e) || elements.material[e] == elements.material[s])
         };

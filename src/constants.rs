@@ -25,4 +25,10 @@ shared! {
     /// Binary digits behind the point of a form factor summed by integer atomics. A hemicube's whole sum is 1, so that
     /// 64 bits hold it eight times over, and the rounding of a pixel is 2⁻⁶² of it.
     FIXED_POINT_BITS = 61;
+    /// Most directions of a meso element.
+    MOST_DIRECTIONS = 64;
+    /// Azimuths in which the horizon of a relief's facet is kept.
+    AZIMUTHS = 128;
+    /// A side of the grid of rays from each facet of a relief to the facets that it sees; RAY_STRATA² rays.
+    RAY_STRATA = 8;
 }

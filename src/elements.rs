@@ -9,6 +9,7 @@ use std::f64::consts::PI;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use crate::meso::Relief;
 use crate::scene::Scene;
 
 /// Steps of an internal coordinate in a unit: finer than f32, coarser than what an offset of 10⁶ units leaves of f64, so
@@ -39,6 +40,8 @@ pub struct Elements {
     pub material: Vec<u32>,
     /// Place of the element in the scene's list of triangles.
     pub input_index: Vec<u32>,
+    /// The relief of those that have one; none where no element has.
+    pub relief: Option<Relief>,
 }
 
 impl Elements {
@@ -95,6 +98,7 @@ impl Elements {
             material: scene.triangles.iter().map(|t| t.material).collect(),
             input_index: (0..scene.triangles.len() as u32).collect(),
             vertices,
+            relief: None,
         }
     }
 
@@ -125,6 +129,9 @@ impl Elements {
         apply(&mut self.emitted, order);
         apply(&mut self.material, order);
         apply(&mut self.input_index, order);
+        if let Some(relief) = &mut self.relief {
+            relief.permute(order);
+        }
     }
 
     /// Values by internal order brought to the order of the input.
@@ -145,11 +152,33 @@ impl Elements {
             .fold(0.0, f64::max)
     }
 
-    /// Largest reflectance of any element and colour.
+    /// Largest reflectance of any element and colour; of an element with a relief, the largest share of the light from
+    /// any direction that comes back.
     pub fn max_reflectance(&self) -> f32 {
-        self.reflectance
-            .iter()
-            .map(|r| r.max_element())
-            .fold(0.0, f32::max)
+        let plain = (0..self.len())
+            .filter(|&e| !self.is_meso(e))
+            .map(|e| self.reflectance[e].max_element())
+            .fold(0.0, f32::max);
+        let relief = self.relief.as_ref().map_or(0.0, Relief::highest_albedo);
+        plain.max(relief)
+    }
+
+    /// Whether an element has a relief.
+    pub fn is_meso(&self, element: usize) -> bool {
+        self.relief
+            .as_ref()
+            .is_some_and(|relief| relief.is_meso(element))
+    }
+
+    /// Gives the elements their relief. What they emit is then the mean of what leaves the tile.
+    pub fn set_relief(&mut self, relief: Option<Relief>) {
+        if let Some(relief) = &relief {
+            for (e, emitted) in self.emitted.iter_mut().enumerate() {
+                if relief.is_meso(e) {
+                    *emitted *= relief.response(e).mean_emission;
+                }
+            }
+        }
+        self.relief = relief;
     }
 }

@@ -10,8 +10,9 @@ use serde::{Deserialize, Serialize};
 use crate::atomic_file::write_atomically;
 use crate::elements::Elements;
 use crate::error::{Error, Result};
+use crate::meso::Relief;
 use crate::scene::Scene;
-use crate::solver::{Light, Report};
+use crate::solver::{Light, ReliefLight, Report};
 
 /// Version of the file's layout.
 pub const VERSION: &str = "1";
@@ -29,9 +30,64 @@ pub struct Solution {
     pub irradiance: Vec<Vec3>,
     /// W·m⁻², RGB, straight from emitters and point lights.
     pub irradiance_direct: Vec<Vec3>,
-    /// W·m⁻², RGB: πLe + ρE.
+    /// W·m⁻², RGB: πLe + ρE; of an element with a relief, the mean of what it sends.
     pub radiosity: Vec<Vec3>,
+    /// Light by direction of the elements with a relief; none where no element has one.
+    pub relief: Option<DirectionalLight>,
     pub report: Report,
+}
+
+/// Light by direction, `[meso element]` in the order of the input; slots as in [`crate::directions::Directions`].
+pub struct DirectionalLight {
+    /// Triangles of the input.
+    pub elements: Vec<u32>,
+    /// Middles of the slots in the tangent frame, `[slot]`.
+    pub directions: Vec<DVec3>,
+    /// Tangent (along u), bitangent (along v) and normal.
+    pub frames: Vec<[Vec3; 3]>,
+    /// ∫ L ω dω in the tangent frame, `[meso element][slot][colour]`, W·m⁻².
+    pub incident_moment: Vec<[Vec3; 3]>,
+    /// Of this what comes straight from emitters and point lights.
+    pub incident_moment_direct: Vec<[Vec3; 3]>,
+    /// πL sent into each slot, `[meso element][slot]`, RGB, W·m⁻².
+    pub exitant: Vec<Vec3>,
+}
+
+impl DirectionalLight {
+    fn new(elements: &Elements, relief: &Relief, light: &ReliefLight) -> Self {
+        let k = relief.directions.count();
+        let mut order: Vec<usize> = (0..light.elements.len()).collect();
+        let input = |m: usize| elements.input_index[light.elements[m] as usize];
+        order.sort_by_key(|&m| input(m));
+        let slots = |m: usize| m * k..(m + 1) * k;
+        Self {
+            elements: order.iter().map(|&m| input(m)).collect(),
+            directions: (0..k).map(|slot| relief.directions.centre(slot)).collect(),
+            frames: order
+                .iter()
+                .map(|&m| light.elements[m] as usize)
+                .map(|e| {
+                    [
+                        relief.tangent[e],
+                        relief.bitangent[e],
+                        elements.normal[e].as_vec3(),
+                    ]
+                })
+                .collect(),
+            incident_moment: order
+                .iter()
+                .flat_map(|&m| light.moments[slots(m)].to_vec())
+                .collect(),
+            incident_moment_direct: order
+                .iter()
+                .flat_map(|&m| light.moments_direct[slots(m)].to_vec())
+                .collect(),
+            exitant: order
+                .iter()
+                .flat_map(|&m| light.exitant[slots(m)].to_vec())
+                .collect(),
+        }
+    }
 }
 
 /// Where a bake's scene came from: enough to read it again.
@@ -57,6 +113,11 @@ impl Solution {
             irradiance: elements.to_input_order(&light.irradiance),
             irradiance_direct: elements.to_input_order(&light.irradiance_direct),
             radiosity: elements.to_input_order(&light.radiosity),
+            relief: elements
+                .relief
+                .as_ref()
+                .zip(light.relief.as_ref())
+                .map(|(relief, light)| DirectionalLight::new(elements, relief, light)),
             report,
         }
     }
@@ -89,7 +150,7 @@ impl Solution {
         };
         let rgb = |values: &[Vec3]| floats(&mut values.iter().flat_map(Vec3::to_array));
         let material: Vec<u8> = self.material.iter().flat_map(|m| m.to_le_bytes()).collect();
-        let parts: [(&str, Dtype, Vec<usize>, Vec<u8>); 7] = [
+        let mut parts: Vec<(&str, Dtype, Vec<usize>, Vec<u8>)> = vec![
             (
                 "vertices",
                 Dtype::F32,
@@ -134,6 +195,37 @@ impl Solution {
                 rgb(&self.radiosity),
             ),
         ];
+        if let Some(relief) = &self.relief {
+            let (m, k) = (relief.elements.len(), relief.directions.len());
+            let blocks = |values: &[[Vec3; 3]]| {
+                floats(&mut values.iter().flatten().flat_map(Vec3::to_array))
+            };
+            let words = relief
+                .elements
+                .iter()
+                .flat_map(|e| e.to_le_bytes())
+                .collect();
+            let directions: Vec<Vec3> = relief.directions.iter().map(|d| d.as_vec3()).collect();
+            let f32s = Dtype::F32;
+            parts.extend([
+                ("meso_elements", Dtype::U32, vec![m], words),
+                ("directions", f32s, vec![k, 3], rgb(&directions)),
+                ("meso_frames", f32s, vec![m, 3, 3], blocks(&relief.frames)),
+                (
+                    "incident_moment",
+                    f32s,
+                    vec![m, k, 3, 3],
+                    blocks(&relief.incident_moment),
+                ),
+                (
+                    "incident_moment_direct",
+                    f32s,
+                    vec![m, k, 3, 3],
+                    blocks(&relief.incident_moment_direct),
+                ),
+                ("exitant", f32s, vec![m, k, 3], rgb(&relief.exitant)),
+            ]);
+        }
         let tensors = parts
             .iter()
             .map(|(name, dtype, shape, bytes)| {

@@ -77,6 +77,8 @@ pub struct Sources {
     pub black: usize,
     /// Chart of each element, for the meshlets.
     pub chart: Vec<u32>,
+    /// Those whose elements have a relief: a range of the list.
+    pub relief: std::ops::Range<usize>,
 }
 
 /// Orders the elements and groups them. `seed` turns each hemicube about its axis by an angle of its own, which keeps the
@@ -98,10 +100,10 @@ pub fn build(
     let mut order = Vec::with_capacity(elements.len());
     let mut groups = Vec::new();
     let mut chart_of = Vec::with_capacity(elements.len());
-    for (c, chart) in charts(elements, &connections, &morton_order(elements))
-        .into_iter()
-        .enumerate()
-    {
+    let mut charts = charts(elements, &connections, &morton_order(elements));
+    // Elements with a relief come last, and so do their sources.
+    charts.sort_by_key(|chart| elements.is_meso(chart[0] as usize));
+    for (c, chart) in charts.into_iter().enumerate() {
         let mut stack = vec![chart];
         while let Some(mut members) = stack.pop() {
             let area = members.iter().map(|&e| elements.area[e as usize]).sum();
@@ -124,9 +126,14 @@ pub fn build(
         list: Vec::with_capacity(groups.len()),
         black: 0,
         chart: chart_of,
+        relief: 0..0,
     };
     let can_shoot = |e: usize| (elements.reflectance[e] + elements.emitted[e]).max_element() > 0.0;
+    let mut plain = None;
     for (first, count) in groups {
+        if elements.is_meso(first as usize) {
+            plain.get_or_insert(sources.list.len());
+        }
         let range = first as usize..(first + count) as usize;
         if !range.clone().any(can_shoot) {
             sources.black += 1;
@@ -148,6 +155,7 @@ pub fn build(
             }
         }
     }
+    sources.relief = plain.unwrap_or(sources.list.len())..sources.list.len();
     for light in lights {
         sources.list.extend(point(light, elements));
     }

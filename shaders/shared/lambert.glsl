@@ -16,10 +16,35 @@ float angle_over_sine(float x) {
     return x >= 0.0 ? g : 3.14159265 * inversesqrt(max(1.0 - x * x, 1e-14)) - g;
 }
 
-// One edge a → b seen from the origin by a receiver with normal n: its angle times the cosine of its plane to n.
-float edge_term(vec3 a, vec3 b, vec3 n) {
+// What edges sum up to: the form factor, or with VECTOR_FLUX the vector whose dot product with n is the form factor.
+#ifdef VECTOR_FLUX
+#define FLUX vec3
+#else
+#define FLUX float
+#endif
+
+// A vector as it counts for a receiver with normal n.
+FLUX flux(vec3 v, vec3 n) {
+#ifdef VECTOR_FLUX
+    return v;
+#else
+    return dot(v, n);
+#endif
+}
+
+// Nothing where the receiver would take less than nothing.
+FLUX flux_above(FLUX f, vec3 n) {
+#ifdef VECTOR_FLUX
+    return dot(f, n) > 0.0 ? f : vec3(0.0);
+#else
+    return max(f, 0.0);
+#endif
+}
+
+// One edge a → b seen from the origin by a receiver with normal n: its angle times the unit normal of its plane.
+FLUX edge_term(vec3 a, vec3 b, vec3 n) {
     float scale = inversesqrt(max(dot(a, a) * dot(b, b), 1e-38));
-    return dot(cross(a, b), n) * scale * angle_over_sine(clamp(dot(a, b) * scale, -1.0, 1.0));
+    return flux(cross(a, b), n) * scale * angle_over_sine(clamp(dot(a, b) * scale, -1.0, 1.0));
 }
 
 // The crossing of a → b with the receiver's horizon, ha and hb being their heights above it.
@@ -31,7 +56,7 @@ const float INV_TWO_PI = 0.15915494;
 
 // A closed contour, clipped to the horizon of n while its edges stream by (Sutherland–Hodgman).
 struct Contour {
-    float sum;
+    FLUX sum;
     bool left;         // gone below the horizon at exit_point
     bool entered;      // came up at first_entry before it ever left
     vec3 exit_point;
@@ -39,7 +64,7 @@ struct Contour {
 };
 
 Contour contour_begin() {
-    return Contour(0.0, false, false, vec3(0.0), vec3(0.0));
+    return Contour(FLUX(0.0), false, false, vec3(0.0), vec3(0.0));
 }
 
 // The edge p → q, seen from the receiver.
@@ -76,6 +101,6 @@ void contour_close(inout Contour c, vec3 n) {
 }
 
 // Form factor from the receiver to what the contour encloses, positive for contours counter-clockwise from their front.
-float contour_form_factor(Contour c) {
+FLUX contour_form_factor(Contour c) {
     return -c.sum * INV_TWO_PI;
 }

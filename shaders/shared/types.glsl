@@ -72,3 +72,17 @@ struct Progress {
     uint shots;              // so far, this batch included
     uint selected;           // in this batch
 };
+
+// An element with a relief.
+struct MesoElement {
+    vec3 tangent;       // along growing u
+    uint response;      // index of its relief's response
+    vec3 bitangent;     // along growing v
+    vec3 scale;         // its own reflectance over the tile's mean
+};
+
+// Reflected radiosity of an element with a relief, with the rounding error of its last sum.
+struct Reflected {
+    vec3 sum;
+    vec3 error;
+};

@@ -7,7 +7,11 @@ pub mod buffers;
 pub mod cull;
 pub mod item_buffer;
 pub mod measure;
+pub mod measure_relief;
+pub mod relief_buffers;
+pub mod relief_visibility;
 pub mod select;
+pub mod send_relief;
 pub mod shade;
 pub mod types;
 

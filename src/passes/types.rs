@@ -139,3 +139,21 @@ pub struct Progress {
     pub shots: u32,
     pub selected: u32,
 }
+
+/// An element with a relief.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct MesoElement {
+    pub tangent: Vec3,
+    pub response: u32,
+    pub bitangent: Vec3,
+    pub scale: Vec3,
+}
+
+/// Reflected radiosity of an element with a relief, with the rounding error of its last sum.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct Reflected {
+    pub sum: Vec3,
+    pub error: Vec3,
+}

@@ -7,12 +7,15 @@ use crate::constants::FACES;
 use crate::error::Result;
 use crate::hemicube::pixel_count;
 use crate::passes::bin_pixels::{self, BinPixels};
-use crate::passes::bin_receivers::BinReceivers;
+use crate::passes::bin_receivers::{BinReceivers, BinRelief, ReliefSets};
 use crate::passes::buffers::{Batch, SceneBuffers, State, download};
 use crate::passes::cull::Cull;
 use crate::passes::item_buffer::ItemBuffer;
 use crate::passes::measure::Measure;
+use crate::passes::measure_relief::MeasureRelief;
+use crate::passes::relief_buffers::ReliefBuffers;
 use crate::passes::select::{Parameters, Select};
+use crate::passes::send_relief::SendRelief;
 use crate::passes::types::{Draw, Progress, Slot};
 use crate::vk::{Buffer, BufferUse, Commands, DescriptorSet, Device, Stage, Timestamps};
 
@@ -60,7 +63,15 @@ struct Passes {
 #[allow(clippy::large_enum_variant)] // one of each lives as long as the solver
 enum Bin {
     Receivers(BinReceivers),
+    Relief(ReliefPasses),
     Pixels(BinPixels),
+}
+
+/// What only scenes with relief compile.
+struct ReliefPasses {
+    measure: MeasureRelief,
+    send: SendRelief,
+    bin: BinRelief,
 }
 
 struct Sets {
@@ -74,6 +85,11 @@ struct Sets {
 #[allow(clippy::large_enum_variant)] // as `Bin`
 enum BinSets {
     Receivers(DescriptorSet),
+    Relief {
+        measure: DescriptorSet,
+        send: DescriptorSet,
+        bin: ReliefSets,
+    },
     Pixels(bin_pixels::Buffers),
 }
 
@@ -87,6 +103,7 @@ impl BatchLoop {
         batch: Batch,
         scene: &SceneBuffers,
         state: &State,
+        relief: Option<&ReliefBuffers>,
         stop_power: f64,
     ) -> Result<Self> {
         let passes = Passes {
@@ -94,9 +111,14 @@ impl BatchLoop {
             select: Select::new(device)?,
             cull: Cull::new(device, settings.culling)?,
             item_buffer,
-            bin: match settings.estimator {
-                Estimator::Receiver => Bin::Receivers(BinReceivers::new(device)?),
-                Estimator::Pixel => Bin::Pixels(BinPixels::new(device)?),
+            bin: match (settings.estimator, relief) {
+                (Estimator::Receiver, Some(_)) => Bin::Relief(ReliefPasses {
+                    measure: MeasureRelief::new(device)?,
+                    send: SendRelief::new(device)?,
+                    bin: BinRelief::new(device)?,
+                }),
+                (Estimator::Receiver, None) => Bin::Receivers(BinReceivers::new(device)?),
+                (Estimator::Pixel, _) => Bin::Pixels(BinPixels::new(device)?),
             },
         };
         let sets = Sets {
@@ -104,9 +126,15 @@ impl BatchLoop {
             select: passes.select.bind(scene, state, &batch)?,
             cull: passes.cull.bind(scene, &batch)?,
             item_buffer: passes.item_buffer.bind(&batch)?,
-            bin: match &passes.bin {
-                Bin::Receivers(bin) => BinSets::Receivers(bin.bind(scene, state, &batch)?),
-                Bin::Pixels(bin) => BinSets::Pixels(bin.bind(device, scene, state, &batch)?),
+            bin: match (&passes.bin, relief) {
+                (Bin::Receivers(bin), _) => BinSets::Receivers(bin.bind(scene, state, &batch)?),
+                (Bin::Relief(passes), Some(relief)) => BinSets::Relief {
+                    measure: passes.measure.bind(scene, state, relief)?,
+                    send: passes.send.bind(scene, &batch, relief)?,
+                    bin: passes.bin.bind(scene, state, &batch, relief)?,
+                },
+                (Bin::Relief(_), None) => unreachable!("made for a scene with relief"),
+                (Bin::Pixels(bin), _) => BinSets::Pixels(bin.bind(device, scene, state, &batch)?),
             },
         };
         let select = Parameters {
@@ -135,8 +163,15 @@ impl BatchLoop {
                     .measure
                     .record(cmd, &sets.measure, scene.source_count);
                 cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+                measure_relief(cmd, &passes, &sets, relief);
                 passes.select.record(cmd, &sets.select, &select);
                 cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+                if let (Bin::Relief(passes), BinSets::Relief { send, .. }, Some(relief)) =
+                    (&passes.bin, &sets.bin, relief)
+                {
+                    passes.send.record(cmd, send, relief, &batch);
+                    cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+                }
                 cmd.timestamp(stamps, 1);
                 passes.cull.record(cmd, &sets.cull, scene, &batch);
                 cmd.barrier(&[Stage::Compute], &[Stage::Draw]);
@@ -148,6 +183,11 @@ impl BatchLoop {
                 match (&passes.bin, &sets.bin) {
                     (Bin::Receivers(bin), BinSets::Receivers(set)) => {
                         bin.record(cmd, set, scene, &batch);
+                    }
+                    (Bin::Relief(passes), BinSets::Relief { bin, .. }) => {
+                        if let Some(relief) = relief {
+                            passes.bin.record(cmd, bin, relief, &batch);
+                        }
                     }
                     (Bin::Pixels(bin), BinSets::Pixels(buffers)) => {
                         bin.record(cmd, buffers, scene, &batch);
@@ -166,6 +206,7 @@ impl BatchLoop {
                 .measure
                 .record(cmd, &sets.measure, scene.source_count);
             cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+            measure_relief(cmd, &passes, &sets, relief);
             let none = Parameters {
                 shot_limit: 0,
                 ..select
@@ -247,6 +288,16 @@ impl BatchLoop {
             readback.read(0, texels),
             slots.iter().map(|s| s.source).collect(),
         ))
+    }
+}
+
+/// The unshot light of the sources with a relief, over what [`Measure`] took them for.
+fn measure_relief(cmd: &Commands, passes: &Passes, sets: &Sets, relief: Option<&ReliefBuffers>) {
+    if let (Bin::Relief(passes), BinSets::Relief { measure, .. }, Some(relief)) =
+        (&passes.bin, &sets.bin, relief)
+    {
+        passes.measure.record(cmd, measure, relief);
+        cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
     }
 }
 

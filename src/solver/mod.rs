@@ -4,6 +4,7 @@
 //! device chooses what to shoot and when to stop, and the CPU looks on one batch behind.
 
 mod batch;
+mod relief_light;
 mod report;
 mod self_test;
 
@@ -15,15 +16,18 @@ use glam::Vec3;
 use crate::charts::Connections;
 use crate::elements::Elements;
 use crate::error::{Error, Result};
+use crate::meso;
 use crate::passes::buffers::{Batch, SceneBuffers, State, download};
 use crate::passes::cull::Culling;
 use crate::passes::item_buffer::ItemBuffer;
-use crate::passes::types::Progress;
+use crate::passes::relief_buffers::ReliefBuffers;
+use crate::passes::types::{Progress, Reflected};
 use crate::scene::PointLight;
 use crate::sources::{self, Grouping, Sources};
 use crate::vk::Device;
 
 use batch::BatchLoop;
+pub use relief_light::ReliefLight;
 pub use report::{Report, Seconds, Skipped, StopReason};
 pub use self_test::{ids_come_back_right, open_device};
 
@@ -53,6 +57,8 @@ pub struct Settings {
     pub culling: Culling,
     /// Sources of a batch, at most.
     pub batch: u32,
+    /// How relief takes part; see [`crate::bake::elements`].
+    pub relief: meso::Options,
 }
 
 impl Default for Settings {
@@ -67,6 +73,7 @@ impl Default for Settings {
             grouping: Grouping::default(),
             culling: Culling::default(),
             batch: 16,
+            relief: meso::Options::default(),
         }
     }
 }
@@ -115,6 +122,8 @@ pub struct Light {
     pub irradiance_direct: Vec<Vec3>,
     pub irradiance: Vec<Vec3>,
     pub radiosity: Vec<Vec3>,
+    /// Of the elements with a relief; none where no element has one.
+    pub relief: Option<ReliefLight>,
 }
 
 /// A scene on the device with its solution under way.
@@ -128,6 +137,7 @@ pub struct Solver {
     batches: BatchLoop,
     scene: SceneBuffers,
     state: State,
+    relief: Option<ReliefBuffers>,
     report: Report,
     emitted_power: f64,
     setup: Duration,
@@ -142,6 +152,11 @@ impl Solver {
         settings: &Settings,
     ) -> Result<Self> {
         settings.check()?;
+        if settings.estimator == Estimator::Pixel && elements.relief.is_some() {
+            return Err(Error::Usage(
+                "--estimator pixel knows no directions: use --transport lambert or --estimator receiver".into(),
+            ));
+        }
         let start = Instant::now();
         let (sources, connections) =
             sources::build(&mut elements, lights, &settings.grouping, settings.seed);
@@ -151,6 +166,11 @@ impl Solver {
         let wanted = settings.batch.clamp(1, scene.source_count.max(1));
         let slots = Batch::fitting_slots(device, &scene, settings.hemicube, wanted);
         let batch = Batch::new(device, &item_buffer.pass, &scene, settings.hemicube, slots)?;
+        let relief = elements
+            .relief
+            .as_ref()
+            .map(|relief| ReliefBuffers::new(device, &elements, relief, &sources, slots))
+            .transpose()?;
         let emitted_power: f64 = sources
             .list
             .iter()
@@ -166,6 +186,7 @@ impl Solver {
             batch,
             &scene,
             &state,
+            relief.as_ref(),
             stop_power,
         )?;
         let mut report = Report::new(device, settings, &elements, &sources, slots);
@@ -179,6 +200,7 @@ impl Solver {
             batches,
             scene,
             state,
+            relief,
             report,
             emitted_power,
             setup: start.elapsed(),
@@ -259,13 +281,26 @@ impl Solver {
         let direct: Vec<Vec3> = download(&self.device, &self.state.direct, count)?;
         let indirect: Vec<Vec3> = download(&self.device, &self.state.indirect, count)?;
         let irradiance: Vec<Vec3> = direct.iter().zip(&indirect).map(|(d, i)| d + i).collect();
-        let radiosity = (0..count)
+        let mut radiosity: Vec<Vec3> = (0..count)
             .map(|e| self.elements.emitted[e] + self.elements.reflectance[e] * irradiance[e])
             .collect();
+        let relief = match (&self.relief, &self.elements.relief) {
+            (Some(buffers), Some(relief)) => {
+                let light = ReliefLight::download(&self.device, &self.elements, relief, buffers)?;
+                let reflected: Vec<Reflected> =
+                    download(&self.device, &buffers.reflected, light.elements.len())?;
+                for (&e, reflected) in light.elements.iter().zip(&reflected) {
+                    radiosity[e as usize] = self.elements.emitted[e as usize] + reflected.sum;
+                }
+                Some(light)
+            }
+            _ => None,
+        };
         Ok(Light {
             irradiance_direct: direct,
             irradiance,
             radiosity,
+            relief,
         })
     }
 

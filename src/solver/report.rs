@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::{BatchResult, Estimator, Settings};
 use crate::elements::Elements;
+use crate::meso::{Class, Relief, Transport};
 use crate::passes::cull::Culling;
 use crate::sources::Sources;
 use crate::vk::Device;
@@ -67,10 +68,33 @@ pub struct Report {
     pub stop: StopReason,
     pub seconds: Seconds,
     pub skipped: Skipped,
+    /// Elements that receive and send by direction, and into how many; null where none does.
+    pub relief: Option<ReliefReport>,
     #[serde(skip)]
     meshlets: u64,
     #[serde(skip)]
     culls: bool,
+}
+
+/// What was relief, and how.
+#[derive(Debug, Clone, Serialize)]
+pub struct ReliefReport {
+    pub elements: u64,
+    pub directions: u32,
+    pub transport: Transport,
+    /// One for each material and size of its tiles.
+    pub classes: Vec<Class>,
+}
+
+impl ReliefReport {
+    fn new(relief: &Relief) -> Self {
+        Self {
+            elements: relief.count() as u64,
+            directions: relief.directions.count() as u32,
+            transport: relief.transport,
+            classes: relief.classes.clone(),
+        }
+    }
 }
 
 impl Report {
@@ -102,6 +126,7 @@ impl Report {
                 black_sources: sources.black as u64,
                 ..Skipped::default()
             },
+            relief: elements.relief.as_ref().map(ReliefReport::new),
             meshlets: 0,
             culls: settings.culling != Culling::Off,
         }

@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use mesolux::elements::Elements;
-use mesolux::scene::{Material, PointLight, Scene, Triangle};
+use mesolux::scene::{HeightMap, Material, PointLight, Scene, Triangle};
+use mesolux::solver::ReliefLight;
 use mesolux::solver::{Light, Report, Settings, Solver, open_device};
 use mesolux::vk::{Device, validation_log};
 
@@ -191,6 +192,31 @@ impl Build {
         first..self.scene.triangles.len()
     }
 
+    /// Gives a material a relief of so many texels a side, `height` over 0..1 × 0..1, in scene units.
+    pub fn relief(&mut self, material: u32, size: u32, height: impl Fn(f64, f64) -> f64) {
+        let centre = |i: u32| (f64::from(i) + 0.5) / f64::from(size);
+        let values = (0..size)
+            .flat_map(|row| (0..size).map(move |column| (column, size - 1 - row)))
+            .map(|(i, j)| height(centre(i), centre(j)) as f32)
+            .collect();
+        self.scene.materials[material as usize].map_height = Some(Arc::new(HeightMap {
+            path: "test".into(),
+            width: size,
+            height: size,
+            values,
+        }));
+    }
+
+    /// Texture coordinates along two directions, one repeat for the length of each.
+    pub fn uv(&mut self, triangles: std::ops::Range<usize>, u: DVec3, v: DVec3) {
+        for t in &mut self.scene.triangles[triangles] {
+            t.uv = t.vertices.map(|i| {
+                let p = self.scene.vertices[i as usize];
+                [p.dot(u) / u.length_squared(), p.dot(v) / v.length_squared()].map(|x| x as f32)
+            });
+        }
+    }
+
     /// Joins equal positions, as reading a file does.
     pub fn weld(&mut self) {
         let mut places = std::collections::HashMap::new();
@@ -218,11 +244,10 @@ impl Build {
     }
 
     pub fn solve(&self, settings: &Settings) -> Solved {
-        solve(
-            Elements::new(&self.scene),
-            &self.scene.point_lights,
-            settings,
-        )
+        let device = device();
+        let elements = mesolux::bake::elements(&device, &self.scene, settings)
+            .expect("the relief fits the device");
+        solve(elements, &self.scene.point_lights, settings)
     }
 }
 
@@ -232,6 +257,8 @@ pub struct Solved {
     pub irradiance: Vec<Vec3>,
     pub direct: Vec<Vec3>,
     pub radiosity: Vec<Vec3>,
+    /// In internal order.
+    pub relief: Option<ReliefLight>,
     pub report: Report,
 }
 
@@ -254,6 +281,7 @@ pub fn solve(elements: Elements, lights: &[PointLight], settings: &Settings) -> 
         irradiance_direct,
         irradiance,
         radiosity,
+        relief,
     } = solver.light().expect("the device gives the solution");
     let e = &solver.elements;
     let solved = Solved {
@@ -261,6 +289,7 @@ pub fn solve(elements: Elements, lights: &[PointLight], settings: &Settings) -> 
         irradiance: e.to_input_order(&irradiance),
         direct: e.to_input_order(&irradiance_direct),
         radiosity: e.to_input_order(&radiosity),
+        relief,
         report: solver.report().clone(),
     };
     assert_silent();

@@ -1,0 +1,251 @@
+//! Directions ↔ slots: the hemisphere about z in K cells of equal solid angle. Pure mathematics in f64;
+//! `shaders/shared/directions.glsl` is the same in f32.
+//!
+//! The square −1..1 × −1..1 is laid over the hemisphere by the concentric map (Shirley and Chiu 1997), which keeps areas:
+//! its cells are the slots. The K of the paper are 4 × 4, 4 × 8 and 8 × 8. Slot index: `row · columns + column`.
+
+use std::f64::consts::{FRAC_PI_4, PI};
+
+use glam::{DVec2, DVec3};
+
+use crate::error::{Error, Result};
+
+/// How the hemisphere is cut into slots.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Directions {
+    pub columns: u32,
+    pub rows: u32,
+}
+
+/// Cells along a side of the square for integrals over slots: every K's cells are whole numbers of them.
+pub const FINE: u32 = 32;
+
+impl Directions {
+    /// # Errors
+    /// A number of slots other than 16, 32 and 64.
+    pub fn new(slots: u32) -> Result<Self> {
+        match slots {
+            16 => Ok(Self {
+                columns: 4,
+                rows: 4,
+            }),
+            32 => Ok(Self {
+                columns: 4,
+                rows: 8,
+            }),
+            64 => Ok(Self {
+                columns: 8,
+                rows: 8,
+            }),
+            other => Err(Error::Usage(format!(
+                "--directions {other}: must be 16, 32 or 64"
+            ))),
+        }
+    }
+
+    pub fn count(&self) -> usize {
+        (self.columns * self.rows) as usize
+    }
+
+    /// The slot of a direction (unit, z up); one below the horizon counts as on it.
+    pub fn slot_of(&self, direction: DVec3) -> usize {
+        let [column, row] = self.cell_coordinates(direction).to_array();
+        let cell = |at: f64, size: u32| (at.max(0.0) as u32).min(size - 1);
+        (cell(row, self.rows) * self.columns + cell(column, self.columns)) as usize
+    }
+
+    /// The direction at the centre of a slot's cell.
+    pub fn centre(&self, slot: usize) -> DVec3 {
+        let (column, row) = (slot as u32 % self.columns, slot as u32 / self.columns);
+        from_square(DVec2::new(
+            (2.0 * f64::from(column) + 1.0) / f64::from(self.columns) - 1.0,
+            (2.0 * f64::from(row) + 1.0) / f64::from(self.rows) - 1.0,
+        ))
+    }
+
+    /// The four slots about a direction with their weights, bilinear between the cells' centres and held at the border of
+    /// the square; the weights sum to 1, and one slot may occur twice.
+    pub fn bilinear(&self, direction: DVec3) -> [(usize, f64); 4] {
+        let at = self.cell_coordinates(direction) - 0.5;
+        let split = |at: f64, size: u32| {
+            let held = at.clamp(0.0, f64::from(size - 1));
+            let low = (held as u32).min(size.saturating_sub(2));
+            (low, held - f64::from(low))
+        };
+        let ((column, x), (row, y)) = (split(at.x, self.columns), split(at.y, self.rows));
+        let slot = |c: u32, r: u32| ((row + r) * self.columns + column + c) as usize;
+        [
+            (slot(0, 0), (1.0 - x) * (1.0 - y)),
+            (slot(1, 0), x * (1.0 - y)),
+            (slot(0, 1), (1.0 - x) * y),
+            (slot(1, 1), x * y),
+        ]
+    }
+
+    /// The fine cells with the slot that each lies in.
+    pub fn fine(&self) -> impl Iterator<Item = (FineCell, usize)> {
+        let each = *self;
+        FineCell::all().map(move |cell| {
+            let column = cell.column * each.columns / FINE;
+            let row = cell.row * each.rows / FINE;
+            (cell, (row * each.columns + column) as usize)
+        })
+    }
+
+    /// Place in the grid of cells, 0..columns × 0..rows.
+    fn cell_coordinates(&self, direction: DVec3) -> DVec2 {
+        let size = DVec2::new(f64::from(self.columns), f64::from(self.rows));
+        (to_square(direction) * 0.5 + 0.5) * size
+    }
+}
+
+/// One of the FINE² cells of equal solid angle that integrals over slots are summed over.
+#[derive(Debug, Clone, Copy)]
+pub struct FineCell {
+    pub column: u32,
+    pub row: u32,
+    /// Through the centre of its square.
+    pub direction: DVec3,
+    /// z from the cell's outer to its inner rim.
+    pub z_range: [f64; 2],
+}
+
+impl FineCell {
+    /// Row-major.
+    pub fn all() -> impl Iterator<Item = Self> {
+        (0..FINE * FINE).map(|i| {
+            let (column, row) = (i % FINE, i / FINE);
+            let centre = |i: u32| (2.0 * f64::from(i) + 1.0) / f64::from(FINE) - 1.0;
+            let square = DVec2::new(centre(column), centre(row));
+            let r = square.abs().max_element();
+            let half = 1.0 / f64::from(FINE);
+            let z = |r: f64| 1.0 - r * r;
+            Self {
+                column,
+                row,
+                direction: from_square(square),
+                z_range: [z(r + half), z(r - half)],
+            }
+        })
+    }
+}
+
+/// Irradiance of a facet with unit normal `n` from the vector moments of the slots: Σ_k (n · m_k)⁺.
+pub fn irradiance(moments: &[DVec3], n: DVec3) -> f64 {
+    moments.iter().map(|m| m.dot(n).max(0.0)).sum()
+}
+
+/// From the square −1..1 to the hemisphere z ≥ 0.
+pub fn from_square(square: DVec2) -> DVec3 {
+    let (a, b) = (square.x, square.y);
+    if a == 0.0 && b == 0.0 {
+        return DVec3::Z;
+    }
+    let (r, angle) = if a.abs() > b.abs() {
+        (a, FRAC_PI_4 * (b / a))
+    } else {
+        (b, 2.0 * FRAC_PI_4 - FRAC_PI_4 * (a / b))
+    };
+    let flat = r * (2.0 - r * r).max(0.0).sqrt();
+    DVec3::new(flat * angle.cos(), flat * angle.sin(), 1.0 - r * r)
+}
+
+/// From the hemisphere to the square; a direction below the horizon is taken to the nearest on it.
+pub fn to_square(direction: DVec3) -> DVec2 {
+    let r = (1.0 - direction.z.clamp(0.0, 1.0)).sqrt();
+    let angle = direction.y.atan2(direction.x);
+    // Quarter of the circle about +x, +y, −x, −y.
+    let turned = if angle < -FRAC_PI_4 {
+        angle + 2.0 * PI
+    } else {
+        angle
+    };
+    let quarter = ((turned + FRAC_PI_4) / (2.0 * FRAC_PI_4))
+        .floor()
+        .clamp(0.0, 3.0);
+    let across = (turned - quarter * 2.0 * FRAC_PI_4) / FRAC_PI_4 * r;
+    match quarter as u32 {
+        0 => DVec2::new(r, across),
+        1 => DVec2::new(-across, r),
+        2 => DVec2::new(-r, -across),
+        _ => DVec2::new(across, -r),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ALL: [u32; 3] = [16, 32, 64];
+
+    #[test]
+    fn round_trips() {
+        for k in ALL {
+            let d = Directions::new(k).expect("a number of the paper");
+            for slot in 0..d.count() {
+                assert_eq!(d.slot_of(d.centre(slot)), slot);
+            }
+            for (cell, slot) in d.fine() {
+                assert_eq!(d.slot_of(cell.direction), slot);
+                let back = from_square(to_square(cell.direction));
+                assert!(back.distance(cell.direction) < 1e-12, "{cell:?}");
+                let weights: f64 = d.bilinear(cell.direction).iter().map(|w| w.1).sum();
+                assert!((weights - 1.0).abs() < 1e-12);
+            }
+        }
+        assert!(Directions::new(17).is_err());
+    }
+
+    /// Cells of one solid angle: the share of random directions in each is 1/K.
+    #[test]
+    fn equal_solid_angles() {
+        for k in ALL {
+            let d = Directions::new(k).expect("a number of the paper");
+            let mut hits = vec![0_u32; d.count()];
+            let (n, m) = (400, 1600);
+            for i in 0..n {
+                for j in 0..m {
+                    // Uniform in z and azimuth.
+                    let z = (f64::from(i) + 0.5) / f64::from(n);
+                    let (sin, cos) = (2.0 * PI * (f64::from(j) + 0.5) / f64::from(m)).sin_cos();
+                    let flat = (1.0 - z * z).sqrt();
+                    hits[d.slot_of(DVec3::new(flat * cos, flat * sin, z))] += 1;
+                }
+            }
+            // A cell's border is some 4 · √(n m / K) samples long, half of which may fall aside.
+            let expected = f64::from(n * m) / d.count() as f64;
+            for h in hits {
+                assert!(
+                    (f64::from(h) - expected).abs() < 3.0 * expected.sqrt(),
+                    "{h} of {expected}"
+                );
+            }
+        }
+    }
+
+    /// A facet tilted 45° under a uniform sky of radiance 1: E = π (1 + cos τ)/2, in every azimuth.
+    #[test]
+    fn tilted_facet_under_a_uniform_sky() {
+        for (k, most) in [(16, 0.035), (32, 0.02), (64, 0.01)] {
+            let d = Directions::new(k).expect("a number of the paper");
+            let mut moments = vec![DVec3::ZERO; d.count()];
+            let weight = 2.0 * PI / f64::from(FINE * FINE);
+            for (cell, slot) in d.fine() {
+                moments[slot] += weight * cell.direction;
+            }
+            let exact = PI * (1.0 + FRAC_PI_4.cos()) / 2.0;
+            let largest = (0..360)
+                .map(|degrees| {
+                    let (sin, cos) = f64::from(degrees).to_radians().sin_cos();
+                    let n = DVec3::new(cos, sin, 1.0) * FRAC_PI_4.cos();
+                    (irradiance(&moments, n) / exact - 1.0).abs()
+                })
+                .fold(0.0, f64::max);
+            println!(
+                "K = {k}: tilted facet, largest error {:.2} %",
+                100.0 * largest
+            );
+            assert!(largest <= most, "K = {k}: {largest}");
+        }
+    }
+}

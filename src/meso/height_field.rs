@@ -1,0 +1,142 @@
+//! One tile of relief as a periodic triangulated surface.
+
+use glam::{DVec2, DVec3};
+
+use crate::scene::{HeightMap, Material};
+
+/// Points along a side of the grid, at most; a larger map is averaged down. 128² points are 32,768 facets.
+pub const MOST_POINTS: u32 = 128;
+
+/// Heights at the points of a periodic grid and the facets between them, mean height 0. Lengths are in widths of a cell:
+/// what a relief does to light does not depend on its scale.
+///
+/// Point (i, j) stands at x = i along u and y = j · aspect along v. The cell above it holds two facets, cut along
+/// the diagonal from (i + 1, j) to (i, j + 1): `2 · (j · columns + i)` below the diagonal, and one more above it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeightField {
+    pub columns: u32,
+    pub rows: u32,
+    /// Height of a cell over its width.
+    pub aspect: f64,
+    /// `[row][column]`, rows along v.
+    pub heights: Vec<f32>,
+}
+
+/// A triangle of the surface.
+#[derive(Debug, Clone, Copy)]
+pub struct Facet {
+    /// x and y in cells, z in widths of a cell.
+    pub centre: DVec3,
+    pub normal: DVec3,
+    pub area: f64,
+}
+
+impl HeightField {
+    /// The relief of a material on a surface where a repeat of the texture is `tile` scene units wide and high.
+    /// None where the material has none.
+    pub fn new(material: &Material, tile: DVec2) -> Option<Self> {
+        let map = material
+            .map_height
+            .as_deref()
+            .filter(|_| material.has_relief())?;
+        let (columns, rows) = (map.width.min(MOST_POINTS), map.height.min(MOST_POINTS));
+        let mean = map.mean();
+        let cell = tile / DVec2::new(f64::from(columns), f64::from(rows));
+        let scale = f64::from(material.height_scale) / cell.x;
+        let heights = (0..rows)
+            .flat_map(|j| (0..columns).map(move |i| (i, j)))
+            .map(|(i, j)| (scale * (average(map, columns, rows, i, j) - mean)) as f32)
+            .collect();
+        Some(Self {
+            columns,
+            rows,
+            aspect: cell.y / cell.x,
+            heights,
+        })
+    }
+
+    pub fn facet_count(&self) -> usize {
+        2 * (self.columns * self.rows) as usize
+    }
+
+    /// Height at a point of the grid; it repeats.
+    pub fn point(&self, i: i64, j: i64) -> f64 {
+        let column = i.rem_euclid(i64::from(self.columns)) as usize;
+        let row = j.rem_euclid(i64::from(self.rows)) as usize;
+        f64::from(self.heights[row * self.columns as usize + column])
+    }
+
+    /// Height of the surface at a place in cells.
+    pub fn height(&self, at: DVec2) -> f64 {
+        let low = at.floor();
+        let (i, j) = (low.x as i64, low.y as i64);
+        let f = at - low;
+        let (right, up) = (self.point(i + 1, j), self.point(i, j + 1));
+        if f.x + f.y <= 1.0 {
+            let corner = self.point(i, j);
+            corner + f.x * (right - corner) + f.y * (up - corner)
+        } else {
+            let corner = self.point(i + 1, j + 1);
+            corner + (1.0 - f.x) * (up - corner) + (1.0 - f.y) * (right - corner)
+        }
+    }
+
+    pub fn facet(&self, facet: usize) -> Facet {
+        let cell = (facet / 2) as i64;
+        let (i, j) = (
+            cell % i64::from(self.columns),
+            cell / i64::from(self.columns),
+        );
+        let (right, up) = (self.point(i + 1, j), self.point(i, j + 1));
+        let (corner, share, slope) = if facet % 2 == 0 {
+            let corner = self.point(i, j);
+            (corner, 1.0 / 3.0, [right - corner, up - corner])
+        } else {
+            let corner = self.point(i + 1, j + 1);
+            (corner, 2.0 / 3.0, [corner - up, corner - right])
+        };
+        let upward = DVec3::new(-slope[0], -slope[1] / self.aspect, 1.0);
+        Facet {
+            centre: DVec3::new(
+                i as f64 + share,
+                j as f64 + share,
+                (corner + right + up) / 3.0,
+            ),
+            normal: upward.normalize(),
+            area: 0.5 * self.aspect * upward.length(),
+        }
+    }
+
+    pub fn highest(&self) -> f64 {
+        self.heights
+            .iter()
+            .map(|&h| f64::from(h))
+            .fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// Root mean square of the slope over the tile.
+    pub fn rms_slope(&self) -> f64 {
+        let sum: f64 = (0..self.facet_count())
+            .map(|q| self.facet(q).normal)
+            .map(|n| (1.0 - n.z * n.z) / (n.z * n.z))
+            .sum();
+        (sum / self.facet_count() as f64).sqrt()
+    }
+}
+
+/// Mean of the texels that point (i, j), counted from the bottom, stands for.
+fn average(map: &HeightMap, columns: u32, rows: u32, i: u32, j: u32) -> f64 {
+    let range = |at: u32, points: u32, size: u32| {
+        let edge = |at: u32| (u64::from(at) * u64::from(size) / u64::from(points)) as u32;
+        edge(at)..edge(at + 1)
+    };
+    let mut sum = 0.0;
+    let mut count = 0;
+    for row in range(rows - 1 - j, rows, map.height) {
+        for column in range(i, columns, map.width) {
+            sum += f64::from(map.values[(row * map.width + column) as usize]);
+            count += 1;
+        }
+    }
+    sum / f64::from(count)
+}

@@ -1,0 +1,15 @@
+//! Relief: height fields, what they see of themselves, and what they do to light.
+//!
+//! ```text
+//! height map ─► height field ─► visibility (GPU, cached) ─► response ─► relief of the elements
+//! ```
+
+mod height_field;
+mod relief;
+mod response;
+mod visibility;
+
+pub use height_field::{Facet, HeightField};
+pub use relief::{Class, Options, Relief, Transport};
+pub use response::{Block, Response, slot_shares};
+pub use visibility::Visibility;

@@ -1,0 +1,84 @@
+//! Visibility of one tile of relief and its cache on disk.
+
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+
+use super::HeightField;
+use crate::atomic_file::write_atomically;
+use crate::constants::{AZIMUTHS, RAY_STRATA};
+use crate::error::Result;
+
+/// What each facet of a [`HeightField`] sees of the sky and of the relief.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Visibility {
+    /// Tangent of the elevation of the horizon, `[facet][azimuth]`, azimuth a at 2π a / AZIMUTHS from u towards v.
+    pub horizons: Vec<f32>,
+    /// The facet that each ray lands on, NONE for the sky, `[facet][ray]`; the rays are cosine-weighted about the normal.
+    pub hits: Vec<u32>,
+}
+
+/// Changes when the shaders' results do.
+const VERSION: &str = "relief visibility 1";
+
+/// Rays from each facet.
+pub const RAYS: usize = (RAY_STRATA * RAY_STRATA) as usize;
+
+impl Visibility {
+    /// The file of a height field in the cache: its content decides.
+    fn file(field: &HeightField, cache: &Path) -> PathBuf {
+        let mut hash = Sha256::new();
+        hash.update(VERSION);
+        hash.update(format!(
+            "{} {} {AZIMUTHS} {RAYS}",
+            field.columns, field.rows
+        ));
+        hash.update(field.aspect.to_le_bytes());
+        field
+            .heights
+            .iter()
+            .for_each(|h| hash.update(h.to_le_bytes()));
+        let name: String = hash.finalize().iter().map(|b| format!("{b:02x}")).collect();
+        cache.join(format!("relief-{name}.bin"))
+    }
+
+    /// What the cache holds for a height field; none if there is nothing or if it is damaged.
+    pub fn load(field: &HeightField, cache: &Path) -> Option<Self> {
+        let bytes = std::fs::read(Self::file(field, cache)).ok()?;
+        let facets = field.facet_count();
+        let (body, sum) = bytes.split_at_checked(4 * facets * (AZIMUTHS as usize + RAYS))?;
+        if Sha256::digest(body).as_slice() != sum {
+            return None;
+        }
+        let (horizons, hits) = body.split_at(4 * facets * AZIMUTHS as usize);
+        let word = |b: &[u8]| [b[0], b[1], b[2], b[3]];
+        Some(Self {
+            horizons: horizons
+                .chunks_exact(4)
+                .map(|b| f32::from_le_bytes(word(b)))
+                .collect(),
+            hits: hits
+                .chunks_exact(4)
+                .map(|b| u32::from_le_bytes(word(b)))
+                .collect(),
+        })
+    }
+
+    pub fn save(&self, field: &HeightField, cache: &Path) -> Result<()> {
+        std::fs::create_dir_all(cache).map_err(|e| crate::error::Error::write(cache, e))?;
+        let mut bytes: Vec<u8> = self.horizons.iter().flat_map(|h| h.to_le_bytes()).collect();
+        bytes.extend(self.hits.iter().flat_map(|h| h.to_le_bytes()));
+        let sum = Sha256::digest(&bytes);
+        bytes.extend_from_slice(&sum);
+        write_atomically(&Self::file(field, cache), |out| out.write_all(&bytes))
+    }
+
+    /// Tangent of the horizon of a facet towards an azimuth, linear between the kept ones.
+    pub fn horizon(&self, facet: usize, azimuth: f64) -> f64 {
+        let at = (azimuth / std::f64::consts::TAU).rem_euclid(1.0) * f64::from(AZIMUTHS);
+        let low = at as usize;
+        let kept = &self.horizons[facet * AZIMUTHS as usize..][..AZIMUTHS as usize];
+        let value = |i: usize| f64::from(kept[i % AZIMUTHS as usize]);
+        value(low) + (value(low + 1) - value(low)) * (at - low as f64)
+    }
+}

@@ -1,0 +1,140 @@
+//! What the passes share about elements with a relief: only scenes that have some allocate it.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use super::buffers::upload;
+use super::types::{MesoElement, Reflected};
+use crate::directions::Directions;
+use crate::elements::Elements;
+use crate::error::{Error, Result};
+use crate::meso::{Relief, slot_shares};
+use crate::sources::Sources;
+use crate::vk::{Buffer, BufferUse, Commands, Device};
+
+/// Elements and sources with a relief are the last of their kinds (point lights aside), so that ranges tell them.
+pub struct ReliefBuffers {
+    pub directions: Directions,
+    pub first_element: u32,
+    pub element_count: u32,
+    pub first_source: u32,
+    pub source_count: u32,
+    /// Most elements of a source.
+    pub most_members: u32,
+    pub elements: Buffer,
+    /// R, `[response][in][colour][axis][out]`.
+    pub matrices: Buffer,
+    /// `[response][in][colour]`, vectors.
+    pub albedos: Buffer,
+    /// H over its mean, `[response][out]`.
+    pub emissions: Buffer,
+    pub shares: Buffer,
+    /// `[meso element][direction][colour]`, vectors.
+    pub moments_direct: Buffer,
+    pub moments_indirect: Buffer,
+    pub reflected: Buffer,
+    /// `[relief source][direction]`.
+    pub shot_exits: Buffer,
+    /// `[slot][member][direction]`.
+    pub member_exits: Buffer,
+    /// `[slot][emitted, reflected][direction]`.
+    pub exits: Buffer,
+}
+
+impl ReliefBuffers {
+    /// # Errors
+    /// More directional state than a buffer of the device may hold.
+    pub fn new(
+        device: &Arc<Device>,
+        elements: &Elements,
+        relief: &Relief,
+        sources: &Sources,
+        batch_slots: u32,
+    ) -> Result<Self> {
+        let k = relief.directions.count() as u64;
+        let first_element = elements.len() - relief.count();
+        let meso = first_element..elements.len();
+        let moment_bytes = 36 * k * meso.len() as u64;
+        let most = device.limits().max_storage_buffer_range;
+        if moment_bytes > most {
+            return Err(Error::Device(format!(
+                "device {}: {} elements with relief and {k} directions need a buffer of {} MiB, and {} MiB is the most: use fewer --directions or patches",
+                device.name(),
+                meso.len(),
+                moment_bytes >> 20,
+                most >> 20
+            )));
+        }
+        let of_relief = sources.relief.clone();
+        let most_members = sources.list[of_relief.clone()]
+            .iter()
+            .map(|s| s.element_count)
+            .max()
+            .unwrap_or(1);
+        let gpu_elements: Vec<MesoElement> = meso
+            .clone()
+            .map(|e| MesoElement {
+                tangent: relief.tangent[e],
+                response: relief.class[e],
+                bitangent: relief.bitangent[e],
+                scale: relief.scale[e],
+            })
+            .collect();
+        let responses = || relief.responses.iter();
+        let matrices: Vec<f32> = responses()
+            .flat_map(|r| r.matrix.chunks_exact(k as usize))
+            .flat_map(|row| {
+                (0..9).flat_map(move |i| row.iter().map(move |block| block[i / 3][i % 3]))
+            })
+            .collect();
+        let albedos: Vec<Vec3> = responses()
+            .flat_map(|r| r.albedo.iter().flatten())
+            .copied()
+            .collect();
+        let emissions: Vec<Vec3> = responses()
+            .flat_map(|r| r.emission.iter().map(|h| *h / r.mean_emission))
+            .collect();
+        let shares: Vec<f32> = slot_shares(&relief.directions)
+            .iter()
+            .map(|&s| s as f32)
+            .collect();
+        let storage = |name, bytes| Buffer::new(device, name, bytes, BufferUse::Storage);
+        let zeroed = |name, bytes| -> Result<Buffer> {
+            let buffer = storage(name, bytes)?;
+            Commands::run(device, name, |cmd| {
+                cmd.fill(&buffer, 0);
+                Ok(())
+            })?;
+            Ok(buffer)
+        };
+        let slots = u64::from(batch_slots);
+        Ok(Self {
+            directions: relief.directions,
+            first_element: first_element as u32,
+            element_count: meso.len() as u32,
+            first_source: of_relief.start as u32,
+            source_count: of_relief.len() as u32,
+            most_members,
+            elements: upload(device, "meso elements", &gpu_elements, BufferUse::Storage)?,
+            matrices: upload(device, "relief matrices", &matrices, BufferUse::Storage)?,
+            albedos: upload(device, "relief albedos", &albedos, BufferUse::Storage)?,
+            emissions: upload(device, "relief emissions", &emissions, BufferUse::Storage)?,
+            shares: upload(device, "direction shares", &shares, BufferUse::Storage)?,
+            moments_direct: zeroed("moments direct", moment_bytes)?,
+            moments_indirect: zeroed("moments indirect", moment_bytes)?,
+            reflected: zeroed(
+                "meso reflected",
+                (size_of::<Reflected>() * meso.len()) as u64,
+            )?,
+            shot_exits: zeroed("shot exits", 12 * k * of_relief.len() as u64)?,
+            member_exits: storage("member exits", 12 * k * slots * u64::from(most_members))?,
+            exits: storage("exits", 24 * k * slots)?,
+        })
+    }
+
+    /// Columns and rows of the directions' square.
+    pub fn cells(&self) -> [u32; 2] {
+        [self.directions.columns, self.directions.rows]
+    }
+}

@@ -1,0 +1,65 @@
+//! The solution's directional part.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use crate::elements::Elements;
+use crate::error::Result;
+use crate::meso::Relief;
+use crate::passes::buffers::download;
+use crate::passes::relief_buffers::ReliefBuffers;
+use crate::vk::Device;
+
+/// Light of the elements with a relief, in internal order; `slot` is an index of [`crate::directions::Directions`] in the
+/// element's tangent frame.
+pub struct ReliefLight {
+    /// The elements, `[meso element]`.
+    pub elements: Vec<u32>,
+    /// ∫ L ω dω over a slot, `[meso element][slot][colour]`, W·m⁻².
+    pub moments: Vec<[Vec3; 3]>,
+    /// Of this what comes straight from emitters and point lights.
+    pub moments_direct: Vec<[Vec3; 3]>,
+    /// What is sent into a slot's directions as radiosity πL, emission included, `[meso element][slot]`, RGB, W·m⁻².
+    pub exitant: Vec<Vec3>,
+}
+
+impl ReliefLight {
+    pub(super) fn download(
+        device: &Arc<Device>,
+        elements: &Elements,
+        relief: &Relief,
+        buffers: &ReliefBuffers,
+    ) -> Result<Self> {
+        let k = relief.directions.count();
+        let count = k * buffers.element_count as usize;
+        let direct: Vec<[Vec3; 3]> = download(device, &buffers.moments_direct, count)?;
+        let mut moments: Vec<[Vec3; 3]> = download(device, &buffers.moments_indirect, count)?;
+        for (sum, direct) in moments.iter_mut().zip(&direct) {
+            (0..3).for_each(|c| sum[c] += direct[c]);
+        }
+        let first = buffers.first_element;
+        let exitant = moments
+            .par_chunks(k)
+            .enumerate()
+            .flat_map_iter(|(m, moments)| {
+                let e = first as usize + m;
+                let response = relief.response(e);
+                let scale = relief.scale[e];
+                let emitted = elements.emitted[e] / response.mean_emission;
+                let sent = response.send(moments);
+                sent.into_iter()
+                    .zip(&response.emission)
+                    .map(move |(sent, emission)| sent * scale + emitted * *emission)
+                    .collect::<Vec<_>>()
+            })
+            .collect();
+        Ok(Self {
+            elements: (first..first + buffers.element_count).collect(),
+            moments,
+            moments_direct: direct,
+            exitant,
+        })
+    }
+}
