@@ -10,15 +10,18 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use super::{Builtin, DeviceOptions};
+use mesolux::directions::Directions;
 use mesolux::error::{Error, Result};
+use mesolux::meso::{self, Transport};
 use mesolux::solution::Origin;
 use mesolux::solver::{Estimator, Report, Settings, Update};
 
 /// Solve a scene and write the light on every element
 ///
 /// The result is a safetensors file: vertices [E,3,3], area [E], normal [E,3], material [E], irradiance [E,3],
-/// irradiance_direct [E,3], radiosity [E,3], in scene units and in the order of the input. Ctrl-C stops the solver and
-/// keeps what it has.
+/// irradiance_direct [E,3], radiosity [E,3], in scene units and in the order of the input. Elements with a relief (M of them,
+/// whose material has a height map) add meso_elements [M], meso_frames [M,3,3], directions [K,3], incident_moment and
+/// incident_moment_direct [M,K,3,3] (colour, vector), exitant [M,K,3]. Ctrl-C stops the solver and keeps what it has.
 #[derive(Args)]
 pub struct Options {
     /// A built-in name (cornell), an .obj file, or a scene.toml
@@ -61,6 +64,29 @@ pub struct SolveOptions {
     /// Turns the hemicubes about their axes: another seed, other aliasing
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
+    /// Directions of the light on relief: 16, 32 or 64
+    #[arg(long, value_name = "K", default_value_t = 64)]
+    directions: u32,
+    /// How relief takes part: keeping energy, by the paper's equations, or not at all
+    #[arg(long, value_enum, default_value = "physical")]
+    transport: TransportName,
+    /// Folder that keeps the visibility of reliefs from run to run [default: mesolux in the user's cache folder]
+    #[arg(long, value_name = "DIR")]
+    cache: Option<PathBuf>,
+    /// Compute the visibility of reliefs anew and do not keep it
+    #[arg(long, conflicts_with = "cache")]
+    no_cache: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+enum TransportName {
+    /// Masking, shadowing and bounces inside the relief
+    Physical,
+    /// Equations (1) to (4) of the paper as printed; loses energy
+    Paper,
+    /// Every element flat: no directions
+    Lambert,
 }
 
 #[derive(Clone, Copy, ValueEnum, Serialize)]
@@ -93,9 +119,35 @@ impl SolveOptions {
             budget,
             shots: self.shots,
             seed: self.seed,
+            relief: meso::Options {
+                transport: match self.transport {
+                    TransportName::Physical => Transport::Physical,
+                    TransportName::Paper => Transport::Paper,
+                    TransportName::Lambert => Transport::Lambert,
+                },
+                directions: Directions::new(self.directions)?,
+                cache: match &self.cache {
+                    Some(dir) => Some(dir.clone()),
+                    None if self.no_cache => None,
+                    None => cache_folder(),
+                },
+            },
             ..Settings::default()
         })
     }
+}
+
+/// Where programs of this user keep what they can make again.
+pub fn cache_folder() -> Option<PathBuf> {
+    let absolute = |name| {
+        std::env::var_os(name)
+            .map(PathBuf::from)
+            .filter(|p| p.is_absolute())
+    };
+    let folder = absolute("XDG_CACHE_HOME")
+        .or_else(|| absolute("LOCALAPPDATA"))
+        .or_else(|| absolute("HOME").map(|home| home.join(".cache")));
+    folder.map(|folder| folder.join("mesolux"))
 }
 
 /// What `--json` prints beside the solver's report.
@@ -144,6 +196,14 @@ pub fn run(options: &Options) -> Result<()> {
         100.0 * report.unshot_share,
         report.stop
     );
+    if let Some(relief) = &report.relief {
+        tracing::info!(
+            "{} elements with relief in {} directions, {} kinds of relief",
+            relief.elements,
+            relief.directions,
+            relief.classes.len()
+        );
+    }
     if options.json {
         let printed = Printed {
             scene: &options.scene,

@@ -88,7 +88,7 @@ impl HeightField {
             cell / i64::from(self.columns),
         );
         let (right, up) = (self.point(i + 1, j), self.point(i, j + 1));
-        let (corner, share, slope) = if facet % 2 == 0 {
+        let (corner, share, slope) = if facet.is_multiple_of(2) {
             let corner = self.point(i, j);
             (corner, 1.0 / 3.0, [right - corner, up - corner])
         } else {

@@ -139,7 +139,7 @@ impl Relief {
                 continue;
             };
             let rms_slope = field.rms_slope();
-            if !(rms_slope <= MOST_SLOPE) {
+            if rms_slope.is_nan() || rms_slope > MOST_SLOPE {
                 return Err(Error::Scene {
                     scene: scene.name.clone(),
                     what: format!(
