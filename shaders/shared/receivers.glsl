@@ -257,49 +257,45 @@ void main() {
     uint directions = cells.x * cells.y;
     vec3 add_reflected = vec3(0.0);
 #endif
-    for (uint slot = 0; slot < slot_count; slot++) {
+    // Without `continue`, whose several ways back would keep compilers from seeing that every lane is at the same slot
+    // and loads the same source.
+    for (uint slot = 0; slot < slot_count && slots[slot].source != NONE; slot++) {
         Slot shot = slots[slot];
-        if (shot.source == NONE) {
-            break;
-        }
         Source s = sources[shot.source];
-        if (dot(ball.xyz - s.eye, n) >= s.radius) {
-            behind++;
-            continue;
-        }
-        FLUX f = gather(e, ball, n, slot, s);
-        vec3 emitted = shot.emitted;
-        vec3 reflected = shot.reflected;
+        bool is_behind = dot(ball.xyz - s.eye, n) >= s.radius;
+        behind += is_behind ? 1 : 0;
+        FLUX f = is_behind ? FLUX(0.0) : gather(e, ball, n, slot, s);
+        if (f != FLUX(0.0)) {
+            vec3 emitted = shot.emitted;
+            vec3 reflected = shot.reflected;
 #ifdef FROM_RELIEF
-        if (f == FLUX(0.0)) {
-            continue;
-        }
-        if (shot.source - first_relief_source < relief_source_count) {
-            send_by_direction(slot, s, ball.xyz, emitted, reflected);
-        }
+            if (shot.source - first_relief_source < relief_source_count) {
+                send_by_direction(slot, s, ball.xyz, emitted, reflected);
+            }
 #endif
 #ifdef TO_RELIEF
-        vec3 local = vec3(dot(meso.tangent, f), dot(meso.bitangent, f), dot(n, f));
-        uint k = direction_of(local * inversesqrt(dot(local, local)), cells);
-        uint at = 3 * (m * directions + k);
-        uint response = 3 * (meso.response * directions + k);
-        bool emits = emitted != vec3(0.0);
-        bool reflects = reflected != vec3(0.0);
-        for (uint c = 0; c < 3; c++) {
-            if (emits) {
-                moments_direct[at + c] += emitted[c] * local;
+            vec3 local = vec3(dot(meso.tangent, f), dot(meso.bitangent, f), dot(n, f));
+            uint k = direction_of(local * inversesqrt(dot(local, local)), cells);
+            uint at = 3 * (m * directions + k);
+            uint response = 3 * (meso.response * directions + k);
+            bool emits = emitted != vec3(0.0);
+            bool reflects = reflected != vec3(0.0);
+            for (uint c = 0; c < 3; c++) {
+                if (emits) {
+                    moments_direct[at + c] += emitted[c] * local;
+                }
+                if (reflects) {
+                    moments_indirect[at + c] += reflected[c] * local;
+                }
+                add_reflected[c] += dot(albedos[response + c], local) * (emitted[c] + reflected[c]);
             }
-            if (reflects) {
-                moments_indirect[at + c] += reflected[c] * local;
-            }
-            add_reflected[c] += dot(albedos[response + c], local) * (emitted[c] + reflected[c]);
-        }
-        add_direct += local.z * emitted;
-        add_indirect += local.z * reflected;
+            add_direct += local.z * emitted;
+            add_indirect += local.z * reflected;
 #else
-        add_direct += f * emitted;
-        add_indirect += f * reflected;
+            add_direct += f * emitted;
+            add_indirect += f * reflected;
 #endif
+        }
     }
     behind_count[e] += behind;
     accumulate(e, add_direct, add_indirect);
