@@ -2,6 +2,7 @@
 
 mod cornell;
 mod grid;
+pub mod relief_maps;
 mod statue;
 mod surface_nets;
 
