@@ -31,16 +31,27 @@ fn maps_span_all_codes_and_repeat_without_a_seam() {
             let code = (value * 65_535.0).round();
             assert_eq!(code / 65_535.0, *value, "{name}");
         }
-        assert!(map.values.contains(&0.0) && map.values.contains(&1.0), "{name}");
-        println!("{name}: rms slope {:.3} at a tenth of the tile, mean {:.3}", rms_slope(&map, 0.1), map.mean());
+        assert!(
+            map.values.contains(&0.0) && map.values.contains(&1.0),
+            "{name}"
+        );
+        println!(
+            "{name}: rms slope {:.3} at a tenth of the tile, mean {:.3}",
+            rms_slope(&map, 0.1),
+            map.mean()
+        );
         // The step across the seam is no greater than the greatest step within.
         let at = |x: usize, y: usize| map.values[(y % 64) * 64 + x % 64];
         let step = |x: usize, y: usize| {
-            (at(x + 1, y) - at(x, y)).abs().max((at(x, y + 1) - at(x, y)).abs())
+            (at(x + 1, y) - at(x, y))
+                .abs()
+                .max((at(x, y + 1) - at(x, y)).abs())
         };
         let inside = (0..63).flat_map(|y| (0..63).map(move |x| (x, y)));
         let inside = inside.map(|(x, y)| step(x, y)).fold(0.0, f32::max);
-        let seam = (0..64).map(|k| step(63, k).max(step(k, 63))).fold(0.0, f32::max);
+        let seam = (0..64)
+            .map(|k| step(63, k).max(step(k, 63)))
+            .fold(0.0, f32::max);
         assert!(seam <= inside, "{name}: {seam} over {inside}");
     }
 }

@@ -55,11 +55,7 @@ struct Edge {
 
 /// Splits the longest edges of a closed manifold, two triangles more each, until there are `count`; `place` moves the
 /// middle of an edge to where it belongs.
-pub(super) fn split_longest(
-    surface: &mut Surface,
-    count: usize,
-    place: impl Fn(DVec3) -> DVec3,
-) {
+pub(super) fn split_longest(surface: &mut Surface, count: usize, place: impl Fn(DVec3) -> DVec3) {
     let mut left_of: HashMap<[u32; 2], usize> = HashMap::new();
     let mut queue = BinaryHeap::new();
     for (index, &corners) in surface.triangles.iter().enumerate() {

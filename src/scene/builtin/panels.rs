@@ -62,7 +62,10 @@ fn finest(panels: &[Panel], budget: usize) -> Vec<[usize; 2]> {
     loop {
         let cells: Vec<[usize; 2]> = panels
             .iter()
-            .map(|p| p.sides().map(|side| (side / size).round().max(1.0) as usize))
+            .map(|p| {
+                p.sides()
+                    .map(|side| (side / size).round().max(1.0) as usize)
+            })
             .collect();
         let quads: usize = cells.iter().map(|[s, t]| s * t).sum();
         if quads <= budget {
