@@ -1,16 +1,13 @@
 //! The Cornell box (Goral et al. 1984; measured data of Cornell's Program of Computer Graphics) with a statue in it.
 
-use std::path::Path;
-
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 use super::grid::{self, Part, ROOM};
-use super::statue;
+use super::{placing, statue};
 use crate::error::{Error, Result};
-use crate::scene::assemble::{Assembly, Mesh, MeshTriangle, is_degenerate};
-use crate::scene::material::TextureCache;
+use crate::scene::assemble::{Assembly, Mesh, MeshTriangle};
 use crate::scene::uv::box_projection;
-use crate::scene::{BuiltinOptions, Camera, Material, Scene, check, obj};
+use crate::scene::{BuiltinOptions, Camera, Material, Scene, check};
 
 /// Elements if nothing else is asked for.
 const PATCHES: usize = 12_000;
@@ -28,12 +25,12 @@ const STATUE_TRIANGLES: std::ops::RangeInclusive<usize> = 3_000..=25_780;
 pub(super) fn build(options: &BuiltinOptions) -> Result<Scene> {
     let patches = options.patches.unwrap_or(PATCHES);
     let mut mesh = match &options.statue {
-        Some(path) => read_statue(path)?,
+        Some(path) => placing::read_statue(path)?,
         None => {
             statue::build((patches / 2).clamp(*STATUE_TRIANGLES.start(), *STATUE_TRIANGLES.end()))
         }
     };
-    place(&mut mesh);
+    stand_in_room(&mut mesh);
     for triangle in &mut mesh.triangles {
         triangle.material = STATUE_MATERIAL;
         // Of a mesh from a file the person is told that coordinates were made up; here there is nothing to tell.
@@ -42,25 +39,32 @@ pub(super) fn build(options: &BuiltinOptions) -> Result<Scene> {
             triangle.uv = Some(box_projection(corners));
         }
     }
-    let statue = mesh
-        .triangles
-        .iter()
-        .filter(|t| !is_degenerate(t.corners.map(|v| mesh.positions[v as usize])))
-        .count();
+    assemble("cornell", mesh, materials(), options.patches, PATCHES)
+}
+
+/// Puts the room around the statue that stands in it: exactly `asked` elements, or else `usual` or twice the statue's.
+pub(super) fn assemble(
+    name: &str,
+    mut mesh: Mesh,
+    materials: [Material; 5],
+    asked: Option<usize>,
+    usual: usize,
+) -> Result<Scene> {
+    let statue = placing::count(&mesh);
     let least = statue + grid::least_triangles();
     // Only a statue that was asked for may need more than the patches that were not.
-    let patches = match options.patches {
-        None => patches.max(2 * statue),
+    let patches = match asked {
+        None => usual.max(2 * statue),
         Some(patches) if patches < least => {
             return Err(Error::Usage(format!(
-                "cornell: {patches} patches are too few: the statue takes {statue}, and with the coarsest room it is {least}"
+                "{name}: {patches} patches are too few: the statue takes {statue}, and with the coarsest room it is {least}"
             )));
         }
         Some(patches) => patches,
     };
 
-    let mut assembly = Assembly::new("cornell".into(), None);
-    let materials = assembly.add_materials(&materials());
+    let mut assembly = Assembly::new(name.into(), None);
+    let materials = assembly.add_materials(&materials);
     assembly.add_mesh(&room(patches - statue), &materials)?;
     assembly.add_mesh(&mesh, &materials)?;
     let scene = &mut assembly.scene;
@@ -81,7 +85,7 @@ pub(super) fn build(options: &BuiltinOptions) -> Result<Scene> {
 }
 
 /// In the order of [`material_of`].
-fn materials() -> [Material; 5] {
+pub(super) fn materials() -> [Material; 5] {
     let diffuse = |name: &str, kd| Material {
         name: name.into(),
         kd,
@@ -99,7 +103,7 @@ fn materials() -> [Material; 5] {
     ]
 }
 
-const STATUE_MATERIAL: u32 = 4;
+pub(super) const STATUE_MATERIAL: u32 = 4;
 
 fn material_of(part: Part) -> u32 {
     match part {
@@ -124,47 +128,8 @@ fn room(count: usize) -> Mesh {
     mesh
 }
 
-fn read_statue(path: &Path) -> Result<Mesh> {
-    let mut mesh = obj::read(path, &mut TextureCache::default())?;
-    if mesh.materials.iter().any(|m| m.name != "default") {
-        mesh.notes.push(format!(
-            "{}: the statue has the material of the scene, not its own",
-            path.display()
-        ));
-    }
-    let (low, high) = bounds(&mesh);
-    let extent = (high - low).max_element();
-    // The placing divides by the extent.
-    if !(extent.is_finite() && extent > f64::MIN_POSITIVE * 1e9) {
-        return Err(Error::file(path, "the statue has no extent to scale by"));
-    }
-    Ok(mesh)
-}
-
-/// Turns the statue, scales it to the room and stands it in the middle of the floor, its lowest vertex at exactly y = 0.
-fn place(mesh: &mut Mesh) {
-    let (low, high) = bounds(mesh);
-    let scale = STATUE_SIZE * ROOM.y / (high - low).max_element();
-    let centre = (low + high) / 2.0;
-    let turn = DMat3::from_rotation_y(STATUE_TURN.to_radians());
-    for position in &mut mesh.positions {
-        *position = turn * ((*position - centre) * scale);
-    }
-    let (low, high) = bounds(mesh);
-    let foot = DVec3::new((low.x + high.x) / 2.0, low.y, (low.z + high.z) / 2.0);
+/// In the middle of the floor.
+pub(super) fn stand_in_room(mesh: &mut Mesh) {
     let middle = DVec3::new(ROOM.x / 2.0, 0.0, ROOM.z / 2.0);
-    for position in &mut mesh.positions {
-        *position = *position - foot + middle;
-    }
-}
-
-/// The box around the corners of the triangles; a vertex that no triangle uses must not move what is seen.
-fn bounds(mesh: &Mesh) -> (DVec3, DVec3) {
-    mesh.triangles
-        .iter()
-        .flat_map(|t| t.corners)
-        .map(|v| mesh.positions[v as usize])
-        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
-            (low.min(p), high.max(p))
-        })
+    placing::stand(mesh, STATUE_TURN, STATUE_SIZE * ROOM.y, middle);
 }
