@@ -1,20 +1,37 @@
 //! Scenes made by code, so that the first command needs no file.
 
+mod bowl_and_bunny;
+mod bunny;
 mod cornell;
+mod cornell_relief;
+mod fruit;
+mod fruit_platter;
 mod grid;
+pub mod relief_maps;
+mod round_cone;
+mod solid;
+mod stage;
 mod statue;
 mod surface_nets;
 
 use super::{BuiltinOptions, Scene};
 use crate::error::{Error, Result};
 
-/// What [`super::load`] takes instead of a path.
-pub const NAMES: [&str; 1] = ["cornell"];
+/// What [`super::load`] takes instead of a path. All but the first are those of the paper's Table 1.
+pub const NAMES: [&str; 4] = [
+    "cornell",
+    "fruit-platter",
+    "bowl-and-bunny",
+    "cornell-relief",
+];
 
 /// Builds the scene of that name.
 pub(super) fn build(name: &str, options: &BuiltinOptions) -> Result<Scene> {
     match name {
         "cornell" => cornell::build(options),
+        "fruit-platter" => fruit_platter::build(options),
+        "bowl-and-bunny" => bowl_and_bunny::build(options),
+        "cornell-relief" => cornell_relief::build(options),
         _ => Err(Error::Usage(format!(
             "\"{name}\" is no built-in scene: there is {}",
             NAMES.join(", ")

@@ -2,25 +2,9 @@
 
 use glam::DVec3;
 
+use super::round_cone::{RoundCone, cone, smooth_union};
 use super::surface_nets::{Surface, polygonise};
 use crate::scene::assemble::{Mesh, MeshTriangle};
-
-/// A cone with round ends, metres; the head looks towards −z, y is up.
-struct RoundCone {
-    from: [f64; 3],
-    from_radius: f64,
-    to: [f64; 3],
-    to_radius: f64,
-}
-
-const fn cone(from: [f64; 3], from_radius: f64, to: [f64; 3], to_radius: f64) -> RoundCone {
-    RoundCone {
-        from,
-        from_radius,
-        to,
-        to_radius,
-    }
-}
 
 /// On the plane x = 0.
 const TRUNK: [RoundCone; 10] = [
@@ -60,8 +44,8 @@ const LIMBS: [RoundCone; 9] = [
 /// Width of the fillets between parts.
 const BLEND: f64 = 0.07;
 /// A box around all of it.
-const LOW: DVec3 = DVec3::new(-0.5, -0.05, -1.5);
-const HIGH: DVec3 = DVec3::new(0.5, 2.1, 1.15);
+pub(super) const LOW: DVec3 = DVec3::new(-0.5, -0.05, -1.5);
+pub(super) const HIGH: DVec3 = DVec3::new(0.5, 2.1, 1.15);
 /// Triangles times the square of a cell's edge, measured.
 const TRIANGLES_PER_CELL: f64 = 17.5;
 
@@ -95,28 +79,13 @@ pub(super) fn build(triangles: usize) -> Mesh {
 }
 
 /// Negative inside. Nearly the distance, which is all that polygonising needs.
-fn distance(p: DVec3) -> f64 {
+pub(super) fn distance(p: DVec3) -> f64 {
     let aside = DVec3::new(p.x.abs(), p.y, p.z);
     let trunk = TRUNK.iter().map(|part| part.distance(p));
     let limbs = LIMBS.iter().map(|part| part.distance(aside));
-    trunk.chain(limbs).fold(f64::INFINITY, smooth_union)
-}
-
-/// Polynomial smooth minimum, Quilez.
-fn smooth_union(a: f64, b: f64) -> f64 {
-    let h = (BLEND - (a - b).abs()).max(0.0) / BLEND;
-    a.min(b) - h * h * BLEND / 4.0
-}
-
-impl RoundCone {
-    /// Distance to the spheres swept along the axis, the nearest sphere taken straight across it.
-    fn distance(&self, p: DVec3) -> f64 {
-        let (from, to) = (DVec3::from(self.from), DVec3::from(self.to));
-        let axis = to - from;
-        let along = ((p - from).dot(axis) / axis.length_squared()).clamp(0.0, 1.0);
-        let radius = self.from_radius + (self.to_radius - self.from_radius) * along;
-        p.distance(from + axis * along) - radius
-    }
+    trunk
+        .chain(limbs)
+        .fold(f64::INFINITY, |a, b| smooth_union(a, b, BLEND))
 }
 
 #[cfg(test)]

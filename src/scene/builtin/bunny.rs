@@ -1,0 +1,48 @@
+//! A sitting bunny, sculpted from round cones.
+
+use glam::DVec3;
+
+use super::round_cone::{RoundCone, cone, smooth_union};
+
+/// On the plane x = 0; units of its own, the head looks towards −z, y is up.
+const TRUNK: [RoundCone; 5] = [
+    // Rump to chest.
+    cone([0.0, 0.34, 0.16], 0.30, [0.0, 0.52, -0.08], 0.235),
+    cone([0.0, 0.50, -0.08], 0.23, [0.0, 0.72, -0.16], 0.15),
+    // Skull and muzzle.
+    cone([0.0, 0.88, -0.16], 0.185, [0.0, 0.86, -0.24], 0.17),
+    cone([0.0, 0.83, -0.30], 0.125, [0.0, 0.81, -0.38], 0.085),
+    // Tail.
+    cone([0.0, 0.22, 0.50], 0.09, [0.0, 0.26, 0.53], 0.085),
+];
+
+/// On the side of positive x; the other side mirrors them.
+const LIMBS: [RoundCone; 8] = [
+    // Ear: root, blade, tip.
+    cone([0.075, 1.00, -0.12], 0.045, [0.105, 1.20, -0.08], 0.075),
+    cone([0.105, 1.20, -0.08], 0.075, [0.135, 1.40, -0.05], 0.062),
+    cone([0.135, 1.40, -0.05], 0.062, [0.150, 1.52, -0.04], 0.028),
+    // Cheek.
+    cone([0.075, 0.80, -0.27], 0.085, [0.080, 0.80, -0.25], 0.085),
+    // Haunch and hind foot.
+    cone([0.20, 0.27, 0.16], 0.205, [0.215, 0.20, 0.08], 0.17),
+    cone([0.215, 0.075, 0.10], 0.075, [0.225, 0.065, -0.26], 0.065),
+    // Foreleg and paw.
+    cone([0.105, 0.50, -0.20], 0.095, [0.095, 0.12, -0.27], 0.062),
+    cone([0.095, 0.06, -0.27], 0.060, [0.095, 0.055, -0.34], 0.055),
+];
+
+const BLEND: f64 = 0.06;
+/// A box around all of it.
+pub(super) const LOW: DVec3 = DVec3::new(-0.48, -0.05, -0.52);
+pub(super) const HIGH: DVec3 = DVec3::new(0.48, 1.62, 0.68);
+
+/// Negative inside. Nearly the distance.
+pub(super) fn distance(p: DVec3) -> f64 {
+    let aside = DVec3::new(p.x.abs(), p.y, p.z);
+    let trunk = TRUNK.iter().map(|part| part.distance(p));
+    let limbs = LIMBS.iter().map(|part| part.distance(aside));
+    trunk
+        .chain(limbs)
+        .fold(f64::INFINITY, |a, b| smooth_union(a, b, BLEND))
+}

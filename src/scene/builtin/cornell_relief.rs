@@ -1,0 +1,55 @@
+//! The Cornell box of the paper's Table 1: an area light and a yellow horse of hammered metal.
+
+use std::sync::Arc;
+
+use super::stage::{self, Stage, even_share};
+use super::{cornell, relief_maps, solid, statue};
+use crate::error::Result;
+use crate::scene::{BuiltinOptions, Material, Scene};
+
+const NAME: &str = "cornell-relief";
+const PATCHES: usize = 83_160;
+const SHARE: f64 = 0.31;
+/// Fewer lose the horse's ears.
+const LEAST_PATCHES: usize = 8_000;
+/// Tiles of hammered metal a metre: a texel is about a third of an element's edge in the default number.
+const REPEATS: f64 = 1.5;
+/// Metres. The slope of the relief is 0.3 in the root mean square.
+const HEIGHT: f32 = 0.022;
+
+/// Builds the room of `cornell` with a horse that has relief.
+///
+/// # Errors
+/// Too few patches; a statue that cannot be read.
+pub(super) fn build(options: &BuiltinOptions) -> Result<Scene> {
+    let mut horse = match &options.statue {
+        Some(path) => stage::read_statue(path)?,
+        None => {
+            let patches = stage::planned(NAME, options, PATCHES, LEAST_PATCHES)?;
+            let count = even_share(patches, SHARE);
+            solid::sculpt(statue::distance, statue::LOW, statue::HIGH, count)
+        }
+    };
+    let room = cornell::ROOM;
+    let extent = cornell::STATUE_SIZE * room.size.y;
+    stage::place(&mut horse, extent, cornell::STATUE_TURN, cornell::FOOT);
+    stage::cover(&mut horse, cornell::STATUE_MATERIAL, REPEATS);
+    let mut materials = cornell::materials().to_vec();
+    let metal = &mut materials[cornell::STATUE_MATERIAL as usize];
+    *metal = Material {
+        map_height: Some(Arc::new(relief_maps::hammered_metal(relief_maps::SIZE))),
+        height_scale: HEIGHT,
+        ..metal.clone()
+    };
+    let stage = Stage {
+        name: NAME,
+        patches: PATCHES,
+        room,
+        material_of: cornell::material_of,
+        materials,
+        solids: vec![horse],
+        point_lights: Vec::new(),
+        camera: cornell::camera(),
+    };
+    stage.build(options)
+}

@@ -1,0 +1,172 @@
+//! The fruit of the platter. Places are metres about the middle of the dish, y above its flat inside.
+
+use glam::DVec3;
+
+use super::round_cone::{cone, smooth_union};
+use super::solid::sculpt;
+use super::stage::diffuse;
+use crate::scene::Material;
+use crate::scene::assemble::Mesh;
+
+/// Radii, metres.
+const ORANGE: f64 = 0.040;
+const GRAPE: f64 = 0.0125;
+
+/// Four in a pyramid, 1.5 mm apart, and one aside.
+pub(super) const ORANGES: [[f64; 3]; 5] = [
+    [-0.105, 0.0, -0.020],
+    [-0.0235, 0.0, -0.020],
+    [-0.06425, 0.0, 0.0506],
+    [-0.06425, 0.0667, 0.0035],
+    [0.100, 0.0, -0.078],
+];
+
+pub(super) struct Fruit {
+    /// With a number of triangles.
+    pub build: fn(usize) -> Mesh,
+    /// The middle of its underside; on the table where y is negative.
+    pub at: DVec3,
+    /// Of all the triangles.
+    pub share: f64,
+    /// Index into [`materials`], counted from 1.
+    pub material: u32,
+}
+
+/// In the order of [`Fruit::material`].
+pub(super) fn materials() -> [Material; 6] {
+    [
+        diffuse("red apple", [0.58, 0.05, 0.04]),
+        diffuse("green apple", [0.36, 0.50, 0.08]),
+        diffuse("pear", [0.62, 0.58, 0.14]),
+        diffuse("banana", [0.84, 0.66, 0.10]),
+        diffuse("grape", [0.20, 0.05, 0.22]),
+        diffuse("stem", [0.16, 0.10, 0.05]),
+    ]
+}
+
+/// Everything but the oranges.
+pub(super) fn others() -> Vec<Fruit> {
+    let fruit = |build, at: [f64; 3], share, material| Fruit {
+        build,
+        at: DVec3::from(at),
+        share,
+        material,
+    };
+    let mut all = Vec::new();
+    let apples = [
+        ([0.076, 0.0, 0.068], 1),
+        ([0.012, 0.0, -0.118], 2),
+        ([0.156, 0.0, 0.010], 1),
+    ];
+    for ([x, y, z], material) in apples {
+        all.push(fruit(apple, [x, y, z], 0.032, material));
+        all.push(fruit(stem, [x, APPLE_STEM, z], 0.0012, 6));
+    }
+    let [x, z] = [-0.005, 0.135];
+    all.push(fruit(pear, [x, 0.0, z], 0.032, 3));
+    all.push(fruit(stem, [x, PEAR_STEM, z], 0.0012, 6));
+    all.push(fruit(banana, [-0.235, -1.0, -0.215], 0.036, 4));
+    // A layer of hexagons and the second in its hollows.
+    let apart = 2.0 * GRAPE + 3e-4;
+    let row = apart * 0.75_f64.sqrt();
+    let low = [
+        (-1.0, 0),
+        (0.0, 0),
+        (1.0, 0),
+        (-0.5, 1),
+        (0.5, 1),
+        (-0.5, -1),
+        (0.5, -1),
+        (1.5, -1),
+    ];
+    let high = [(-0.5, 0), (0.5, 0), (0.0, -1), (1.0, -1)];
+    let mut grapes = |places: &[(f64, i32)], up: f64, shift: f64| {
+        for &(column, line) in places {
+            let at = [
+                -0.090 + column * apart,
+                up,
+                -0.112 + f64::from(line) * row + shift,
+            ];
+            all.push(fruit(grape, at, 0.006, 5));
+        }
+    };
+    grapes(&low, 0.0, 0.0);
+    grapes(
+        &high,
+        apart * (2.0_f64 / 3.0).sqrt(),
+        apart / 12.0_f64.sqrt(),
+    );
+    all
+}
+
+pub(super) fn orange(count: usize) -> Mesh {
+    sphere(ORANGE, count)
+}
+
+fn grape(count: usize) -> Mesh {
+    sphere(GRAPE, count)
+}
+
+fn sphere(radius: f64, count: usize) -> Mesh {
+    let reach = DVec3::splat(radius);
+    sculpt(|p| p.length() - radius, -reach, reach, count)
+}
+
+/// Where the stems begin, above the underside of the fruit.
+const APPLE_STEM: f64 = 0.0625;
+const PEAR_STEM: f64 = 0.1075;
+
+/// A spindle torus, narrower below, so that it has hollows above and below.
+fn apple(count: usize) -> Mesh {
+    let (ring, tube) = (0.0175, 0.0225);
+    let distance = |p: DVec3| {
+        let narrow = 1.0 + 4.0 * p.y.min(0.03);
+        let across = DVec3::new(p.x, 0.0, p.z).length() / narrow;
+        (across - ring).hypot(p.y / 1.45) - tube
+    };
+    sculpt(distance, DVec3::splat(-0.05), DVec3::splat(0.05), count)
+}
+
+fn pear(count: usize) -> Mesh {
+    let parts = [
+        cone([0.0, 0.036, 0.0], 0.036, [0.0, 0.044, 0.0], 0.036),
+        cone([0.0, 0.060, 0.0], 0.026, [0.003, 0.092, 0.0], 0.015),
+    ];
+    let distance = |p: DVec3| smooth_union(parts[0].distance(p), parts[1].distance(p), 0.03);
+    let (low, high) = (
+        DVec3::new(-0.05, -0.01, -0.05),
+        DVec3::new(0.05, 0.12, 0.05),
+    );
+    sculpt(distance, low, high, count)
+}
+
+fn stem(count: usize) -> Mesh {
+    let part = cone([0.0, 0.0, 0.0], 0.002, [0.004, 0.018, 0.0], 0.0024);
+    let (low, high) = (DVec3::splat(-0.004), DVec3::new(0.01, 0.022, 0.004));
+    sculpt(|p| part.distance(p), low, high, count)
+}
+
+/// Round cones along an arc that lies on the table, thin towards the ends.
+fn banana(count: usize) -> Mesh {
+    let parts: Vec<_> = (0..10)
+        .map(|i| {
+            let at = |i: i32| {
+                let angle = (200.0 + 14.0 * f64::from(i)).to_radians();
+                [0.11 * angle.cos(), 0.0, 0.11 * angle.sin()]
+            };
+            let radius = |i: i32| 0.0185 - 0.0115 * ((f64::from(i) - 5.0).abs() / 5.0).powi(3);
+            cone(at(i), radius(i), at(i + 1), radius(i + 1))
+        })
+        .collect();
+    let distance = |p: DVec3| {
+        parts
+            .iter()
+            .map(|part| part.distance(p))
+            .fold(f64::INFINITY, |a, b| smooth_union(a, b, 0.01))
+    };
+    let (low, high) = (
+        DVec3::new(-0.15, -0.03, -0.15),
+        DVec3::new(0.15, 0.03, 0.05),
+    );
+    sculpt(distance, low, high, count)
+}
