@@ -6,7 +6,7 @@
 //! ```text
 //! .obj ─► obj_lint ─► obj + mtl ─┐
 //! scene.toml ─► scene_file ──────┼─► assemble ─► check ─► Scene ─► write
-//! cornell ─► builtin ────────────┘
+//! built-in name ─► builtin ──────┘
 //! ```
 
 mod assemble;

@@ -82,8 +82,8 @@ pub(super) fn build(options: &BuiltinOptions) -> Result<Scene> {
         }],
         camera: Camera {
             name: "front".into(),
-            position: DVec3::new(0.60, 0.32, -0.30),
-            look_at: DVec3::new(0.60, 0.12, 0.44),
+            position: DVec3::new(0.575, 0.32, -0.30),
+            look_at: DVec3::new(0.575, 0.12, 0.44),
             up: DVec3::Y,
             fov_y: 40.0,
         },

@@ -17,11 +17,10 @@ const TRUNK: [RoundCone; 5] = [
 ];
 
 /// On the side of positive x; the other side mirrors them.
-const LIMBS: [RoundCone; 8] = [
-    // Ear: root, blade, tip.
-    cone([0.075, 1.00, -0.12], 0.045, [0.105, 1.20, -0.08], 0.075),
-    cone([0.105, 1.20, -0.08], 0.075, [0.135, 1.40, -0.05], 0.062),
-    cone([0.135, 1.40, -0.05], 0.062, [0.150, 1.52, -0.04], 0.028),
+const LIMBS: [RoundCone; 7] = [
+    // Ear.
+    cone([0.075, 1.00, -0.12], 0.050, [0.115, 1.30, -0.07], 0.074),
+    cone([0.115, 1.30, -0.07], 0.074, [0.145, 1.53, -0.04], 0.038),
     // Cheek.
     cone([0.075, 0.80, -0.27], 0.085, [0.080, 0.80, -0.25], 0.085),
     // Haunch and hind foot.

@@ -1,9 +1,9 @@
 //! The fruit of the platter. Places are metres about the middle of the dish, y above its flat inside.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::round_cone::{cone, smooth_union};
-use super::solid::sculpt;
+use super::solid::{revolve, sculpt};
 use super::stage::diffuse;
 use crate::scene::Material;
 use crate::scene::assemble::Mesh;
@@ -32,6 +32,23 @@ pub(super) struct Fruit {
     pub material: u32,
 }
 
+impl Fruit {
+    /// Whether a stem stands on it.
+    pub fn has_stem(&self) -> bool {
+        [RED_APPLE, GREEN_APPLE, PEAR].contains(&self.material)
+    }
+}
+
+const RED_APPLE: u32 = 1;
+const GREEN_APPLE: u32 = 2;
+const PEAR: u32 = 3;
+const BANANA: u32 = 4;
+const GRAPES: u32 = 5;
+pub(super) const STEM: u32 = 6;
+pub(super) const STEM_SHARE: f64 = 0.0012;
+/// Metres about its middle that a stem takes.
+pub(super) const STEM_RADIUS: f64 = 0.0033;
+
 /// In the order of [`Fruit::material`].
 pub(super) fn materials() -> [Material; 6] {
     [
@@ -54,18 +71,15 @@ pub(super) fn others() -> Vec<Fruit> {
     };
     let mut all = Vec::new();
     let apples = [
-        ([0.076, 0.0, 0.068], 1),
-        ([0.012, 0.0, -0.118], 2),
-        ([0.156, 0.0, 0.010], 1),
+        ([0.076, 0.0, 0.068], RED_APPLE),
+        ([0.012, 0.0, -0.118], GREEN_APPLE),
+        ([0.156, 0.0, 0.010], RED_APPLE),
     ];
-    for ([x, y, z], material) in apples {
-        all.push(fruit(apple, [x, y, z], 0.032, material));
-        all.push(fruit(stem, [x, APPLE_STEM, z], 0.0012, 6));
+    for (at, material) in apples {
+        all.push(fruit(apple, at, 0.032, material));
     }
-    let [x, z] = [-0.005, 0.135];
-    all.push(fruit(pear, [x, 0.0, z], 0.032, 3));
-    all.push(fruit(stem, [x, PEAR_STEM, z], 0.0012, 6));
-    all.push(fruit(banana, [-0.235, -1.0, -0.215], 0.036, 4));
+    all.push(fruit(pear, [-0.005, 0.0, 0.135], 0.032, PEAR));
+    all.push(fruit(banana, [-0.10, -1.0, -0.328], 0.036, BANANA));
     // A layer of hexagons and the second in its hollows.
     let apart = 2.0 * GRAPE + 3e-4;
     let row = apart * 0.75_f64.sqrt();
@@ -87,7 +101,7 @@ pub(super) fn others() -> Vec<Fruit> {
                 up,
                 -0.112 + f64::from(line) * row + shift,
             ];
-            all.push(fruit(grape, at, 0.006, 5));
+            all.push(fruit(grape, at, 0.006, GRAPES));
         }
     };
     grapes(&low, 0.0, 0.0);
@@ -111,10 +125,6 @@ fn sphere(radius: f64, count: usize) -> Mesh {
     let reach = DVec3::splat(radius);
     sculpt(|p| p.length() - radius, -reach, reach, count)
 }
-
-/// Where the stems begin, above the underside of the fruit.
-const APPLE_STEM: f64 = 0.0625;
-const PEAR_STEM: f64 = 0.1075;
 
 /// A spindle torus, narrower below, so that it has hollows above and below.
 fn apple(count: usize) -> Mesh {
@@ -140,10 +150,15 @@ fn pear(count: usize) -> Mesh {
     sculpt(distance, low, high, count)
 }
 
-fn stem(count: usize) -> Mesh {
-    let part = cone([0.0, 0.0, 0.0], 0.002, [0.004, 0.018, 0.0], 0.0024);
-    let (low, high) = (DVec3::splat(-0.004), DVec3::new(0.01, 0.022, 0.004));
-    sculpt(|p| part.distance(p), low, high, count)
+pub(super) fn stem(count: usize) -> Mesh {
+    let profile = [
+        [0.0, 0.0],
+        [0.0024, 0.0],
+        [0.0018, 0.012],
+        [0.0032, 0.024],
+        [0.0, 0.025],
+    ];
+    revolve(&profile.map(DVec2::from), count)
 }
 
 /// Round cones along an arc that lies on the table, thin towards the ends.

@@ -4,10 +4,9 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
-use super::fruit::{self, Fruit};
 use super::grid::{Part, Room};
 use super::stage::{self, Stage, diffuse, even_share};
-use super::{relief_maps, solid};
+use super::{fruit, relief_maps, solid};
 use crate::error::{Error, Result};
 use crate::scene::assemble::Mesh;
 use crate::scene::{BuiltinOptions, Camera, Material, Scene};
@@ -20,6 +19,9 @@ const DISH_SHARE: f64 = 0.12;
 /// Fewer leave the smallest grape without a shape.
 const LEAST_PATCHES: usize = 6_000;
 
+/// Of the smallest solid.
+const LEAST_TRIANGLES: usize = 24;
+
 /// Metres; the table is its floor.
 const ROOM: Room = Room {
     size: DVec3::new(1.4, 0.9, 1.0),
@@ -27,14 +29,14 @@ const ROOM: Room = Room {
     light_z: [0.25, 0.65],
 };
 /// Where the dish stands, and the height of its flat inside.
-const DISH_FOOT: DVec3 = DVec3::new(0.70, 1e-3, 0.45);
+const DISH_FOOT: DVec3 = DVec3::new(0.70, 1e-3, 0.52);
 const DISH_THICKNESS: f64 = 0.010;
 /// Between what lies on something and what it lies on.
 const GAP: f64 = 5e-4;
 /// Tiles of peel a metre, and how deep it is in metres: a texel is about a third of an element's edge in the default
 /// number, and the slope of the relief 0.3 in the root mean square.
 const REPEATS: f64 = 10.0;
-const HEIGHT: f32 = 0.0012;
+const HEIGHT: f32 = 0.0024;
 
 const ORANGE: u32 = 5;
 const DISH: u32 = 6;
@@ -64,16 +66,18 @@ pub(super) fn build(options: &BuiltinOptions) -> Result<Scene> {
         stage::cover(&mut orange, ORANGE, REPEATS);
         solids.push(orange);
     }
-    for Fruit {
-        build,
-        at,
-        share,
-        material,
-    } in fruit::others()
-    {
-        let mut mesh = build(even_share(patches, share));
-        lay(&mut mesh, at);
-        stage::cover(&mut mesh, ORANGE + 1 + material, 1.0);
+    for fruit in fruit::others() {
+        let count = |share| even_share(patches, share).max(LEAST_TRIANGLES);
+        let mut mesh = (fruit.build)(count(fruit.share));
+        lay(&mut mesh, fruit.at);
+        stage::cover(&mut mesh, ORANGE + 1 + fruit.material, 1.0);
+        if fruit.has_stem() {
+            let mut stem = fruit::stem(count(fruit::STEM_SHARE));
+            let foot = stage::top(&mesh, fruit::STEM_RADIUS) + DVec3::Y * GAP;
+            stage::stand(&mut stem, foot);
+            stage::cover(&mut stem, ORANGE + 1 + fruit::STEM, 1.0);
+            solids.push(stem);
+        }
         solids.push(mesh);
     }
 
@@ -105,8 +109,8 @@ pub(super) fn build(options: &BuiltinOptions) -> Result<Scene> {
         point_lights: Vec::new(),
         camera: Camera {
             name: "front".into(),
-            position: DVec3::new(0.70, 0.46, -0.28),
-            look_at: DVec3::new(0.70, 0.045, 0.43),
+            position: DVec3::new(0.70, 0.47, -0.30),
+            look_at: DVec3::new(0.70, 0.03, 0.48),
             up: DVec3::Y,
             fov_y: 40.0,
         },

@@ -22,9 +22,10 @@ pub fn orange_peel(size: u32) -> HeightMap {
     let pits = Scatter { cells: 11, seed: 2 };
     make("orange-peel", size, |u, v| {
         let [nearest, second] = pits.nearest_two(u, v);
-        let pit = |d: f64| (-d * d / 0.18).exp();
+        // Never deeper where two pits meet.
+        let pit = |d: f64| (-d * d / 0.16).exp();
         let uneven = (TAU * (2.0 * u + v)).sin() + (TAU * (u - 3.0 * v)).sin();
-        0.06 * uneven - pit(nearest) - pit(second)
+        0.05 * uneven - pit(nearest).hypot(pit(second)).min(1.0)
     })
 }
 

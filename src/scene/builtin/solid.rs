@@ -55,7 +55,8 @@ pub(super) fn revolve(profile: &[DVec2], count: usize) -> Mesh {
     let widest = profile.iter().map(|p| p.x).fold(0.0, f64::max);
     // 2 rings × segments triangles; the quads about square at half the greatest radius.
     let ratio = TAU * widest * 0.6 / length;
-    let rings = ((count as f64 / 2.0 / ratio).sqrt() as usize).max(profile.len() - 2);
+    let rings = (count as f64 / 2.0 / ratio).sqrt() as usize;
+    let rings = rings.min(count / 6).max(profile.len() - 2);
     let segments = (count / 2 / rings).max(3);
     let rings = resample(profile, rings);
     let mut positions = vec![DVec3::new(0.0, profile[0].y, 0.0)];

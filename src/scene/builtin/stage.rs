@@ -1,8 +1,9 @@
 //! What the built-in scenes have in common: rooms, statues from files, and where things stand.
 
+use std::f64::consts::TAU;
 use std::path::Path;
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec2, DVec3, swizzles::Vec3Swizzles};
 
 use super::grid::{self, Part, Room};
 use crate::error::{Error, Result};
@@ -171,6 +172,33 @@ pub(super) fn stand(mesh: &mut Mesh, foot: DVec3) {
     for position in &mut mesh.positions {
         *position = *position - under + foot;
     }
+}
+
+/// The lowest place over the middle of a mesh where something of that radius may stand, up to the mesh's own coarseness.
+pub(super) fn top(mesh: &Mesh, radius: f64) -> DVec3 {
+    let (low, high) = bounds(mesh);
+    let middle = (low + high) / 2.0;
+    let around = (0..8).map(|i| radius * DVec2::from_angle(TAU * f64::from(i) / 8.0));
+    let feet: Vec<DVec2> = around.chain([DVec2::ZERO]).collect();
+    let mut y = low.y;
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle
+            .corners
+            .map(|v| mesh.positions[v as usize] - middle);
+        for foot in &feet {
+            // Barycentric coordinates seen from above.
+            let across = |p: DVec3, q: DVec3| {
+                let (p, q) = (p.xz() - *foot, q.xz() - *foot);
+                p.perp_dot(q)
+            };
+            let weights = DVec3::new(across(b, c), across(c, a), across(a, b));
+            let sum = weights.element_sum();
+            if sum != 0.0 && (weights / sum).min_element() >= 0.0 {
+                y = y.max(middle.y + weights.dot(DVec3::new(a.y, b.y, c.y)) / sum);
+            }
+        }
+    }
+    DVec3::new(middle.x, y, middle.z)
 }
 
 /// The box around the corners of the triangles; a vertex that no triangle uses must not move what is seen.
