@@ -13,6 +13,7 @@ mod assemble;
 pub mod builtin;
 mod camera;
 mod check;
+mod displace;
 mod hash;
 mod load;
 mod map_files;
@@ -34,6 +35,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+pub use displace::displace;
 pub use load::{BuiltinOptions, load};
 pub use maps::{HeightMap, NormalMap};
 pub use material::Material;

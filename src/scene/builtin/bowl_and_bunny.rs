@@ -28,7 +28,7 @@ const BUNNY_TURN: f64 = -25.0;
 const BUNNY_FOOT: DVec3 = DVec3::new(0.71, 1e-3, 0.46);
 const BOWL_FOOT: DVec3 = DVec3::new(0.46, 1e-3, 0.40);
 /// Tiles of knit a metre, and how deep it is in metres: a texel is about a third of an element's edge in the default
-/// number, and the slope of the relief 0.4 in the root mean square.
+/// number, and the slope of the relief 0.27 in the root mean square.
 const REPEATS: f64 = 11.0;
 const HEIGHT: f32 = 0.0014;
 
