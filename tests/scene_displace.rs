@@ -228,10 +228,15 @@ fn at_a_seam_the_mean_of_the_heights_counts() {
     let high = displace(&flat);
     let corner = (heights.sample(0.0, 0.0) + heights.sample(0.25, 0.0)) / 2.0 - heights.mean();
     assert!((high.vertices[0].z - corner).abs() < 1e-15);
-    // A shift by whole repeats is no seam.
+    // A shift by whole repeats is no seam: the two count once, beside a third.
     for uv in &mut flat.triangles[1].uv {
         uv[0] += 6.75;
     }
+    let mut third = flat.clone();
+    third.vertices.push(DVec3::new(-2.0, 2.0, 0.0));
+    let uv = [[0.25, 0.0], [1.25, 1.0], [0.25, 1.0]];
+    third.triangles.push(triangle([0, 3, 4], uv, 0));
+    assert!((displace(&third).vertices[0].z - corner).abs() < 1e-15);
     let corner = heights.sample(0.0, 0.0) - heights.mean();
     assert!((displace(&flat).vertices[0].z - corner).abs() < 1e-15);
 }

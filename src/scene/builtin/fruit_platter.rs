@@ -32,7 +32,7 @@ const ROOM: Room = Room {
 const DISH_FOOT: DVec3 = DVec3::new(0.70, 1e-3, 0.52);
 const DISH_THICKNESS: f64 = 0.010;
 /// Between what lies on something and what it lies on.
-const GAP: f64 = 5e-4;
+const GAP: f64 = 1e-3;
 /// Tiles of peel a metre, and how deep it is in metres: a texel is about a third of an element's edge in the default
 /// number, and the slope of the relief 0.26 in the root mean square.
 const REPEATS: f64 = 10.0;

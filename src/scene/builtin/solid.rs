@@ -164,3 +164,32 @@ fn exactly(mut positions: Vec<DVec3>, mut triangles: Vec<[u32; 3]>, count: usize
         ..Mesh::default()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+
+    #[test]
+    fn splitting_keeps_a_solid_closed_and_as_large() {
+        let corners = [[0, 0, 0], [3, 0, 0], [0, 2, 0], [0, 0, 1]];
+        let positions = corners.map(|p| DVec3::from(p.map(f64::from))).to_vec();
+        let faces = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
+        for count in [4, 6, 100, 1_002] {
+            let mesh = exactly(positions.clone(), faces.clone(), count);
+            assert_eq!(mesh.triangles.len(), count);
+            let mut edges = HashSet::new();
+            let mut volume = 0.0;
+            for [a, b, c] in mesh.triangles.iter().map(|t| t.corners) {
+                for edge in [[a, b], [b, c], [c, a]] {
+                    assert!(edges.insert(edge), "{count}: {edge:?} twice");
+                }
+                let [a, b, c] = [a, b, c].map(|v| mesh.positions[v as usize]);
+                volume += a.dot(b.cross(c)) / 6.0;
+            }
+            assert!(edges.iter().all(|&[a, b]| edges.contains(&[b, a])));
+            assert!((volume - 1.0).abs() < 1e-12, "{count}: {volume}");
+        }
+    }
+}
