@@ -1,6 +1,6 @@
 //! What must hold for a scene as a whole, however it was read.
 
-use super::{Camera, Scene};
+use super::{Camera, Scene, relief_notes};
 use crate::error::{Error, Result};
 
 /// Extents within which the squares and areas of later steps stay far from the ends of f32.
@@ -41,6 +41,8 @@ pub(super) fn finish(mut scene: Scene) -> Result<Scene> {
         ));
     }
 
+    let mut notes = relief_notes::collect(&scene);
+    scene.notes.append(&mut notes);
     if scene.cameras.is_empty() {
         let camera = Camera::for_scene(&scene);
         scene

@@ -16,7 +16,7 @@ pub struct BuiltinOptions {
     pub statue: Option<PathBuf>,
 }
 
-/// Reads the scene that `spec` names: a built-in one (`cornell`), an `.obj` file or a `scene.toml` file.
+/// Reads the scene that `spec` names: a built-in one ([`builtin::NAMES`]), an `.obj` file or a `scene.toml` file.
 ///
 /// # Errors
 /// A name that is neither; a file that cannot be read or used, with the line or the material; a scene that cannot be
@@ -38,7 +38,7 @@ pub fn load(spec: &str, options: &BuiltinOptions) -> Result<Scene> {
     }
     if options.patches.is_some() || options.statue.is_some() {
         return Err(Error::Usage(format!(
-            "a number of patches and a statue belong to the built-in scene ({}), not to {spec}",
+            "a number of patches and a statue belong to the built-in scenes ({}), not to {spec}",
             builtin::NAMES.join(", ")
         )));
     }

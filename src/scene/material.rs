@@ -43,7 +43,8 @@ impl Default for Material {
 pub(super) const DEFAULT_KD: f32 = 0.5;
 
 impl Material {
-    /// Checks reflectance in 0..=1, texture included, and emission finite and not negative; the error is one clause.
+    /// Checks reflectance in 0..=1, texture included, emission finite and not negative, and the relief finite; the error
+    /// is one clause.
     pub(super) fn check(&self) -> Result<(), String> {
         if !self.kd.iter().all(|c| (0.0..=1.0).contains(c)) {
             return Err(format!("reflectance Kd {} must be in 0..=1", rgb(self.kd)));
@@ -53,6 +54,19 @@ impl Material {
                 "emitted radiance Ke {} must be finite and not negative",
                 rgb(self.ke)
             ));
+        }
+        if !self.height_scale.is_finite() {
+            return Err(format!("height scale {} must be finite", self.height_scale));
+        }
+        if let Some(map) = &self.map_height {
+            let highest = map.values.iter().fold(0.0_f32, |most, v| most.max(v.abs()));
+            if !(highest * self.height_scale).is_finite() {
+                return Err(format!(
+                    "the heights of {} times {} are beyond every number",
+                    map.path.display(),
+                    self.height_scale
+                ));
+            }
         }
         let Some(texture) = &self.map_kd else {
             return Ok(());
@@ -105,25 +119,60 @@ impl std::fmt::Display for MadeUp {
     }
 }
 
-/// Textures by path, so that materials share what they have in common.
+/// Textures and relief maps by path, so that materials share what they have in common.
 #[derive(Default)]
-pub(super) struct TextureCache(HashMap<PathBuf, Arc<Texture>>);
+pub(super) struct TextureCache {
+    textures: HashMap<PathBuf, Arc<Texture>>,
+    heights: HashMap<PathBuf, Arc<HeightMap>>,
+    normals: HashMap<PathBuf, Arc<NormalMap>>,
+    /// What reading them gave to say, for whoever reads next to pass on.
+    pub notes: Vec<String>,
+}
+
+/// Where a map is asked for.
+#[derive(Clone, Copy)]
+pub(super) struct Asked<'a> {
+    /// To whose folder the name of the map is relative.
+    pub file: &'a Path,
+    pub material: &'a str,
+    /// The statement or key that names the map.
+    pub keyword: &'a str,
+}
 
 impl TextureCache {
-    /// The texture `name`, relative to the folder of `file`, in which `material` asks for it.
-    pub fn get(&mut self, file: &Path, material: &str, name: &str) -> Result<Arc<Texture>> {
-        // Exporters on Windows write `textures\brick.png`, which no other system can open.
-        let path = file.with_file_name(name.replace('\\', "/"));
-        if let Some(texture) = self.0.get(&path) {
-            return Ok(texture.clone());
-        }
-        let texture = Texture::load(&path).map_err(|error| Error::Material {
-            path: file.to_owned(),
-            material: material.to_owned(),
-            what: format!("map_Kd: {error}"),
-        })?;
-        let texture = Arc::new(texture);
-        self.0.insert(path, texture.clone());
-        Ok(texture)
+    pub fn texture(&mut self, asked: Asked, name: &str) -> Result<Arc<Texture>> {
+        cached(&mut self.textures, asked, name, Texture::load)
     }
+
+    pub fn heights(&mut self, asked: Asked, name: &str) -> Result<Arc<HeightMap>> {
+        cached(&mut self.heights, asked, name, |path| {
+            let (map, note) = HeightMap::load(path)?;
+            self.notes.extend(note);
+            Ok(map)
+        })
+    }
+
+    pub fn normals(&mut self, asked: Asked, name: &str) -> Result<Arc<NormalMap>> {
+        cached(&mut self.normals, asked, name, NormalMap::load)
+    }
+}
+
+fn cached<T>(
+    known: &mut HashMap<PathBuf, Arc<T>>,
+    asked: Asked,
+    name: &str,
+    read: impl FnOnce(&Path) -> Result<T>,
+) -> Result<Arc<T>> {
+    // Exporters on Windows write `textures\brick.png`, which no other system can open.
+    let path = asked.file.with_file_name(name.replace('\\', "/"));
+    if let Some(map) = known.get(&path) {
+        return Ok(map.clone());
+    }
+    let map = Arc::new(read(&path).map_err(|error| Error::Material {
+        path: asked.file.to_owned(),
+        material: asked.material.to_owned(),
+        what: format!("{}: {error}", asked.keyword),
+    })?);
+    known.insert(path, map.clone());
+    Ok(map)
 }

@@ -6,21 +6,25 @@
 //! ```text
 //! .obj ─► obj_lint ─► obj + mtl ─┐
 //! scene.toml ─► scene_file ──────┼─► assemble ─► check ─► Scene ─► write
-//! cornell ─► builtin ────────────┘
+//! built-in name ─► builtin ──────┘
 //! ```
 
 mod assemble;
 pub mod builtin;
 mod camera;
 mod check;
+mod displace;
 mod hash;
 mod load;
+mod map_files;
 mod maps;
 mod material;
 mod mtl;
+mod mtl_relief;
 mod obj;
 mod obj_lint;
 mod placement;
+mod relief_notes;
 mod scene_file;
 mod texture;
 mod uv;
@@ -31,6 +35,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+pub use displace::displace;
 pub use load::{BuiltinOptions, load};
 pub use maps::{HeightMap, NormalMap};
 pub use material::Material;

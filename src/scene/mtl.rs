@@ -1,9 +1,10 @@
-//! Wavefront MTL material libraries: `Kd`, `Ke`, `map_Kd`.
+//! Wavefront MTL material libraries: `Kd`, `Ke`, `map_Kd`, and the maps of the relief.
 
 use std::path::Path;
 
 use super::Material;
-use super::material::{DEFAULT_KD, MadeUp, TextureCache};
+use super::material::{Asked, DEFAULT_KD, MadeUp, TextureCache};
+use super::mtl_relief::{self, Relief};
 use super::obj::read_text;
 use super::obj_lint::{brief, finite, statements};
 use crate::error::{Error, Result};
@@ -12,6 +13,7 @@ pub(super) struct Library {
     /// In the order of the file.
     pub materials: Vec<Material>,
     pub made_up: Vec<MadeUp>,
+    pub notes: Vec<String>,
 }
 
 /// Reads a library with its textures, whose paths are relative to it.
@@ -19,15 +21,21 @@ pub(super) struct Library {
 /// # Errors
 /// The first wrong line; a material whose numbers or texture cannot be used.
 pub(super) fn read(path: &Path, textures: &mut TextureCache) -> Result<Library> {
-    let text = check(path, &read_text(path)?)?;
-    let (read, _) = tobj::load_mtl_buf(&mut text.as_bytes())
+    let checked = check(path, &read_text(path)?)?;
+    let (read, _) = tobj::load_mtl_buf(&mut checked.text.as_bytes())
         .map_err(|error| Error::file(path, error.to_string()))?;
 
     let mut library = Library {
         materials: Vec::new(),
         made_up: Vec::new(),
+        notes: Vec::new(),
     };
-    for material in read {
+    assert_eq!(
+        read.len(),
+        checked.reliefs.len(),
+        "tobj and the check see the same materials"
+    );
+    for (material, relief) in read.into_iter().zip(&checked.reliefs) {
         // With a texture and no factor the texture is the reflectance.
         let default = if material.diffuse_texture.is_some() {
             1.0
@@ -41,10 +49,17 @@ pub(super) fn read(path: &Path, textures: &mut TextureCache) -> Result<Library> 
             });
         }
         let map_kd = match &material.diffuse_texture {
-            Some(name) => Some(textures.get(path, &material.name, name)?),
+            Some(name) => {
+                let asked = Asked {
+                    file: path,
+                    material: &material.name,
+                    keyword: "map_Kd",
+                };
+                Some(textures.texture(asked, name)?)
+            }
             None => None,
         };
-        let material = Material {
+        let mut material = Material {
             kd: material
                 .diffuse
                 .map_or([default; 3], |kd| kd.map(|c| c as f32)),
@@ -55,6 +70,7 @@ pub(super) fn read(path: &Path, textures: &mut TextureCache) -> Result<Library> 
             map_kd,
             ..Material::default()
         };
+        relief.read(path, textures, &mut material, &mut library.notes)?;
         material.check().map_err(|what| Error::Material {
             path: path.to_owned(),
             material: material.name.clone(),
@@ -65,10 +81,19 @@ pub(super) fn read(path: &Path, textures: &mut TextureCache) -> Result<Library> 
     Ok(library)
 }
 
-/// Checks the text line by line and leaves what tobj is to read: it panics on a `Ka`, `Kd`, `Ks` or `Ke` that is short.
-fn check(path: &Path, text: &str) -> Result<String> {
+struct Checked {
+    /// What tobj is to read.
+    text: String,
+    /// `[material]`, in the order of the file.
+    reliefs: Vec<Relief>,
+}
+
+/// Checks the text line by line. Of a `Ka`, `Kd`, `Ks` or `Ke` that is short tobj panics, and the relief maps it does not
+/// know in full.
+fn check(path: &Path, text: &str) -> Result<Checked> {
     let mut kept = String::new();
     let mut names: Vec<String> = Vec::new();
+    let mut reliefs: Vec<Relief> = Vec::new();
     for (line, statement) in statements(text) {
         let statement = statement.trim();
         let (keyword, rest) = statement
@@ -78,6 +103,10 @@ fn check(path: &Path, text: &str) -> Result<String> {
             "newmtl" => new_material(rest, &mut names),
             "Kd" | "Ke" => colour(keyword, rest),
             "map_Kd" => texture(rest),
+            _ if mtl_relief::is_keyword(keyword) => match reliefs.last_mut() {
+                Some(relief) => relief.add(keyword, rest),
+                None => Ok(()),
+            },
             _ => continue,
         };
         let checked = checked.and_then(|()| match names.is_empty() {
@@ -91,13 +120,20 @@ fn check(path: &Path, text: &str) -> Result<String> {
             };
             Error::line(path, line, what)
         })?;
+        reliefs.resize_with(names.len(), Relief::default);
+        if mtl_relief::is_keyword(keyword) {
+            continue;
+        }
         let operands = match keyword {
             "Kd" | "Ke" => rest.split_once('#').map_or(rest, |(numbers, _)| numbers),
             _ => rest,
         };
         kept.push_str(&format!("{keyword} {operands}\n"));
     }
-    Ok(kept)
+    Ok(Checked {
+        text: kept,
+        reliefs,
+    })
 }
 
 fn new_material(name: &str, names: &mut Vec<String>) -> Result<(), String> {

@@ -66,6 +66,8 @@ fn materials(
                 return Err(Error::line(path, *line, what));
             }
             let read = mtl::read(&file, textures)?;
+            mesh.notes.extend(read.notes);
+            mesh.notes.append(&mut textures.notes);
             for material in read.materials {
                 if mesh.materials.iter().any(|m| m.name == material.name) {
                     return Err(Error::Material {

@@ -9,7 +9,7 @@ use toml::Spanned;
 
 use super::assemble::{Assembly, Mesh};
 use super::load::stem;
-use super::material::{DEFAULT_KD, MadeUp, TextureCache};
+use super::material::{Asked, DEFAULT_KD, MadeUp, TextureCache};
 use super::obj::read_text;
 use super::placement::{Placement, Scale};
 use super::{Camera, Material, PointLight, Scene, check, obj};
@@ -53,6 +53,10 @@ pub(super) struct MaterialTable {
     kd: Option<[f32; 3]>,
     ke: Option<[f32; 3]>,
     map_kd: Option<String>,
+    height_map: Option<String>,
+    /// Scene units for a value of 1.
+    height_scale: Option<f32>,
+    normal_map: Option<String>,
 }
 
 #[derive(Debug, Deserialize, Serialize)]
@@ -240,9 +244,27 @@ fn change_material(
     if let Some(ke) = changes.ke {
         material.ke = ke;
     }
+    let asked = |keyword| Asked {
+        file: lines.path,
+        material: name,
+        keyword,
+    };
     if let Some(file) = &changes.map_kd {
-        material.map_kd = Some(textures.get(lines.path, name, file)?);
+        material.map_kd = Some(textures.texture(asked("map_kd"), file)?);
     }
+    if let Some(file) = &changes.height_map {
+        material.map_height = Some(textures.heights(asked("height_map"), file)?);
+    }
+    if let Some(scale) = changes.height_scale {
+        if material.map_height.is_none() {
+            return Err(refuse("height_scale needs a height_map".into()));
+        }
+        material.height_scale = scale;
+    }
+    if let Some(file) = &changes.normal_map {
+        material.map_normal = Some(textures.normals(asked("normal_map"), file)?);
+    }
+    mesh.notes.append(&mut textures.notes);
     material.check().map_err(refuse)
 }
 

@@ -26,12 +26,7 @@ impl Texture {
     /// A file that cannot be read or decoded, or that passes the decoder's memory limit; a texel that is negative or
     /// not finite.
     pub fn load(path: &Path) -> Result<Self> {
-        let reader = image::ImageReader::open(path)
-            .and_then(image::ImageReader::with_guessed_format)
-            .map_err(|source| Error::read(path, source))?;
-        let decoded = reader
-            .decode()
-            .map_err(|error| Error::file(path, format!("cannot be decoded: {error}")))?;
+        let decoded = decode(path)?;
         let (width, height) = (decoded.width(), decoded.height());
         let texels = match decoded {
             DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
@@ -78,6 +73,7 @@ impl Texture {
     fn bilinear(&self, u: f64, v: f64) -> [f32; 3] {
         let (columns, x) = neighbours(u, self.width);
         let (rows, y) = neighbours(1.0 - v, self.height);
+        let (x, y) = (x as f32, y as f32);
         let texel = |row: usize, column: usize| {
             self.texels[rows[row] * self.width as usize + columns[column]]
         };
@@ -136,12 +132,21 @@ impl Texture {
     }
 }
 
+/// An image as its file holds it, of whichever format its first bytes tell.
+pub(super) fn decode(path: &Path) -> Result<DynamicImage> {
+    image::ImageReader::open(path)
+        .and_then(image::ImageReader::with_guessed_format)
+        .map_err(|source| Error::read(path, source))?
+        .decode()
+        .map_err(|error| Error::file(path, format!("cannot be decoded: {error}")))
+}
+
 /// The two texels about a coordinate in repeats, and how far it lies towards the second.
-fn neighbours(coordinate: f64, size: u32) -> ([usize; 2], f32) {
+pub(super) fn neighbours(coordinate: f64, size: u32) -> ([usize; 2], f64) {
     let at = coordinate.rem_euclid(1.0) * f64::from(size) - 0.5;
     let low = at.floor();
     let first = (low as i64).rem_euclid(i64::from(size)) as usize;
-    ([first, (first + 1) % size as usize], (at - low) as f32)
+    ([first, (first + 1) % size as usize], at - low)
 }
 
 /// A uniform place in the triangle (0,0), (1,0), (0,1), the same for the same number.

@@ -1,44 +1,42 @@
-//! A sitting rabbit, sculpted from round cones. The head looks towards −z, y is up; about 1.2 high.
+//! A sitting bunny, sculpted from round cones.
 
 use glam::DVec3;
 
-use super::shapes::{RoundCone, cone, smooth_union};
+use super::round_cone::{RoundCone, cone, smooth_union};
 
-/// On the plane x = 0.
+/// On the plane x = 0; units of its own, the head looks towards −z, y is up.
 const TRUNK: [RoundCone; 5] = [
-    // Rump and back.
-    cone([0.0, 0.34, 0.17], 0.30, [0.0, 0.37, -0.12], 0.235),
-    // Chest and neck.
-    cone([0.0, 0.42, -0.16], 0.20, [0.0, 0.64, -0.27], 0.145),
+    // Rump to chest.
+    cone([0.0, 0.34, 0.16], 0.30, [0.0, 0.52, -0.08], 0.235),
+    cone([0.0, 0.50, -0.08], 0.23, [0.0, 0.72, -0.16], 0.15),
     // Skull and muzzle.
-    cone([0.0, 0.75, -0.31], 0.170, [0.0, 0.71, -0.43], 0.120),
-    cone([0.0, 0.71, -0.43], 0.115, [0.0, 0.68, -0.50], 0.070),
+    cone([0.0, 0.88, -0.16], 0.185, [0.0, 0.86, -0.24], 0.17),
+    cone([0.0, 0.83, -0.30], 0.125, [0.0, 0.81, -0.38], 0.085),
     // Tail.
-    cone([0.0, 0.27, 0.50], 0.100, [0.0, 0.32, 0.53], 0.080),
+    cone([0.0, 0.22, 0.50], 0.09, [0.0, 0.26, 0.53], 0.085),
 ];
 
 /// On the side of positive x; the other side mirrors them.
 const LIMBS: [RoundCone; 7] = [
     // Ear.
-    cone([0.070, 0.86, -0.26], 0.052, [0.115, 1.06, -0.20], 0.068),
-    cone([0.115, 1.06, -0.20], 0.068, [0.140, 1.24, -0.13], 0.032),
+    cone([0.075, 1.00, -0.12], 0.050, [0.115, 1.30, -0.07], 0.074),
+    cone([0.115, 1.30, -0.07], 0.074, [0.145, 1.53, -0.04], 0.038),
     // Cheek.
-    cone([0.065, 0.69, -0.40], 0.085, [0.05, 0.67, -0.45], 0.065),
+    cone([0.075, 0.80, -0.27], 0.085, [0.080, 0.80, -0.25], 0.085),
     // Haunch and hind foot.
-    cone([0.17, 0.27, 0.17], 0.220, [0.22, 0.20, 0.02], 0.165),
-    cone([0.22, 0.068, 0.08], 0.068, [0.24, 0.060, -0.22], 0.060),
+    cone([0.20, 0.27, 0.16], 0.205, [0.215, 0.20, 0.08], 0.17),
+    cone([0.215, 0.075, 0.10], 0.075, [0.225, 0.065, -0.26], 0.065),
     // Foreleg and paw.
-    cone([0.105, 0.36, -0.24], 0.090, [0.105, 0.08, -0.33], 0.058),
-    cone([0.105, 0.062, -0.33], 0.060, [0.105, 0.055, -0.41], 0.055),
+    cone([0.105, 0.50, -0.20], 0.095, [0.095, 0.12, -0.27], 0.062),
+    cone([0.095, 0.06, -0.27], 0.060, [0.095, 0.055, -0.34], 0.055),
 ];
 
-/// Width of the fillets between parts.
-const BLEND: f64 = 0.05;
+const BLEND: f64 = 0.06;
 /// A box around all of it.
-pub(super) const LOW: DVec3 = DVec3::new(-0.45, -0.03, -0.62);
-pub(super) const HIGH: DVec3 = DVec3::new(0.45, 1.32, 0.68);
+pub(super) const LOW: DVec3 = DVec3::new(-0.48, -0.05, -0.52);
+pub(super) const HIGH: DVec3 = DVec3::new(0.48, 1.62, 0.68);
 
-/// Negative inside, nearly the distance.
+/// Negative inside. Nearly the distance.
 pub(super) fn distance(p: DVec3) -> f64 {
     let aside = DVec3::new(p.x.abs(), p.y, p.z);
     let trunk = TRUNK.iter().map(|part| part.distance(p));

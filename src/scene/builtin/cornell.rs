@@ -2,19 +2,26 @@
 
 use glam::DVec3;
 
-use super::grid::{self, Part, ROOM};
-use super::{placing, statue};
+use super::grid::{self, Part, Room};
+use super::stage::{self, diffuse};
+use super::statue;
 use crate::error::{Error, Result};
-use crate::scene::assemble::{Assembly, Mesh, MeshTriangle};
+use crate::scene::assemble::Assembly;
 use crate::scene::uv::box_projection;
 use crate::scene::{BuiltinOptions, Camera, Material, Scene, check};
 
 /// Elements if nothing else is asked for.
 const PATCHES: usize = 12_000;
+/// The measured box.
+pub(super) const ROOM: Room = Room {
+    size: DVec3::new(5.56, 5.488, 5.592),
+    light_x: [2.13, 3.43],
+    light_z: [2.27, 3.32],
+};
 /// The greatest extent of the statue over the height of the room.
-const STATUE_SIZE: f64 = 0.6;
+pub(super) const STATUE_SIZE: f64 = 0.6;
 /// Turns a head that looks towards −z, to the camera, to the left and half towards it.
-const STATUE_TURN: f64 = -60.0;
+pub(super) const STATUE_TURN: f64 = -60.0;
 /// Triangles of the statue made by code: fewer lose the ears, more show no more of it.
 const STATUE_TRIANGLES: std::ops::RangeInclusive<usize> = 3_000..=25_780;
 
@@ -25,12 +32,12 @@ const STATUE_TRIANGLES: std::ops::RangeInclusive<usize> = 3_000..=25_780;
 pub(super) fn build(options: &BuiltinOptions) -> Result<Scene> {
     let patches = options.patches.unwrap_or(PATCHES);
     let mut mesh = match &options.statue {
-        Some(path) => placing::read_statue(path)?,
+        Some(path) => stage::read_statue(path)?,
         None => {
             statue::build((patches / 2).clamp(*STATUE_TRIANGLES.start(), *STATUE_TRIANGLES.end()))
         }
     };
-    stand_in_room(&mut mesh);
+    stage::place(&mut mesh, STATUE_SIZE * ROOM.size.y, STATUE_TURN, FOOT);
     for triangle in &mut mesh.triangles {
         triangle.material = STATUE_MATERIAL;
         // Of a mesh from a file the person is told that coordinates were made up; here there is nothing to tell.
@@ -39,18 +46,7 @@ pub(super) fn build(options: &BuiltinOptions) -> Result<Scene> {
             triangle.uv = Some(box_projection(corners));
         }
     }
-    assemble("cornell", mesh, materials(), options.patches, PATCHES)
-}
-
-/// Puts the room around the statue that stands in it: exactly `asked` elements, or else `usual` or twice the statue's.
-pub(super) fn assemble(
-    name: &str,
-    mut mesh: Mesh,
-    materials: [Material; 5],
-    asked: Option<usize>,
-    usual: usize,
-) -> Result<Scene> {
-    let statue = placing::count(&mesh);
+    let statue = stage::count(&mesh);
     let least = statue + grid::least_triangles();
     // Only a statue that was asked for may need more than the patches that were not.
     let patches = match asked {
@@ -63,19 +59,16 @@ pub(super) fn assemble(
         Some(patches) => patches,
     };
 
-    let mut assembly = Assembly::new(name.into(), None);
-    let materials = assembly.add_materials(&materials);
-    assembly.add_mesh(&room(patches - statue), &materials)?;
+    let mut assembly = Assembly::new("cornell".into(), None);
+    let materials = assembly.add_materials(&materials());
+    assembly.add_mesh(
+        &stage::room(&ROOM, patches - statue, material_of),
+        &materials,
+    )?;
     assembly.add_mesh(&mesh, &materials)?;
     let scene = &mut assembly.scene;
     scene.notes.append(&mut mesh.notes);
-    scene.cameras.push(Camera {
-        name: "front".into(),
-        position: DVec3::new(2.78, 2.73, -8.0),
-        look_at: DVec3::new(2.78, 2.73, 0.0),
-        up: DVec3::Y,
-        fov_y: 39.3,
-    });
+    scene.cameras.push(camera());
     assert_eq!(
         scene.triangles.len(),
         patches,
@@ -84,13 +77,22 @@ pub(super) fn assemble(
     check::finish(assembly.into_scene())
 }
 
+/// The middle of the floor, where the statue stands.
+pub(super) const FOOT: DVec3 = DVec3::new(ROOM.size.x / 2.0, 0.0, ROOM.size.z / 2.0);
+
+/// The camera of the measured data.
+pub(super) fn camera() -> Camera {
+    Camera {
+        name: "front".into(),
+        position: DVec3::new(2.78, 2.73, -8.0),
+        look_at: DVec3::new(2.78, 2.73, 0.0),
+        up: DVec3::Y,
+        fov_y: 39.3,
+    }
+}
+
 /// In the order of [`material_of`].
 pub(super) fn materials() -> [Material; 5] {
-    let diffuse = |name: &str, kd| Material {
-        name: name.into(),
-        kd,
-        ..Material::default()
-    };
     [
         diffuse("white", [0.725, 0.71, 0.68]),
         diffuse("red", [0.63, 0.065, 0.05]),
@@ -105,31 +107,11 @@ pub(super) fn materials() -> [Material; 5] {
 
 pub(super) const STATUE_MATERIAL: u32 = 4;
 
-fn material_of(part: Part) -> u32 {
+pub(super) fn material_of(part: Part) -> u32 {
     match part {
-        Part::White => 0,
-        Part::Red => 1,
-        Part::Green => 2,
+        Part::Floor | Part::Ceiling | Part::Back => 0,
+        Part::Left => 1,
+        Part::Right => 2,
         Part::Light => 3,
     }
-}
-
-fn room(count: usize) -> Mesh {
-    let mut mesh = Mesh::default();
-    for (corners, part) in grid::triangles(count) {
-        let first = mesh.positions.len() as u32;
-        mesh.positions.extend(corners);
-        mesh.triangles.push(MeshTriangle {
-            corners: [first, first + 1, first + 2],
-            uv: Some(box_projection(corners)),
-            material: material_of(part),
-        });
-    }
-    mesh
-}
-
-/// In the middle of the floor.
-pub(super) fn stand_in_room(mesh: &mut Mesh) {
-    let middle = DVec3::new(ROOM.x / 2.0, 0.0, ROOM.z / 2.0);
-    placing::stand(mesh, STATUE_TURN, STATUE_SIZE * ROOM.y, middle);
 }

@@ -1,80 +1,187 @@
-//! Fruit as implicit shapes, about one unit in radius, y up.
+//! The fruit of the platter. Places are metres about the middle of the dish, y above its flat inside.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
-use super::shapes::{RoundCone, cone, smooth_union};
+use super::round_cone::{cone, smooth_union};
+use super::solid::{revolve, sculpt};
+use super::stage::diffuse;
+use crate::scene::Material;
+use crate::scene::assemble::Mesh;
 
-/// A box around each of them.
-pub(super) const LOW: DVec3 = DVec3::splat(-1.2);
-pub(super) const HIGH: DVec3 = DVec3::splat(1.2);
+/// Radii, metres.
+const ORANGE: f64 = 0.040;
+const GRAPE: f64 = 0.0125;
 
-/// A ball with a dimple where the stalk was.
-pub(super) fn orange(p: DVec3) -> f64 {
-    let aside = (p.x * p.x + p.z * p.z) / (0.22 * 0.22);
-    let dimple = match p.y > 0.0 {
-        true => (1.0 - aside).max(0.0).powi(2),
-        false => 0.0,
-    };
-    p.length() - 1.0 + 0.05 * dimple
-}
-
-/// A ring without a hole, narrower below.
-pub(super) fn apple(p: DVec3) -> f64 {
-    let narrow = 1.0 + 0.16 * (0.5 - p.y).clamp(0.0, 1.3);
-    let aside = p.x.hypot(p.z) * narrow - 0.38;
-    aside.hypot(p.y * 0.72) - 0.60
-}
-
-/// Where the stalk of an apple starts.
-pub(super) const APPLE_STALK: f64 = 0.62;
-
-const PEAR: [RoundCone; 2] = [
-    cone([0.0, -0.45, 0.0], 0.52, [0.0, 0.05, 0.0], 0.36),
-    cone([0.0, 0.05, 0.0], 0.36, [0.0, 0.62, 0.0], 0.22),
+/// Four in a pyramid, 1.5 mm apart, and one aside.
+pub(super) const ORANGES: [[f64; 3]; 5] = [
+    [-0.105, 0.0, -0.020],
+    [-0.0235, 0.0, -0.020],
+    [-0.06425, 0.0, 0.0506],
+    [-0.06425, 0.0667, 0.0035],
+    [0.100, 0.0, -0.078],
 ];
 
-pub(super) fn pear(p: DVec3) -> f64 {
-    PEAR.iter()
-        .map(|part| part.distance(p))
-        .fold(f64::INFINITY, |a, b| smooth_union(a, b, 0.25))
+pub(super) struct Fruit {
+    /// With a number of triangles.
+    pub build: fn(usize) -> Mesh,
+    /// The middle of its underside; on the table where y is negative.
+    pub at: DVec3,
+    /// Of all the triangles.
+    pub share: f64,
+    /// Index into [`materials`], counted from 1.
+    pub material: u32,
 }
 
-/// Where the stalk of a pear starts.
-pub(super) const PEAR_STALK: f64 = 0.82;
-
-/// Lies on its side, bent about the y axis; its middle is towards −z.
-pub(super) fn banana(p: DVec3) -> f64 {
-    const BEND: f64 = 0.95;
-    const HALF_TURN: f64 = 0.95;
-    let p = p - DVec3::new(0.0, 0.0, 0.6);
-    let angle = p.x.atan2(-p.z).clamp(-HALF_TURN, HALF_TURN);
-    let on_arc = DVec3::new(BEND * angle.sin(), 0.0, -BEND * angle.cos());
-    let along = angle / HALF_TURN;
-    // Full in the middle, with a blunt tip at one end and a stalk at the other.
-    let full = 1.0 - along.powi(4);
-    p.distance(on_arc) - (0.065 + 0.125 * full)
-}
-
-/// Grapes of a bunch in three layers, each on the gaps of the one below: rows along x, how many across.
-const LAYERS: [&[usize]; 3] = [&[1, 2, 3, 4, 3], &[1, 2, 3], &[1, 2]];
-const GRAPE: f64 = 0.21;
-/// Neighbours are pressed together a little, so that a bunch is one surface.
-const APART: f64 = 1.9 * GRAPE;
-
-pub(super) fn grapes(p: DVec3) -> f64 {
-    let (row_apart, layer_apart) = (0.75_f64.sqrt() * APART, (2.0_f64 / 3.0).sqrt() * APART);
-    let mut nearest = f64::INFINITY;
-    for (layer, rows) in LAYERS.iter().enumerate() {
-        for (row, &across) in rows.iter().enumerate() {
-            for k in 0..across {
-                let centre = DVec3::new(
-                    (row as f64 + layer as f64 * 2.0 / 3.0) * row_apart - 0.75,
-                    layer as f64 * layer_apart - 0.3,
-                    (k as f64 - (across - 1) as f64 / 2.0) * APART,
-                );
-                nearest = smooth_union(nearest, p.distance(centre) - GRAPE, 0.03);
-            }
-        }
+impl Fruit {
+    /// Whether a stem stands on it.
+    pub fn has_stem(&self) -> bool {
+        [RED_APPLE, GREEN_APPLE, PEAR].contains(&self.material)
     }
-    nearest
+}
+
+const RED_APPLE: u32 = 1;
+const GREEN_APPLE: u32 = 2;
+const PEAR: u32 = 3;
+const BANANA: u32 = 4;
+const GRAPES: u32 = 5;
+pub(super) const STEM: u32 = 6;
+pub(super) const STEM_SHARE: f64 = 0.0012;
+/// Metres about its middle that a stem takes.
+pub(super) const STEM_RADIUS: f64 = 0.0033;
+
+/// In the order of [`Fruit::material`].
+pub(super) fn materials() -> [Material; 6] {
+    [
+        diffuse("red apple", [0.58, 0.05, 0.04]),
+        diffuse("green apple", [0.36, 0.50, 0.08]),
+        diffuse("pear", [0.62, 0.58, 0.14]),
+        diffuse("banana", [0.84, 0.66, 0.10]),
+        diffuse("grape", [0.20, 0.05, 0.22]),
+        diffuse("stem", [0.16, 0.10, 0.05]),
+    ]
+}
+
+/// Everything but the oranges.
+pub(super) fn others() -> Vec<Fruit> {
+    let fruit = |build, at: [f64; 3], share, material| Fruit {
+        build,
+        at: DVec3::from(at),
+        share,
+        material,
+    };
+    let mut all = Vec::new();
+    let apples = [
+        ([0.076, 0.0, 0.068], RED_APPLE),
+        ([0.012, 0.0, -0.118], GREEN_APPLE),
+        ([0.156, 0.0, 0.010], RED_APPLE),
+    ];
+    for (at, material) in apples {
+        all.push(fruit(apple, at, 0.032, material));
+    }
+    all.push(fruit(pear, [-0.005, 0.0, 0.135], 0.032, PEAR));
+    all.push(fruit(banana, [-0.10, -1.0, -0.328], 0.036, BANANA));
+    // A layer of hexagons and the second in its hollows.
+    let apart = 2.0 * GRAPE + 3e-4;
+    let row = apart * 0.75_f64.sqrt();
+    let low = [
+        (-1.0, 0),
+        (0.0, 0),
+        (1.0, 0),
+        (-0.5, 1),
+        (0.5, 1),
+        (-0.5, -1),
+        (0.5, -1),
+        (1.5, -1),
+    ];
+    let high = [(-0.5, 0), (0.5, 0), (0.0, -1), (1.0, -1)];
+    let mut grapes = |places: &[(f64, i32)], up: f64, shift: f64| {
+        for &(column, line) in places {
+            let at = [
+                -0.090 + column * apart,
+                up,
+                -0.112 + f64::from(line) * row + shift,
+            ];
+            all.push(fruit(grape, at, 0.006, GRAPES));
+        }
+    };
+    grapes(&low, 0.0, 0.0);
+    grapes(
+        &high,
+        apart * (2.0_f64 / 3.0).sqrt(),
+        apart / 12.0_f64.sqrt(),
+    );
+    all
+}
+
+pub(super) fn orange(count: usize) -> Mesh {
+    sphere(ORANGE, count)
+}
+
+fn grape(count: usize) -> Mesh {
+    sphere(GRAPE, count)
+}
+
+fn sphere(radius: f64, count: usize) -> Mesh {
+    let reach = DVec3::splat(radius);
+    sculpt(|p| p.length() - radius, -reach, reach, count)
+}
+
+/// A spindle torus, narrower below, so that it has hollows above and below.
+fn apple(count: usize) -> Mesh {
+    let (ring, tube) = (0.0175, 0.0225);
+    let distance = |p: DVec3| {
+        let narrow = 1.0 + 4.0 * p.y.min(0.03);
+        let across = DVec3::new(p.x, 0.0, p.z).length() / narrow;
+        (across - ring).hypot(p.y / 1.45) - tube
+    };
+    sculpt(distance, DVec3::splat(-0.05), DVec3::splat(0.05), count)
+}
+
+fn pear(count: usize) -> Mesh {
+    let parts = [
+        cone([0.0, 0.036, 0.0], 0.036, [0.0, 0.044, 0.0], 0.036),
+        cone([0.0, 0.060, 0.0], 0.026, [0.003, 0.092, 0.0], 0.015),
+    ];
+    let distance = |p: DVec3| smooth_union(parts[0].distance(p), parts[1].distance(p), 0.03);
+    let (low, high) = (
+        DVec3::new(-0.05, -0.01, -0.05),
+        DVec3::new(0.05, 0.12, 0.05),
+    );
+    sculpt(distance, low, high, count)
+}
+
+pub(super) fn stem(count: usize) -> Mesh {
+    let profile = [
+        [0.0, 0.0],
+        [0.0024, 0.0],
+        [0.0018, 0.012],
+        [0.0032, 0.024],
+        [0.0, 0.025],
+    ];
+    revolve(&profile.map(DVec2::from), count)
+}
+
+/// Round cones along an arc that lies on the table, thin towards the ends.
+fn banana(count: usize) -> Mesh {
+    let parts: Vec<_> = (0..10)
+        .map(|i| {
+            let at = |i: i32| {
+                let angle = (200.0 + 14.0 * f64::from(i)).to_radians();
+                [0.11 * angle.cos(), 0.0, 0.11 * angle.sin()]
+            };
+            let radius = |i: i32| 0.0185 - 0.0115 * ((f64::from(i) - 5.0).abs() / 5.0).powi(3);
+            cone(at(i), radius(i), at(i + 1), radius(i + 1))
+        })
+        .collect();
+    let distance = |p: DVec3| {
+        parts
+            .iter()
+            .map(|part| part.distance(p))
+            .fold(f64::INFINITY, |a, b| smooth_union(a, b, 0.01))
+    };
+    let (low, high) = (
+        DVec3::new(-0.15, -0.03, -0.15),
+        DVec3::new(0.15, 0.03, 0.05),
+    );
+    sculpt(distance, low, high, count)
 }

@@ -1,241 +1,157 @@
-//! Oranges and plain fruit on a platter, under an area light.
+//! The fruit platter of the paper's Table 1: a dish of fruit on a table, oranges with a peel, an area light above.
 
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
-use super::panels::Panel;
-use super::still_life::{add_panels, even_share, sculpted, table, turned};
-use super::{fruit, placing, relief_maps};
+use super::grid::{Part, Room};
+use super::stage::{self, Stage, diffuse, even_share};
+use super::{fruit, relief_maps, solid};
 use crate::error::{Error, Result};
-use crate::scene::assemble::{Assembly, Mesh};
-use crate::scene::{BuiltinOptions, Camera, Material, Scene, check};
+use crate::scene::assemble::Mesh;
+use crate::scene::{BuiltinOptions, Camera, Material, Scene};
 
 const NAME: &str = "fruit-platter";
-/// Elements in all and of the oranges in the paper's scene.
 const PATCHES: usize = 76_304;
-const ORANGES: usize = 11_446;
-/// Metres: repeat of the peel.
-const TILE: f64 = 0.08;
-const RELIEF: f64 = 0.06 * TILE;
+/// Of the oranges, the only ones with relief.
+const SHARE: f64 = 0.15;
+const DISH_SHARE: f64 = 0.12;
+/// Fewer leave the smallest grape without a shape.
+const LEAST_PATCHES: usize = 6_000;
 
-/// Height of the platter's well, and the gap under what stands in it.
-const WELL: f64 = 0.012;
-const GAP: f64 = 5e-4;
-const ORANGE_RADIUS: f64 = 0.045;
-/// Oranges in the well, x and z; the first three carry one more.
-const ORANGE_PLACES: [[f64; 2]; 4] = [
-    [0.020, 0.0975],
-    [0.0655, 0.0187],
-    [-0.0255, 0.0187],
-    [-0.0765, 0.102],
-];
+/// Of the smallest solid.
+const LEAST_TRIANGLES: usize = 24;
 
-const FIRST_FRUIT_MATERIAL: u32 = 4;
-const ORANGE: u32 = FIRST_FRUIT_MATERIAL;
-const PLATTER: u32 = 5;
-const APPLE: u32 = 6;
-const PEAR: u32 = 7;
-const BANANA: u32 = 8;
-const GRAPES: u32 = 9;
-const STALK: u32 = 10;
-const LIGHT: u32 = 11;
+/// Metres; the table is its floor.
+const ROOM: Room = Room {
+    size: DVec3::new(1.4, 0.9, 1.0),
+    light_x: [0.45, 0.95],
+    light_z: [0.25, 0.65],
+};
+/// Where the dish stands, and the height of its flat inside.
+const DISH_FOOT: DVec3 = DVec3::new(0.70, 1e-3, 0.52);
+const DISH_THICKNESS: f64 = 0.010;
+/// Between what lies on something and what it lies on.
+const GAP: f64 = 1e-3;
+/// Tiles of peel a metre, and how deep it is in metres: a texel is about a third of an element's edge in the default
+/// number, and the slope of the relief 0.26 in the root mean square.
+const REPEATS: f64 = 10.0;
+const HEIGHT: f32 = 0.0024;
 
-/// A plain fruit in the well.
-struct Fruit {
-    name: &'static str,
-    distance: fn(DVec3) -> f64,
-    material: u32,
-    /// Degrees about y, greatest extent, x and z.
-    turn: f64,
-    size: f64,
-    place: [f64; 2],
-    /// Share of the triangles that the oranges leave.
-    share: f64,
-}
+const ORANGE: u32 = 5;
+const DISH: u32 = 6;
 
-const PLAIN: [Fruit; 5] = [
-    Fruit {
-        name: "apple",
-        distance: fruit::apple,
-        material: APPLE,
-        turn: 0.0,
-        size: 0.084,
-        place: [0.154, 0.033],
-        share: 0.04,
-    },
-    Fruit {
-        name: "apple",
-        distance: fruit::apple,
-        material: APPLE,
-        turn: 80.0,
-        size: 0.082,
-        place: [0.111, 0.114],
-        share: 0.04,
-    },
-    Fruit {
-        name: "pear",
-        distance: fruit::pear,
-        material: PEAR,
-        turn: 0.0,
-        size: 0.125,
-        place: [-0.135, 0.028],
-        share: 0.05,
-    },
-    Fruit {
-        name: "banana",
-        distance: fruit::banana,
-        material: BANANA,
-        turn: 12.0,
-        size: 0.18,
-        place: [0.055, -0.088],
-        share: 0.05,
-    },
-    Fruit {
-        name: "bunch of grapes",
-        distance: fruit::grapes,
-        material: GRAPES,
-        turn: 25.0,
-        size: 0.11,
-        place: [-0.112, -0.088],
-        share: 0.12,
-    },
-];
-const PLATTER_SHARE: f64 = 0.15;
-
-/// Builds the scene in exactly `options.patches` elements.
+/// Builds the scene in exactly as many elements as asked for.
 ///
 /// # Errors
-/// A statue, for which there is no place; too few patches.
+/// Too few patches; a statue, for which there is no place.
 pub(super) fn build(options: &BuiltinOptions) -> Result<Scene> {
     if options.statue.is_some() {
         return Err(Error::Usage(format!(
-            "{NAME}: there is no statue in this scene that a mesh could replace"
+            "{NAME}: there is no statue in it to replace"
         )));
     }
-    let patches = options.patches.unwrap_or(PATCHES);
-    let oranges = even_share(patches, ORANGES as f64 / PATCHES as f64);
-    let plain = patches - oranges;
+    let patches = stage::planned(NAME, options, PATCHES, LEAST_PATCHES)?;
+    let mut dish = solid::revolve(&dish_profile(), even_share(patches, DISH_SHARE));
+    stage::stand(&mut dish, DISH_FOOT);
+    stage::cover(&mut dish, DISH, 1.0);
+    let mut solids = vec![dish];
 
-    let mut assembly = Assembly::new(NAME.into(), None);
-    let materials = assembly.add_materials(&materials());
-    for mesh in stack_of_oranges(oranges)? {
-        assembly.add_mesh(&mesh, &materials)?;
+    let oranges = fruit::ORANGES.len();
+    let pairs = even_share(patches, SHARE) / 2;
+    for (index, at) in fruit::ORANGES.iter().enumerate() {
+        let count = 2 * (pairs * (index + 1) / oranges - pairs * index / oranges);
+        let mut orange = fruit::orange(count);
+        lay(&mut orange, DVec3::from(*at));
+        stage::cover(&mut orange, ORANGE, REPEATS);
+        solids.push(orange);
     }
-    let count = even_share(plain, PLATTER_SHARE);
-    let mut platter = turned(NAME, "platter", &PLATTER_PROFILE.map(DVec2::from), count)?;
-    placing::stand(&mut platter, 0.0, 0.56, DVec3::Y * GAP);
-    placing::clothe(&mut platter, PLATTER, 1.0);
-    assembly.add_mesh(&platter, &materials)?;
-    for one in &PLAIN {
-        let count = even_share(plain, one.share);
-        let mut mesh = sculpted(
-            NAME,
-            one.name,
-            one.distance,
-            [fruit::LOW, fruit::HIGH],
-            count,
-        )?;
-        placing::stand(&mut mesh, one.turn, one.size, in_well(one.place));
-        placing::clothe(&mut mesh, one.material, 1.0);
-        assembly.add_mesh(&mesh, &materials)?;
+    for fruit in fruit::others() {
+        let count = |share| even_share(patches, share).max(LEAST_TRIANGLES);
+        let mut mesh = (fruit.build)(count(fruit.share));
+        lay(&mut mesh, fruit.at);
+        stage::cover(&mut mesh, ORANGE + 1 + fruit.material, 1.0);
+        if fruit.has_stem() {
+            let mut stem = fruit::stem(count(fruit::STEM_SHARE));
+            let foot = stage::top(&mesh, fruit::STEM_RADIUS) + DVec3::Y * GAP;
+            stage::stand(&mut stem, foot);
+            stage::cover(&mut stem, ORANGE + 1 + fruit::STEM, 1.0);
+            solids.push(stem);
+        }
+        solids.push(mesh);
     }
-    let mut panels = vec![Panel {
-        low: DVec3::new(-0.25, 0.85, -0.40),
-        high: DVec3::new(0.25, 0.85, 0.0),
-        facing: DVec3::NEG_Y,
-        material: LIGHT,
-    }];
-    panels.extend(table(1.1, 0.9, 0.6));
-    add_panels(&mut assembly, &panels, &materials, patches)?;
 
-    assembly.scene.cameras.push(Camera {
-        name: "front".into(),
-        position: DVec3::new(0.0, 0.42, -0.78),
-        look_at: DVec3::new(0.0, 0.035, 0.0),
-        up: DVec3::Y,
-        fov_y: 36.0,
-    });
-    check::finish(assembly.into_scene())
-}
-
-/// Oranges in the well and one on the first three.
-fn stack_of_oranges(triangles: usize) -> Result<Vec<Mesh>> {
-    let count = ORANGE_PLACES.len() + 1;
-    let pairs = triangles / 2;
-    let mut meshes = Vec::new();
-    for index in 0..count {
-        let share = |before: usize| before * pairs / count;
-        let own = 2 * (share(index + 1) - share(index));
-        let mut mesh = sculpted(
-            NAME,
-            "orange",
-            fruit::orange,
-            [fruit::LOW, fruit::HIGH],
-            own,
-        )?;
-        let place = match ORANGE_PLACES.get(index) {
-            Some(&place) => in_well(place),
-            None => on_three(),
-        };
-        placing::stand(&mut mesh, 40.0 * index as f64, 2.0 * ORANGE_RADIUS, place);
-        placing::clothe(&mut mesh, ORANGE, 1.0 / TILE);
-        meshes.push(mesh);
-    }
-    Ok(meshes)
-}
-
-fn in_well([x, z]: [f64; 2]) -> DVec3 {
-    DVec3::new(x, GAP + WELL + GAP, z)
-}
-
-/// The lowest point of a ball that rests on the first three.
-fn on_three() -> DVec3 {
-    let [a, b, c] = [0, 1, 2].map(|k| in_well(ORANGE_PLACES[k]));
-    let middle = (a + b + c) / 3.0;
-    let reach = 2.0 * ORANGE_RADIUS + GAP;
-    let rise = (reach * reach - middle.distance_squared(a)).max(0.0).sqrt();
-    middle + DVec3::Y * rise
-}
-
-fn materials() -> [Material; 12] {
-    let diffuse = |name: &str, kd| Material {
-        name: name.into(),
-        kd,
-        ..Material::default()
+    let peel = Material {
+        map_height: Some(Arc::new(relief_maps::orange_peel(relief_maps::SIZE))),
+        height_scale: HEIGHT,
+        ..diffuse("peel", [0.86, 0.36, 0.04])
     };
-    [
-        diffuse("table", [0.45, 0.30, 0.18]),
-        diffuse("back", [0.70, 0.69, 0.66]),
-        diffuse("left", [0.45, 0.52, 0.42]),
-        diffuse("right", [0.60, 0.50, 0.38]),
+    let mut materials = vec![
+        diffuse("plaster", [0.72, 0.70, 0.66]),
+        diffuse("wood", [0.46, 0.29, 0.16]),
+        diffuse("rose", [0.62, 0.26, 0.22]),
+        diffuse("blue", [0.20, 0.32, 0.52]),
         Material {
-            map_height: Some(Arc::new(relief_maps::orange_peel(relief_maps::SIZE))),
-            height_scale: RELIEF as f32,
-            ..diffuse("orange", [0.85, 0.40, 0.05])
-        },
-        diffuse("platter", [0.75, 0.76, 0.78]),
-        diffuse("apple", [0.60, 0.06, 0.05]),
-        diffuse("pear", [0.60, 0.62, 0.16]),
-        diffuse("banana", [0.82, 0.66, 0.12]),
-        diffuse("grapes", [0.22, 0.08, 0.26]),
-        diffuse("stalk", [0.20, 0.13, 0.07]),
-        Material {
-            ke: [14.0, 13.0, 11.5],
+            ke: [9.0, 8.2, 6.8],
             ..diffuse("light", [0.78; 3])
         },
-    ]
+        peel,
+        diffuse("porcelain", [0.80, 0.80, 0.78]),
+    ];
+    materials.extend(fruit::materials());
+    let stage = Stage {
+        name: NAME,
+        patches: PATCHES,
+        room: ROOM,
+        material_of,
+        materials,
+        solids,
+        point_lights: Vec::new(),
+        camera: Camera {
+            name: "front".into(),
+            position: DVec3::new(0.70, 0.47, -0.30),
+            look_at: DVec3::new(0.70, 0.03, 0.48),
+            up: DVec3::Y,
+            fov_y: 40.0,
+        },
+    };
+    stage.build(options)
 }
 
-/// Radius and height in metres, from under the foot round the rim to the middle of the well.
-const PLATTER_PROFILE: [[f64; 2]; 9] = [
-    [0.0, 0.0],
-    [0.17, 0.0],
-    [0.215, 0.006],
-    [0.275, 0.024],
-    [0.28, 0.028],
-    [0.274, 0.030],
-    [0.222, 0.014],
-    [0.212, WELL],
-    [0.0, WELL],
-];
+/// Lays a fruit at a place about the middle of the dish; its y is above the flat inside, or below it for the table.
+fn lay(mesh: &mut Mesh, at: DVec3) {
+    let inside = DISH_FOOT + DVec3::Y * DISH_THICKNESS;
+    let y = match at.y < 0.0 {
+        true => GAP,
+        false => inside.y + at.y + GAP,
+    };
+    stage::stand(mesh, DVec3::new(inside.x + at.x, y, inside.z + at.z));
+}
+
+fn material_of(part: Part) -> u32 {
+    match part {
+        Part::Back | Part::Ceiling => 0,
+        Part::Floor => 1,
+        Part::Left => 2,
+        Part::Right => 3,
+        Part::Light => 4,
+    }
+}
+
+/// Flat to a radius of 0.2 m, with a rim that rises outward.
+fn dish_profile() -> Vec<DVec2> {
+    [
+        [0.0, 0.0],
+        [0.195, 0.0],
+        [0.215, 0.006],
+        [0.255, 0.026],
+        [0.258, 0.029],
+        [0.258, 0.033],
+        [0.254, 0.034],
+        [0.212, 0.014],
+        [0.200, DISH_THICKNESS],
+        [0.0, DISH_THICKNESS],
+    ]
+    .map(DVec2::from)
+    .to_vec()
+}

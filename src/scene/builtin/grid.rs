@@ -1,18 +1,24 @@
-//! The Cornell box as quads on shared lines, and its cut into an exact number of triangles.
+//! A room with an open front as quads on shared lines, and its cut into an exact number of triangles.
 
 use glam::DVec3;
 
-/// Metres; y is up, the opening is at z = 0.
-pub(super) const ROOM: DVec3 = DVec3::new(5.56, 5.488, 5.592);
-/// The light in the plane of the ceiling, from and to.
-pub(super) const LIGHT_X: [f64; 2] = [2.13, 3.43];
-pub(super) const LIGHT_Z: [f64; 2] = [2.27, 3.32];
+/// A box in metres; y is up, the opening is at z = 0.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Room {
+    pub size: DVec3,
+    /// The light in the plane of the ceiling, from and to.
+    pub light_x: [f64; 2],
+    pub light_z: [f64; 2],
+}
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Part {
-    White,
-    Red,
-    Green,
+    Floor,
+    Ceiling,
+    Back,
+    /// At the greatest x, on the left for who looks in.
+    Left,
+    Right,
     Light,
 }
 
@@ -50,17 +56,18 @@ impl Cells {
     }
 
     /// The finest near-uniform cells that need at most `budget` triangles.
-    fn within(budget: usize) -> Self {
-        let surface = 2.0 * ROOM.x * ROOM.z + ROOM.x * ROOM.y + 2.0 * ROOM.z * ROOM.y;
-        let mut size = (2.0 * surface / budget as f64).sqrt();
+    fn within(room: &Room, budget: usize) -> Self {
+        let size = room.size;
+        let surface = 2.0 * size.x * size.z + size.x * size.y + 2.0 * size.z * size.y;
+        let mut cell = (2.0 * surface / budget as f64).sqrt();
         loop {
-            let rounded = |length: f64| (length / size).round().max(1.0) as i64;
+            let rounded = |length: f64| (length / cell).round().max(1.0) as i64;
             let wanted = [
-                rounded(LIGHT_X[0]),
-                rounded(LIGHT_X[1] - LIGHT_X[0]),
-                rounded(LIGHT_Z[0]),
-                rounded(LIGHT_Z[1] - LIGHT_Z[0]),
-                rounded(ROOM.y),
+                rounded(room.light_x[0]),
+                rounded(room.light_x[1] - room.light_x[0]),
+                rounded(room.light_z[0]),
+                rounded(room.light_z[1] - room.light_z[0]),
+                rounded(size.y),
             ];
             // Each count one less, as wanted or one more: 3⁵ choices.
             let best = (0..3_i64.pow(5))
@@ -82,7 +89,7 @@ impl Cells {
             if let Some(cells) = best {
                 return cells;
             }
-            size *= 1.01;
+            cell *= 1.01;
         }
     }
 }
@@ -96,8 +103,8 @@ pub(super) fn least_triangles() -> usize {
 ///
 /// What a grid leaves over is made up by quads cut in four about their centre, spread evenly (two more each), and, where
 /// one is missing still, by halving a triangle at the opening, whose edge no other triangle shares.
-pub(super) fn triangles(count: usize) -> Vec<([DVec3; 3], Part)> {
-    let quads = quads(&Cells::within(count));
+pub(super) fn triangles(room: &Room, count: usize) -> Vec<([DVec3; 3], Part)> {
+    let quads = quads(room, &Cells::within(room, count));
     let more = count - 2 * quads.len();
     let in_four = more / 2;
     assert!(in_four <= quads.len(), "a finer grid would have fitted");
@@ -137,20 +144,25 @@ fn halve_at_opening(triangles: &mut Vec<([DVec3; 3], Part)>) {
     triangles.insert(index + 1, ([middle, b, c], part));
 }
 
-fn quads(cells: &Cells) -> Vec<Quad> {
+fn quads(room: &Room, cells: &Cells) -> Vec<Quad> {
+    let Room {
+        size,
+        light_x,
+        light_z,
+    } = *room;
     let x = lines(
-        &[0.0, LIGHT_X[0], LIGHT_X[1], ROOM.x],
+        &[0.0, light_x[0], light_x[1], size.x],
         &[cells.x_aside, cells.x_light, cells.x_aside],
     );
-    let y = lines(&[0.0, ROOM.y], &[cells.y]);
+    let y = lines(&[0.0, size.y], &[cells.y]);
     let z = lines(
-        &[0.0, LIGHT_Z[0], LIGHT_Z[1], ROOM.z],
+        &[0.0, light_z[0], light_z[1], size.z],
         &[cells.z_aside, cells.z_light, cells.z_aside],
     );
     let within = |stretch: [f64; 2], at: f64| at >= stretch[0] && at < stretch[1];
-    let ceiling = |x: f64, z: f64| match within(LIGHT_X, x) && within(LIGHT_Z, z) {
+    let ceiling = |x: f64, z: f64| match within(light_x, x) && within(light_z, z) {
         true => Part::Light,
-        false => Part::White,
+        false => Part::Ceiling,
     };
 
     let mut quads = Vec::with_capacity(cells.quads());
@@ -158,29 +170,29 @@ fn quads(cells: &Cells) -> Vec<Quad> {
     surface(
         &z,
         &x,
-        |_, _| Part::White,
+        |_, _| Part::Floor,
         |z, x| DVec3::new(x, 0.0, z),
         &mut quads,
     );
-    surface(&x, &z, ceiling, |x, z| DVec3::new(x, ROOM.y, z), &mut quads);
+    surface(&x, &z, ceiling, |x, z| DVec3::new(x, size.y, z), &mut quads);
     surface(
         &y,
         &x,
-        |_, _| Part::White,
-        |y, x| DVec3::new(x, y, ROOM.z),
+        |_, _| Part::Back,
+        |y, x| DVec3::new(x, y, size.z),
         &mut quads,
     );
     surface(
         &z,
         &y,
-        |_, _| Part::Red,
-        |z, y| DVec3::new(ROOM.x, y, z),
+        |_, _| Part::Left,
+        |z, y| DVec3::new(size.x, y, z),
         &mut quads,
     );
     surface(
         &y,
         &z,
-        |_, _| Part::Green,
+        |_, _| Part::Right,
         |y, z| DVec3::new(0.0, y, z),
         &mut quads,
     );

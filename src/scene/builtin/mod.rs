@@ -4,15 +4,13 @@ mod bowl_and_bunny;
 mod bunny;
 mod cornell;
 mod cornell_relief;
-mod exact;
 mod fruit;
 mod fruit_platter;
 mod grid;
-mod lathe;
-mod panels;
-mod placing;
 pub mod relief_maps;
-mod shapes;
+mod round_cone;
+mod solid;
+mod stage;
 mod statue;
 mod still_life;
 mod surface_nets;
@@ -20,21 +18,21 @@ mod surface_nets;
 use super::{BuiltinOptions, Scene};
 use crate::error::{Error, Result};
 
-/// What [`super::load`] takes instead of a path.
+/// What [`super::load`] takes instead of a path. All but the first are those of the paper's Table 1.
 pub const NAMES: [&str; 4] = [
     "cornell",
-    "cornell-relief",
-    "bowl-and-bunny",
     "fruit-platter",
+    "bowl-and-bunny",
+    "cornell-relief",
 ];
 
 /// Builds the scene of that name.
 pub(super) fn build(name: &str, options: &BuiltinOptions) -> Result<Scene> {
     match name {
         "cornell" => cornell::build(options),
-        "cornell-relief" => cornell_relief::build(options),
-        "bowl-and-bunny" => bowl_and_bunny::build(options),
         "fruit-platter" => fruit_platter::build(options),
+        "bowl-and-bunny" => bowl_and_bunny::build(options),
+        "cornell-relief" => cornell_relief::build(options),
         _ => Err(Error::Usage(format!(
             "\"{name}\" is no built-in scene: there is {}",
             NAMES.join(", ")

@@ -1,152 +1,175 @@
-//! Height maps made by code: tiles that repeat without a seam.
-//!
-//! Nothing but sums, products and square roots is used, so that every machine gives the same texels.
+//! Height maps made by code. Each repeats without a seam, is square, and is the same on every call.
 
-use crate::scene::HeightMap;
+use std::f64::consts::{PI, TAU};
+use std::path::PathBuf;
 
-/// Texels along a side of the maps of the built-in scenes.
+use super::super::HeightMap;
+
+/// Texels a side for which the features below are made.
 pub const SIZE: u32 = 64;
 
-/// Overlapping round dents with softened ridges between them.
+/// Round dents that meet in ridges, 8 across the tile.
 pub fn hammered_metal(size: u32) -> HeightMap {
-    let dents = Points::new(4, 0.7, 0x68_61_6d);
-    tile("hammered-metal.png", size, |u, v| {
-        let [nearest, second] = dents.nearest(u, v);
-        // Bowls are square in the distance; where two meet, the ridge is rounded off.
-        smooth_min(nearest * nearest, second * second, 0.25)
+    let dents = Scatter { cells: 8, seed: 1 };
+    make("hammered-metal", size, |u, v| {
+        let [nearest, _] = dents.nearest_two(u, v);
+        (nearest * nearest).min(1.0)
     })
 }
 
-/// A smooth skin with pores, wavy between them.
+/// Small pits in a gently uneven skin, 11 across the tile.
 pub fn orange_peel(size: u32) -> HeightMap {
-    let pores = Points::new(5, 0.55, 0x6f_72_61);
-    let waves = Points::new(3, 0.8, 0x70_65_65);
-    tile("orange-peel.png", size, |u, v| {
-        let [pore, _] = pores.nearest(u, v);
-        let [wave, _] = waves.nearest(u, v);
-        0.35 * bump(wave / 0.9) - bump(pore / 0.55)
+    let pits = Scatter { cells: 11, seed: 2 };
+    make("orange-peel", size, |u, v| {
+        let [nearest, second] = pits.nearest_two(u, v);
+        // Never deeper where two pits meet.
+        let pit = |d: f64| (-d * d / 0.16).exp();
+        let uneven = (TAU * (2.0 * u + v)).sin() + (TAU * (u - 3.0 * v)).sin();
+        0.05 * uneven - pit(nearest).hypot(pit(second)).min(1.0)
     })
 }
 
-/// Plain knitting: columns of stitches, each a V of two strands.
+/// Rows of stitches, each a V of two strands: 8 columns, 8 rows.
 pub fn knit(size: u32) -> HeightMap {
-    const WALES: f64 = 3.0;
-    const COURSES: f64 = 4.0;
-    /// Courses that a strand climbs from the middle of a stitch to its side.
-    const CLIMB: f64 = 0.9;
-    tile("knit.png", size, |u, v| {
-        let across = 2.0 * (u * WALES).fract() - 1.0;
-        let along = (v * COURSES - CLIMB * across.abs()).rem_euclid(1.0);
-        arch(across.abs()) * (0.35 + 0.65 * arch(along))
+    make("knit", size, |u, v| {
+        let across = (8.0 * u).rem_euclid(1.0);
+        // From the seam between columns (0) to the middle of the V (1) and back.
+        let inward = 1.0 - (2.0 * across - 1.0).abs();
+        let round = (PI * (2.0 * across).rem_euclid(1.0)).sin();
+        let strand = 0.5 + 0.5 * (TAU * (8.0 * v + 0.6 * inward)).cos();
+        round.sqrt() * (0.35 + 0.65 * strand)
     })
 }
 
-/// Bricks in running bond, rounded at the edges, with deeper mortar.
+/// Running bond: 4 bricks across, 8 courses, mortar set back.
 pub fn brick(size: u32) -> HeightMap {
-    const BRICKS: f64 = 2.0;
-    const COURSES: f64 = 4.0;
-    /// From the joint's middle to the brick's full height, over the height of a course.
-    const EDGE: f64 = 0.3;
-    tile("brick.png", size, |u, v| {
-        let course = (v * COURSES).floor();
-        let along = (u * BRICKS + 0.5 * (course % 2.0)).fract();
-        let up = (v * COURSES).fract();
-        let to_end = along.min(1.0 - along) * COURSES / BRICKS;
-        let to_bed = up.min(1.0 - up);
-        step(to_end / EDGE) * step(to_bed / EDGE)
+    make("brick", size, |u, v| {
+        let course = (8.0 * v).floor();
+        let along = (4.0 * u + 0.5 * course.rem_euclid(2.0)).rem_euclid(1.0);
+        let up = (8.0 * v).rem_euclid(1.0);
+        // To the nearest joint, in heights of a course; a brick is two long.
+        let joint = (2.0 * along.min(1.0 - along)).min(up.min(1.0 - up));
+        let t = ((joint - 0.06) / 0.16).clamp(0.0, 1.0);
+        t * t * (3.0 - 2.0 * t)
     })
 }
 
-/// Heights of a tile, u and v up in 0..1 at the centres of the texels, brought to the codes 0 to 65535.
-fn tile(name: &str, size: u32, height: impl Fn(f64, f64) -> f64) -> HeightMap {
-    let at = |texel: u32| (f64::from(texel) + 0.5) / f64::from(size);
+/// The height map of a function on the tile, stretched to 0..=1 in steps of 1/65535, so that a 16-bit PNG holds it.
+fn make(name: &str, size: u32, height: impl Fn(f64, f64) -> f64) -> HeightMap {
+    let place = |i: u32| (f64::from(i) + 0.5) / f64::from(size);
     let heights: Vec<f64> = (0..size)
-        .flat_map(|row| (0..size).map(move |column| (column, row)))
-        .map(|(column, row)| height(at(column), at(size - 1 - row)))
+        .flat_map(|row| (0..size).map(move |column| (place(column), 1.0 - place(row))))
+        .map(|(u, v)| height(u, v))
         .collect();
     let low = heights.iter().copied().fold(f64::INFINITY, f64::min);
     let high = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let scale = 65_535.0 / (high - low).max(f64::MIN_POSITIVE);
+    let span = (high - low).max(f64::MIN_POSITIVE);
     HeightMap {
-        path: name.into(),
+        path: PathBuf::from(format!("{name}.png")),
         width: size,
         height: size,
         values: heights
             .iter()
-            // An image of 16 bits holds these values exactly.
-            .map(|h| ((h - low) * scale).round() as u16)
-            .map(|code| f32::from(code) / 65_535.0)
+            .map(|h| ((h - low) / span * f64::from(u16::MAX)).round() as u16)
+            .map(|code| f32::from(code) / f32::from(u16::MAX))
             .collect(),
     }
 }
 
-/// One at 0, zero from 1 on, smooth.
-fn bump(x: f64) -> f64 {
-    let rest = (1.0 - x * x).max(0.0);
-    rest * rest
+/// One point in each cell of a square grid on the tile, off its middle at random.
+struct Scatter {
+    cells: i32,
+    seed: u64,
 }
 
-/// Zero at 0 and 1, one in the middle.
-fn arch(x: f64) -> f64 {
-    4.0 * x * (1.0 - x)
-}
-
-/// From 0 at 0 to 1 from 1 on, smooth.
-fn step(x: f64) -> f64 {
-    let x = x.clamp(0.0, 1.0);
-    x * x * (3.0 - 2.0 * x)
-}
-
-/// Polynomial smooth minimum, Quilez.
-fn smooth_min(a: f64, b: f64, width: f64) -> f64 {
-    let h = (width - (a - b).abs()).max(0.0) / width;
-    a.min(b) - h * h * width / 4.0
-}
-
-/// Points scattered over the tile, one in each cell of a coarse grid; they repeat with it.
-struct Points {
-    cells: i64,
-    /// `[row][column]`, in cells.
-    places: Vec<[f64; 2]>,
-}
-
-impl Points {
-    /// `jitter`: how far of a cell a point may be moved.
-    fn new(cells: i64, jitter: f64, seed: u64) -> Self {
-        let mut state = seed;
-        let mut random = || {
-            // SplitMix64 (Steele et al. 2014).
-            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let mut z = state;
-            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-        };
-        let places = (0..cells)
-            .flat_map(|row| (0..cells).map(move |column| [column, row]))
-            .map(|cell| cell.map(|c| c as f64 + 0.5 + jitter * (random() - 0.5)))
-            .collect();
-        Self { cells, places }
-    }
-
-    /// Distances to the nearest two points, in cells.
-    fn nearest(&self, u: f64, v: f64) -> [f64; 2] {
-        let at = [u, v].map(|c| c * self.cells as f64);
-        let mut nearest = [f64::INFINITY; 2];
-        for place in &self.places {
-            let mut squared = 0.0;
-            for k in 0..2 {
-                let apart = (at[k] - place[k]).abs();
-                let around = apart.min(self.cells as f64 - apart);
-                squared += around * around;
-            }
-            let distance = squared.sqrt();
-            if distance < nearest[0] {
-                nearest = [distance, nearest[0]];
-            } else if distance < nearest[1] {
-                nearest[1] = distance;
+impl Scatter {
+    /// Distances to the two nearest points, in cells.
+    fn nearest_two(&self, u: f64, v: f64) -> [f64; 2] {
+        let (x, y) = (u * f64::from(self.cells), v * f64::from(self.cells));
+        let mut found = [f64::INFINITY; 2];
+        for dy in -2..=2 {
+            for dx in -2..=2 {
+                let (cx, cy) = (x.floor() as i32 + dx, y.floor() as i32 + dy);
+                let [jx, jy] = self.jitter(cx, cy);
+                let distance = (f64::from(cx) + jx - x).hypot(f64::from(cy) + jy - y);
+                if distance < found[0] {
+                    found = [distance, found[0]];
+                } else if distance < found[1] {
+                    found[1] = distance;
+                }
             }
         }
-        nearest
+        found
+    }
+
+    /// The point of a cell within it, the same one tile further.
+    fn jitter(&self, x: i32, y: i32) -> [f64; 2] {
+        let cell = y.rem_euclid(self.cells) * self.cells + x.rem_euclid(self.cells);
+        // SplitMix64, Steele et al. 2014.
+        let mut z = (self.seed * 4_096 + cell as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^= z >> 31;
+        let part = |bits: u64| 0.2 + 0.6 * (bits & 0xffff) as f64 / 65_535.0;
+        [part(z), part(z >> 16)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Root mean square slope for a tile of one unit and a height scale of 1.
+    fn rms_slope(map: &HeightMap) -> f64 {
+        let step = 0.5 / f64::from(map.width);
+        let mut sum = 0.0;
+        for i in 0..map.width {
+            for j in 0..map.height {
+                let (u, v) = (
+                    f64::from(i) * 2.0 * step + step,
+                    f64::from(j) * 2.0 * step + step,
+                );
+                let du = (map.sample(u + step, v) - map.sample(u - step, v)) / (2.0 * step);
+                let dv = (map.sample(u, v + step) - map.sample(u, v - step)) / (2.0 * step);
+                sum += du * du + dv * dv;
+            }
+        }
+        (sum / f64::from(map.width * map.height)).sqrt()
+    }
+
+    #[test]
+    fn they_use_every_height_and_repeat_without_a_seam() {
+        for make in [hammered_metal, orange_peel, knit, brick] {
+            let map = make(SIZE);
+            let size = SIZE as usize;
+            let (mut within, mut across) = (0.0_f32, 0.0_f32);
+            for k in 0..size {
+                across = across
+                    .max((map.values[k] - map.values[k + size * (size - 1)]).abs())
+                    .max((map.values[k * size] - map.values[k * size + size - 1]).abs());
+                for i in 1..size {
+                    within = within
+                        .max((map.values[i * size + k] - map.values[(i - 1) * size + k]).abs())
+                        .max((map.values[k * size + i] - map.values[k * size + i - 1]).abs());
+                }
+            }
+            let name = map.path.display();
+            assert!(
+                across <= within,
+                "{name}: a step of {across} at the seam, {within} within"
+            );
+            assert!(
+                map.values.contains(&0.0) && map.values.contains(&1.0),
+                "{name}"
+            );
+            let exact = |v: &f32| (v * 65_535.0).round() / 65_535.0 == *v;
+            assert!(map.values.iter().all(exact), "{name}");
+            println!(
+                "{name}: rms slope {:.2}, mean {:.3}",
+                rms_slope(&map),
+                map.mean()
+            );
+            assert_eq!(make(SIZE), map);
+        }
     }
 }

@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 
-use super::shapes::{RoundCone, cone, smooth_union};
+use super::round_cone::{RoundCone, cone, smooth_union};
 use super::surface_nets::{Surface, polygonise};
 use crate::scene::assemble::{Mesh, MeshTriangle};
 

@@ -1,0 +1,42 @@
+//! Round cones and their smooth union, from which figures are sculpted.
+
+use glam::DVec3;
+
+/// A cone with round ends, metres.
+pub(super) struct RoundCone {
+    from: [f64; 3],
+    from_radius: f64,
+    to: [f64; 3],
+    to_radius: f64,
+}
+
+pub(super) const fn cone(
+    from: [f64; 3],
+    from_radius: f64,
+    to: [f64; 3],
+    to_radius: f64,
+) -> RoundCone {
+    RoundCone {
+        from,
+        from_radius,
+        to,
+        to_radius,
+    }
+}
+
+/// Polynomial smooth minimum, Quilez; `blend` is the width of the fillet.
+pub(super) fn smooth_union(a: f64, b: f64, blend: f64) -> f64 {
+    let h = (blend - (a - b).abs()).max(0.0) / blend;
+    a.min(b) - h * h * blend / 4.0
+}
+
+impl RoundCone {
+    /// Distance to the spheres swept along the axis, the nearest sphere taken straight across it; negative inside.
+    pub fn distance(&self, p: DVec3) -> f64 {
+        let (from, to) = (DVec3::from(self.from), DVec3::from(self.to));
+        let axis = to - from;
+        let along = ((p - from).dot(axis) / axis.length_squared()).clamp(0.0, 1.0);
+        let radius = self.from_radius + (self.to_radius - self.from_radius) * along;
+        p.distance(from + axis * along) - radius
+    }
+}

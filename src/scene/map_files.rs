@@ -1,0 +1,156 @@
+//! Textures and relief maps of a scene that is written out.
+
+use std::collections::HashMap;
+use std::fs;
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use image::{DynamicImage, ImageBuffer, ImageFormat, Luma, Rgb};
+
+use super::{HeightMap, NormalMap, Scene};
+use crate::atomic_file::write_atomically;
+use crate::error::{Error, Result};
+
+/// The names of the files in the folder.
+#[derive(Default)]
+pub(super) struct MapFiles {
+    /// By the path of the original.
+    pub textures: HashMap<PathBuf, String>,
+    /// By the address of the map: maps made by code may share a path.
+    maps: HashMap<usize, String>,
+}
+
+impl MapFiles {
+    pub fn of<T>(&self, map: &Arc<T>) -> &str {
+        &self.maps[&address(map)]
+    }
+}
+
+fn address<T>(map: &Arc<T>) -> usize {
+    Arc::as_ptr(map).addr()
+}
+
+/// Writes each texture and map once.
+pub(super) fn write(scene: &Scene, dir: &Path) -> Result<MapFiles> {
+    let mut files = MapFiles::default();
+    // Read whole before any is written: a copy may replace an original.
+    let mut contents: Vec<(String, Vec<u8>)> = Vec::new();
+    for texture in scene.materials.iter().filter_map(|m| m.map_kd.as_deref()) {
+        if files.textures.contains_key(&texture.path) {
+            continue;
+        }
+        let name = copy_name("texture", &texture.path, files.textures.len());
+        let bytes = fs::read(&texture.path).map_err(|source| Error::read(&texture.path, source))?;
+        contents.push((name.clone(), bytes));
+        files.textures.insert(texture.path.clone(), name);
+    }
+    for material in &scene.materials {
+        if let Some(map) = &material.map_height {
+            let same = HeightMap::load(&map.path).is_ok_and(|(there, _)| there == **map);
+            add(
+                &mut files,
+                &mut contents,
+                map,
+                "height",
+                &map.path,
+                same,
+                encode_heights,
+            )?;
+        }
+        if let Some(map) = &material.map_normal {
+            let same = NormalMap::load(&map.path).is_ok_and(|there| there == **map);
+            add(
+                &mut files,
+                &mut contents,
+                map,
+                "normal",
+                &map.path,
+                same,
+                encode_normals,
+            )?;
+        }
+    }
+    for (name, bytes) in contents {
+        write_atomically(&dir.join(name), |out| out.write_all(&bytes))?;
+    }
+    Ok(files)
+}
+
+/// The file of a map, if it holds the map still, else the map encoded anew.
+fn add<T>(
+    files: &mut MapFiles,
+    contents: &mut Vec<(String, Vec<u8>)>,
+    map: &Arc<T>,
+    kind: &str,
+    path: &Path,
+    same: bool,
+    encode: impl Fn(&T) -> Result<(&'static str, Vec<u8>)>,
+) -> Result<()> {
+    if files.maps.contains_key(&address(map)) {
+        return Ok(());
+    }
+    let number = files.maps.len();
+    let (name, bytes) = if same {
+        let bytes = fs::read(path).map_err(|source| Error::read(path, source))?;
+        (copy_name(kind, path, number), bytes)
+    } else {
+        let (extension, bytes) = encode(map)?;
+        (format!("{kind}-{number}.{extension}"), bytes)
+    };
+    contents.push((name.clone(), bytes));
+    files.maps.insert(address(map), name);
+    Ok(())
+}
+
+/// Numbered, since maps of one name may come from several folders.
+fn copy_name(kind: &str, path: &Path, number: usize) -> String {
+    match path.extension() {
+        Some(extension) => format!("{kind}-{number}.{}", extension.to_string_lossy()),
+        None => format!("{kind}-{number}"),
+    }
+}
+
+/// A 16-bit grey PNG if that holds every value exactly, else OpenEXR.
+fn encode_heights(map: &HeightMap) -> Result<(&'static str, Vec<u8>)> {
+    let code = |value: f32| (value * f32::from(u16::MAX)).round() as u16;
+    let exact = |&value: &f32| f32::from(code(value)) / f32::from(u16::MAX) == value;
+    if map.values.iter().all(exact) {
+        let codes = map.values.iter().map(|&value| code(value)).collect();
+        let grey = ImageBuffer::<Luma<u16>, Vec<u16>>::from_raw(map.width, map.height, codes);
+        encode(&map.path, grey.map(DynamicImage::from), ImageFormat::Png)
+    } else {
+        let spread = map.values.iter().flat_map(|&value| [value; 3]).collect();
+        let floats = ImageBuffer::<Rgb<f32>, Vec<f32>>::from_raw(map.width, map.height, spread);
+        encode(
+            &map.path,
+            floats.map(DynamicImage::from),
+            ImageFormat::OpenExr,
+        )
+    }
+}
+
+fn encode_normals(map: &NormalMap) -> Result<(&'static str, Vec<u8>)> {
+    let code = |&c: &f32| ((f64::from(c) + 1.0) / 2.0 * f64::from(u16::MAX)).round() as u16;
+    let codes = map.normals.iter().flatten().map(code).collect();
+    let image = ImageBuffer::<Rgb<u16>, Vec<u16>>::from_raw(map.width, map.height, codes);
+    encode(&map.path, image.map(DynamicImage::from), ImageFormat::Png)
+}
+
+fn encode(
+    path: &Path,
+    image: Option<DynamicImage>,
+    format: ImageFormat,
+) -> Result<(&'static str, Vec<u8>)> {
+    let image =
+        image.ok_or_else(|| Error::file(path, "the map has not width times height texels"))?;
+    let mut bytes = Cursor::new(Vec::new());
+    image
+        .write_to(&mut bytes, format)
+        .map_err(|error| Error::file(path, format!("cannot be encoded: {error}")))?;
+    let extension = match format {
+        ImageFormat::OpenExr => "exr",
+        _ => "png",
+    };
+    Ok((extension, bytes.into_inner()))
+}

@@ -1,0 +1,149 @@
+//! What a person should know of the relief in a scene: maps without effect, and maps that contradict each other.
+
+use glam::DVec2;
+
+use super::{HeightMap, Material, NormalMap, Scene};
+
+/// Samples along each axis of a normal map, at most.
+const MOST_SAMPLES: u32 = 256;
+/// Correlation of slopes below which two maps contradict each other, and above which a changed sign mends them.
+const CONTRADICTING: f64 = 0.5;
+const AGREEING: f64 = 0.8;
+
+/// One sentence for each thing worth saying of a material that a triangle uses.
+pub(super) fn collect(scene: &Scene) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (index, material) in scene.materials.iter().enumerate() {
+        if !scene.triangles.iter().any(|t| t.material as usize == index) {
+            continue;
+        }
+        let told = match (&material.map_height, &material.map_normal) {
+            (None, Some(map)) => Some(format!(
+                "normal map {} makes no relief without a height map, which light by directions needs",
+                map.path.display()
+            )),
+            (Some(map), _) if map.is_constant() => Some(format!(
+                "height map {} is flat: there is no relief",
+                map.path.display()
+            )),
+            (Some(_), _) if material.height_scale == 0.0 => {
+                Some("the height scale is 0: there is no relief".into())
+            }
+            (Some(heights), Some(normals)) => tile_size(scene, index as u32)
+                .and_then(|tile| contradiction(material, heights, normals, tile)),
+            _ => None,
+        };
+        notes.extend(told.map(|what| format!("material \"{}\": {what}", material.name)));
+    }
+    notes
+}
+
+/// Scene units that one repeat takes along u and v: the means of |dP/du| and |dP/dv| over the area with this material.
+fn tile_size(scene: &Scene, material: u32) -> Option<DVec2> {
+    let (mut sum, mut area) = (DVec2::ZERO, 0.0);
+    for triangle in scene.triangles.iter().filter(|t| t.material == material) {
+        let [p, q, r] = scene.corners(triangle);
+        let [a, b, c] = triangle.uv.map(|uv| DVec2::from(uv.map(f64::from)));
+        let (pq, pr, ab, ac) = (q - p, r - p, b - a, c - a);
+        let along_u = (pq * ac.y - pr * ab.y) / ab.perp_dot(ac);
+        let along_v = (pr * ab.x - pq * ac.x) / ab.perp_dot(ac);
+        let weight = pq.cross(pr).length();
+        let size = DVec2::new(along_u.length(), along_v.length());
+        // Coordinates on a line or in a point have no size.
+        if size.is_finite() && size.min_element() > 0.0 {
+            sum += size * weight;
+            area += weight;
+        }
+    }
+    (area > 0.0).then(|| sum / area)
+}
+
+/// Products of the slopes of two maps, summed over the tile.
+#[derive(Default)]
+struct Slopes {
+    of_heights: f64,
+    of_normals: f64,
+    across_u: f64,
+    across_v: f64,
+    /// Angles between the normals, radians.
+    angle: f64,
+    samples: f64,
+}
+
+impl Slopes {
+    fn compare(material: &Material, heights: &HeightMap, normals: &NormalMap, tile: DVec2) -> Self {
+        let scale = f64::from(material.height_scale);
+        // Half a texel of the coarser map to either side.
+        let step_u = 0.5 / f64::from(heights.width.min(normals.width));
+        let step_v = 0.5 / f64::from(heights.height.min(normals.height));
+        let mut sums = Self::default();
+        for row in chosen(normals.height) {
+            for column in chosen(normals.width) {
+                let u = (f64::from(column) + 0.5) / f64::from(normals.width);
+                let v = 1.0 - (f64::from(row) + 0.5) / f64::from(normals.height);
+                let along = |du: f64, dv: f64| {
+                    heights.sample(u + du, v + dv) - heights.sample(u - du, v - dv)
+                };
+                let h = DVec2::new(
+                    along(step_u, 0.0) / (2.0 * step_u * tile.x),
+                    along(0.0, step_v) / (2.0 * step_v * tile.y),
+                ) * scale;
+                let [x, y, z] =
+                    normals.normals[(row * normals.width + column) as usize].map(f64::from);
+                let n = -DVec2::new(x, y) / z;
+                sums.of_heights += h.length_squared();
+                sums.of_normals += n.length_squared();
+                sums.across_u += h.x * n.x;
+                sums.across_v += h.y * n.y;
+                sums.angle += h.extend(-1.0).angle_between(n.extend(-1.0));
+                sums.samples += 1.0;
+            }
+        }
+        sums
+    }
+
+    /// Correlation, were the slopes of the normals multiplied by these signs.
+    fn correlation(&self, sign_u: f64, sign_v: f64) -> f64 {
+        let size = (self.of_heights * self.of_normals).sqrt();
+        if size == 0.0 {
+            return 0.0;
+        }
+        (sign_u * self.across_u + sign_v * self.across_v) / size
+    }
+}
+
+/// Texels of an axis, all or evenly chosen.
+fn chosen(size: u32) -> impl Iterator<Item = u32> {
+    let count = size.min(MOST_SAMPLES);
+    (0..count).map(move |i| (u64::from(i) * u64::from(size) / u64::from(count)) as u32)
+}
+
+fn contradiction(
+    material: &Material,
+    heights: &HeightMap,
+    normals: &NormalMap,
+    tile: DVec2,
+) -> Option<String> {
+    let slopes = Slopes::compare(material, heights, normals, tile);
+    if slopes.correlation(1.0, 1.0) >= CONTRADICTING {
+        return None;
+    }
+    let mends = [
+        ([1.0, -1.0], "; with green (y) turned over they agree"),
+        (
+            [-1.0, -1.0],
+            "; with the sign of the heights turned they agree",
+        ),
+        ([-1.0, 1.0], "; with red (x) turned over they agree"),
+    ];
+    let mend = mends
+        .iter()
+        .find(|([u, v], _)| slopes.correlation(*u, *v) > AGREEING)
+        .map_or("", |(_, words)| words);
+    Some(format!(
+        "height map {} and normal map {} contradict each other: {:.0} degrees between their normals in the mean{mend}",
+        heights.path.display(),
+        normals.path.display(),
+        (slopes.angle / slopes.samples).to_degrees()
+    ))
+}

@@ -1,0 +1,339 @@
+//! The high-poly baseline: relief turned into geometry.
+
+use std::collections::HashMap;
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use glam::DVec3;
+use mesolux::scene::{BuiltinOptions, HeightMap, Material, Scene, Triangle, displace, load};
+
+fn map(size: u32, height: impl Fn(f64, f64) -> f64) -> HeightMap {
+    let place = |i: u32| (f64::from(i) + 0.5) / f64::from(size);
+    HeightMap {
+        path: "made.png".into(),
+        width: size,
+        height: size,
+        values: (0..size)
+            .flat_map(|row| (0..size).map(move |column| (place(column), 1.0 - place(row))))
+            .map(|(u, v)| height(u, v) as f32)
+            .collect(),
+    }
+}
+
+fn relief(map: HeightMap, scale: f32) -> Material {
+    Material {
+        name: "relief".into(),
+        kd: [0.5; 3],
+        map_height: Some(Arc::new(map)),
+        height_scale: scale,
+        ..Material::default()
+    }
+}
+
+fn plain() -> Material {
+    Material {
+        name: "plain".into(),
+        kd: [0.25; 3],
+        ke: [1.0; 3],
+        ..Material::default()
+    }
+}
+
+fn triangle(vertices: [u32; 3], uv: [[f32; 2]; 3], material: u32) -> Triangle {
+    Triangle {
+        vertices,
+        uv,
+        material,
+    }
+}
+
+/// The square from (0,0) to (2,2) in z = 0 under one tile; with `beside` a plain one of the same size at its right.
+fn sheet(material: Material, beside: bool) -> Scene {
+    let mut scene = Scene {
+        name: "sheet".into(),
+        vertices: [[0, 0], [2, 0], [2, 2], [0, 2], [4, 0], [4, 2]]
+            .map(|[x, y]| DVec3::new(f64::from(x), f64::from(y), 0.0))
+            .to_vec(),
+        materials: vec![material, plain()],
+        ..Scene::default()
+    };
+    let uv = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    scene
+        .triangles
+        .push(triangle([0, 1, 2], [uv[0], uv[1], uv[2]], 0));
+    scene
+        .triangles
+        .push(triangle([0, 2, 3], [uv[0], uv[2], uv[3]], 0));
+    if beside {
+        scene
+            .triangles
+            .push(triangle([1, 4, 5], [uv[0], uv[1], uv[2]], 1));
+        scene
+            .triangles
+            .push(triangle([1, 5, 2], [uv[0], uv[2], uv[3]], 1));
+    } else {
+        scene.vertices.truncate(4);
+    }
+    scene
+}
+
+/// A product of waves whose mean over the texels is 0.5.
+fn waves(size: u32) -> HeightMap {
+    map(size, |u, v| {
+        0.5 + 0.25 * (TAU * u).sin() + 0.25 * (TAU * v).cos()
+    })
+}
+
+fn area(scene: &Scene, material: u32) -> f64 {
+    scene
+        .triangles
+        .iter()
+        .filter(|t| t.material == material)
+        .map(|t| scene.corners(t))
+        .map(|[a, b, c]| (b - a).cross(c - a).length() / 2.0)
+        .sum()
+}
+
+fn edges(triangles: impl Iterator<Item = Triangle>) -> HashMap<[u32; 2], usize> {
+    let mut edges = HashMap::new();
+    for [a, b, c] in triangles.map(|t| t.vertices) {
+        for edge in [[a, b], [b, c], [c, a]] {
+            *edges.entry(edge).or_default() += 1;
+        }
+    }
+    edges
+}
+
+#[test]
+fn a_wave_on_a_plane_has_exact_heights_at_the_vertices() {
+    // Legs of 8 texels are halved three times, the diagonal of 11.3 four times: 16 rows of 8 squares, halved.
+    for (scale, beside) in [(0.3_f32, false), (-0.125, false)] {
+        let heights = waves(8);
+        let flat = sheet(relief(heights.clone(), scale), beside);
+        let high = displace(&flat);
+        assert_eq!(high.triangles.len(), 2 * 128, "{scale}");
+        assert_eq!(high.dropped_degenerate, 0);
+        let mut moved = 0;
+        for t in &high.triangles {
+            for (p, uv) in high.corners(t).iter().zip(t.uv) {
+                let [u, v] = uv.map(f64::from);
+                assert_eq!((p.x, p.y), (2.0 * u, 2.0 * v));
+                let expected = f64::from(scale) * (heights.sample(u, v) - heights.mean());
+                assert!((p.z - expected).abs() < 1e-15, "{} {expected}", p.z);
+                moved += usize::from(p.z != 0.0);
+            }
+        }
+        assert!(moved > 300, "{moved}");
+        assert_eq!(
+            high.vertices[0].z,
+            f64::from(scale) * (heights.sample(0.0, 0.0) - heights.mean())
+        );
+        // Facing up still, and above the same square.
+        let seen: f64 = high
+            .triangles
+            .iter()
+            .map(|t| high.corners(t))
+            .map(|[a, b, c]| (b - a).cross(c - a).z / 2.0)
+            .sum();
+        assert!((seen - 4.0).abs() < 1e-12, "{seen}");
+        assert!(area(&high, 0) > 4.01);
+    }
+}
+
+#[test]
+fn an_edge_ends_at_one_texel() {
+    for size in [1_u32, 2, 3, 5, 16] {
+        let heights = map(size, |u, v| u + 2.0 * v);
+        let high = displace(&sheet(relief(heights, 1.0), false));
+        let mut longest = 0.0_f64;
+        for t in &high.triangles {
+            for k in 0..3 {
+                let [a, b] = [t.uv[k], t.uv[(k + 1) % 3]];
+                let [u, v] = [0, 1].map(|i| f64::from(b[i] - a[i]) * f64::from(size));
+                longest = longest.max(u.hypot(v));
+            }
+        }
+        // A map of one texel is flat: no relief, nothing to refine.
+        match size {
+            1 => assert_eq!(high.triangles.len(), 2),
+            _ => assert!(longest <= 1.0 && longest > 0.5, "{size}: {longest}"),
+        }
+    }
+}
+
+#[test]
+fn without_relief_nothing_changes_but_the_maps() {
+    let constant = relief(map(8, |_, _| 0.7), 1.0);
+    let zero = relief(waves(8), 0.0);
+    for material in [constant, zero] {
+        let flat = sheet(material, true);
+        let high = displace(&flat);
+        assert_eq!(
+            (&high.vertices, &high.triangles),
+            (&flat.vertices, &flat.triangles)
+        );
+        assert!(
+            high.materials
+                .iter()
+                .all(|m| m.map_height.is_none() && m.map_normal.is_none())
+        );
+        assert_eq!(high.materials[0].kd, [0.5; 3]);
+    }
+    // Refined, but as good as flat.
+    let faint = relief(waves(8), 1e-30);
+    let high = displace(&sheet(faint, true));
+    assert!(high.triangles.len() > 256);
+    assert!((area(&high, 0) - 4.0).abs() < 1e-12);
+    assert!((area(&high, 1) - 4.0).abs() < 1e-12);
+}
+
+#[test]
+fn the_border_to_plain_surfaces_stays_and_has_no_t_junction() {
+    let high = displace(&sheet(relief(waves(8), 0.3), true));
+    for t in &high.triangles {
+        for p in high.corners(t) {
+            if t.material == 1 || p.x == 2.0 {
+                assert_eq!(p.z, 0.0, "{p}");
+            }
+        }
+    }
+    assert!(
+        high.vertices.iter().any(|p| p.x == 0.0 && p.z.abs() > 0.05),
+        "the open border moves"
+    );
+    assert!((area(&high, 1) - 4.0).abs() < 1e-12);
+    // An edge without a twin lies on the border of the whole.
+    let edges = edges(high.triangles.iter().copied());
+    for [a, b] in edges.keys() {
+        if !edges.contains_key(&[*b, *a]) {
+            let [p, q] = [a, b].map(|v| high.vertices[*v as usize]);
+            let on = |axis: usize, at: f64| p[axis] == at && q[axis] == at;
+            assert!(
+                on(0, 0.0) || on(0, 4.0) || on(1, 0.0) || on(1, 2.0),
+                "{p} {q}"
+            );
+        }
+    }
+    assert!(edges.values().all(|&n| n == 1));
+}
+
+#[test]
+fn at_a_seam_the_mean_of_the_heights_counts() {
+    let mut flat = sheet(relief(waves(8), 1.0), false);
+    // The second triangle elsewhere in the tile: the diagonal is a seam.
+    for uv in &mut flat.triangles[1].uv {
+        uv[0] += 0.25;
+    }
+    let heights = waves(8);
+    let high = displace(&flat);
+    let corner = (heights.sample(0.0, 0.0) + heights.sample(0.25, 0.0)) / 2.0 - heights.mean();
+    assert!((high.vertices[0].z - corner).abs() < 1e-15);
+    // A shift by whole repeats is no seam: the two count once, beside a third.
+    for uv in &mut flat.triangles[1].uv {
+        uv[0] += 6.75;
+    }
+    let mut third = flat.clone();
+    third.vertices.push(DVec3::new(-2.0, 2.0, 0.0));
+    let uv = [[0.25, 0.0], [1.25, 1.0], [0.25, 1.0]];
+    third.triangles.push(triangle([0, 3, 4], uv, 0));
+    assert!((displace(&third).vertices[0].z - corner).abs() < 1e-15);
+    let corner = heights.sample(0.0, 0.0) - heights.mean();
+    assert!((displace(&flat).vertices[0].z - corner).abs() < 1e-15);
+}
+
+#[test]
+fn it_moves_along_the_smooth_normal() {
+    // A roof of two planes that meet at the ridge x = 0 at right angles: there the normal is straight up.
+    let mut roof = sheet(relief(map(4, |u, _| (TAU * u).cos()), 1.0), false);
+    let x = 0.5_f64.sqrt();
+    roof.vertices = [
+        [-1.0, 0.0],
+        [0.0, 0.0],
+        [0.0, 1.0],
+        [-1.0, 1.0],
+        [1.0, 0.0],
+        [1.0, 1.0],
+    ]
+    .map(|[s, y]: [f64; 2]| DVec3::new(s * x, y, -s.abs() * x))
+    .to_vec();
+    let uv = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    let next = uv.map(|[u, v]| [u + 1.0, v]);
+    roof.triangles
+        .push(triangle([1, 4, 5], [next[0], next[1], next[2]], 0));
+    roof.triangles
+        .push(triangle([1, 5, 2], [next[0], next[2], next[3]], 0));
+    let high = displace(&roof);
+    let map = roof.materials[0].map_height.as_deref().unwrap();
+    let height = map.sample(0.0, 0.0) - map.mean();
+    let ridge = high.vertices[1];
+    assert!(
+        ridge.x.abs() < 0.35 * height && ridge.z > 0.9 * height,
+        "{ridge} {height}"
+    );
+    let eave = high.vertices[0] - roof.vertices[0];
+    assert!(
+        (eave - height * DVec3::new(-x, 0.0, x)).length() < 1e-12,
+        "{eave}"
+    );
+}
+
+#[test]
+fn the_built_in_scenes_stay_closed() {
+    for (name, patches) in [
+        ("bowl-and-bunny", 6_000),
+        ("cornell-relief", 8_000),
+        ("fruit-platter", 6_000),
+    ] {
+        let options = BuiltinOptions {
+            patches: Some(patches),
+            statue: None,
+        };
+        let scene = load(name, &options).unwrap();
+        let high = displace(&scene);
+        assert_eq!(high.dropped_degenerate, 0);
+        assert!(high.materials.iter().all(|m| !m.has_relief()));
+        let raised = |t: &&Triangle| scene.materials[t.material as usize].has_relief();
+        let edges = edges(high.triangles.iter().filter(raised).copied());
+        assert!(
+            edges
+                .iter()
+                .all(|(&[a, b], &n)| n == 1 && edges.get(&[b, a]) == Some(&1)),
+            "{name}"
+        );
+        let count = |scene: &Scene, wanted: bool| {
+            scene
+                .triangles
+                .iter()
+                .filter(|t| raised(t) == wanted)
+                .count()
+        };
+        assert_eq!(
+            count(&high, false),
+            count(&scene, false),
+            "the rest is untouched"
+        );
+        assert!(count(&high, true) > 10 * count(&scene, true));
+    }
+}
+
+#[test]
+#[ignore = "prints the sizes of the baselines"]
+fn sizes() {
+    for name in ["fruit-platter", "bowl-and-bunny", "cornell-relief"] {
+        let scene = load(name, &BuiltinOptions::default()).unwrap();
+        let before = std::time::Instant::now();
+        let high = displace(&scene);
+        let raised = |t: &&Triangle| scene.materials[t.material as usize].has_relief();
+        let count = |s: &Scene| s.triangles.iter().filter(raised).count();
+        println!(
+            "{name}: {} to {} triangles, of relief {} to {} ({:.1} each), {:.2} s, {} dropped",
+            scene.triangles.len(),
+            high.triangles.len(),
+            count(&scene),
+            count(&high),
+            count(&high) as f64 / count(&scene) as f64,
+            before.elapsed().as_secs_f64(),
+            high.dropped_degenerate
+        );
+    }
+}
