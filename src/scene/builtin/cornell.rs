@@ -49,11 +49,11 @@ pub(super) fn build(options: &BuiltinOptions) -> Result<Scene> {
     let statue = stage::count(&mesh);
     let least = statue + grid::least_triangles();
     // Only a statue that was asked for may need more than the patches that were not.
-    let patches = match asked {
-        None => usual.max(2 * statue),
+    let patches = match options.patches {
+        None => patches.max(2 * statue),
         Some(patches) if patches < least => {
             return Err(Error::Usage(format!(
-                "{name}: {patches} patches are too few: the statue takes {statue}, and with the coarsest room it is {least}"
+                "cornell: {patches} patches are too few: the statue takes {statue}, and with the coarsest room it is {least}"
             )));
         }
         Some(patches) => patches,

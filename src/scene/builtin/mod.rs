@@ -12,7 +12,6 @@ mod round_cone;
 mod solid;
 mod stage;
 mod statue;
-mod still_life;
 mod surface_nets;
 
 use super::{BuiltinOptions, Scene};

@@ -1,5 +1,4 @@
-//! A standing horse, sculpted from round cones: the statue where no mesh is given. Metres; the head looks towards −z, y
-//! is up.
+//! A standing horse, sculpted from round cones: the statue where no mesh is given.
 
 use glam::DVec3;
 

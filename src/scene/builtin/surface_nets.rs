@@ -54,7 +54,7 @@ pub(super) fn polygonise(
 }
 
 /// One Newton step on to the surface, at most half a cell: the mean of crossings lies inside wherever it is convex.
-pub(super) fn towards_surface(distance: impl Fn(DVec3) -> f64, at: DVec3, cell: f64) -> DVec3 {
+fn towards_surface(distance: impl Fn(DVec3) -> f64, at: DVec3, cell: f64) -> DVec3 {
     let h = cell / 16.0;
     let slope = |axis: DVec3| (distance(at + axis * h) - distance(at - axis * h)) / (2.0 * h);
     let gradient = DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z));
