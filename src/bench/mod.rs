@@ -1,6 +1,7 @@
 //! Benchmarks: release builds, median and spread, alternatives side by side.
 
 pub mod hemicube;
+pub mod table1;
 
 /// Median, and the 10 % and 90 % points.
 pub fn spread(values: &mut [f64]) -> (f64, f64, f64) {

@@ -24,7 +24,7 @@ use mesolux::solver::{Estimator, Report, Settings, Update};
 /// incident_moment_direct [M,K,3,3] (colour, vector), exitant [M,K,3]. Ctrl-C stops the solver and keeps what it has.
 #[derive(Args)]
 pub struct Options {
-    /// A built-in name (cornell), an .obj file, or a scene.toml
+    /// A built-in name (cornell, cornell-relief, bowl-and-bunny, fruit-platter), an .obj file, or a scene.toml
     scene: String,
     /// The file to write
     #[arg(short, long, value_name = "OUT.safetensors")]
@@ -178,7 +178,7 @@ pub fn run(options: &Options) -> Result<()> {
     let bar = Bar::new();
     let solution = mesolux::bake::bake(&device, &scene, &settings, |update| {
         bar.show(update);
-        !INTERRUPTED.load(Ordering::SeqCst)
+        !interrupted()
     });
     bar.finish();
     let solution = solution?;
@@ -267,7 +267,7 @@ pub fn writable(path: &std::path::Path) -> Result<()> {
 }
 
 /// The first Ctrl-C asks the solver to stop and keep its result, the second ends the program.
-fn catch_interrupts() {
+pub fn catch_interrupts() {
     let caught = ctrlc::set_handler(|| {
         if INTERRUPTED.swap(true, Ordering::SeqCst) {
             std::process::exit(130);
@@ -277,6 +277,10 @@ fn catch_interrupts() {
     if let Err(error) = caught {
         tracing::warn!("Ctrl-C will not keep the result: {error}");
     }
+}
+
+pub fn interrupted() -> bool {
+    INTERRUPTED.load(Ordering::SeqCst)
 }
 
 fn peak_resident_bytes() -> Option<u64> {

@@ -1,9 +1,11 @@
 //! `mesolux bench`.
 
+use std::path::PathBuf;
+
 use clap::{Args, Subcommand};
 
 use super::{Builtin, DeviceOptions};
-use mesolux::bench::hemicube;
+use mesolux::bench::{hemicube, table1};
 use mesolux::error::Result;
 
 /// Measure speeds on this machine; use a release build
@@ -17,6 +19,29 @@ pub struct Options {
 enum What {
     /// Hemicubes a second in the Cornell box, with and without culling, side by side
     Hemicube(HemicubeOptions),
+    /// The paper's Table 1: three scenes in 16, 32 and 64 directions, without directions, and with the relief as geometry
+    Table1(Table1Options),
+}
+
+#[derive(Args)]
+struct Table1Options {
+    /// Folder for table1.csv, table1.json and table1.svg
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Only this scene (fruit-platter, bowl-and-bunny, cornell-relief); may be given again
+    #[arg(long, value_name = "NAME")]
+    scene: Vec<String>,
+    /// Elements of each scene, for a quicker look; the paper's numbers if not given
+    #[arg(long, value_name = "N")]
+    patches: Option<usize>,
+    /// Error bound at which a bake is done, as a share of the emitted power
+    #[arg(long, value_name = "X", default_value_t = 0.01)]
+    residual: f64,
+    /// Leave out the bake of the relief as geometry, which takes longest
+    #[arg(long)]
+    no_high_poly: bool,
+    #[command(flatten)]
+    device: DeviceOptions,
 }
 
 #[derive(Args)]
@@ -34,7 +59,33 @@ struct HemicubeOptions {
 }
 
 pub fn run(options: &Options) -> Result<()> {
-    let What::Hemicube(options) = &options.what;
+    match &options.what {
+        What::Hemicube(options) => run_hemicube(options),
+        What::Table1(options) => run_table1(options),
+    }
+}
+
+fn run_table1(options: &Table1Options) -> Result<()> {
+    let all = || table1::SCENES.iter().map(|s| s.0.to_owned()).collect();
+    let wanted = table1::Options {
+        scenes: if options.scene.is_empty() {
+            all()
+        } else {
+            options.scene.clone()
+        },
+        patches: options.patches,
+        residual: options.residual,
+        high_poly: !options.no_high_poly,
+    };
+    let device = options.device.open()?;
+    super::bake::catch_interrupts();
+    table1::run(&device, &wanted, &options.output, || {
+        !super::bake::interrupted()
+    })?;
+    options.device.check()
+}
+
+fn run_hemicube(options: &HemicubeOptions) -> Result<()> {
     let builtin = Builtin {
         patches: options.builtin.patches.or(Some(83_160)),
         statue: options.builtin.statue.clone(),

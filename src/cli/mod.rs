@@ -15,7 +15,7 @@ use mesolux::scene::{BuiltinOptions, Scene};
 
 /// Bake and draw global illumination with Vulkan: progressive radiosity through hemicube item buffers.
 ///
-/// SCENE is a built-in name (cornell), an .obj file, or a scene.toml. Results go to files and stdout, everything else to
+/// SCENE is a built-in name (cornell, cornell-relief, bowl-and-bunny, fruit-platter), an .obj file, or a scene.toml. Results go to files and stdout, everything else to
 /// stderr. Exit code 2 says that something given was wrong; nothing is written then.
 #[derive(Parser)]
 #[command(version, about)]

@@ -1,0 +1,332 @@
+//! `mesolux bench table1`: the paper's Table 1, its time column beside ours.
+//!
+//! The bakes of a scene take turns of a few seconds, so that what slows the machine slows all of them.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use plotters::prelude::*;
+use serde::Serialize;
+
+use crate::atomic_file::write_atomically;
+use crate::bake;
+use crate::directions::Directions;
+use crate::error::{Error, Result};
+use crate::meso::{Options as ReliefOptions, Transport};
+use crate::scene::{BuiltinOptions, Scene, displace, load};
+use crate::solver::{Settings, Solver, StopReason};
+use crate::vk::Device;
+
+/// A scene of the paper with its minutes for K = 16, 32, 64 (on hardware of 2013 that it does not name).
+pub const SCENES: [(&str, [f64; 3]); 3] = [
+    ("fruit-platter", [10.4, 11.0, 12.3]),
+    ("bowl-and-bunny", [6.3, 6.6, 7.8]),
+    ("cornell-relief", [8.8, 9.8, 10.3]),
+];
+
+/// What is to be measured.
+pub struct Options {
+    /// Names out of [`SCENES`].
+    pub scenes: Vec<String>,
+    /// Elements, the paper's numbers if not given.
+    pub patches: Option<usize>,
+    pub residual: f64,
+    /// Also bake the relief as geometry.
+    pub high_poly: bool,
+}
+
+/// One bake.
+#[derive(Debug, Clone, Serialize)]
+pub struct Row {
+    pub scene: String,
+    /// `lambert`, `16`, `32`, `64` or `high-poly`.
+    pub kind: String,
+    pub elements: u64,
+    pub meso_elements: u64,
+    pub sources: u64,
+    pub hemicubes: u64,
+    pub error_bound: Option<f64>,
+    /// Visibility and response of the relief, nothing kept from earlier runs.
+    pub relief_seconds: f64,
+    /// All of the bake but reading the scene.
+    pub seconds: f64,
+    pub paper_minutes: Option<f64>,
+}
+
+/// A bake under way.
+struct Under {
+    row: Row,
+    solver: Solver,
+    done: bool,
+}
+
+/// How long a bake goes on before the next one has its turn.
+const TURN: Duration = Duration::from_secs(4);
+
+/// Bakes, prints and writes `table1.csv`, `table1.json` and `table1.svg` into `folder` after every scene. `go_on` may stop it
+/// between turns; finished scenes are kept.
+pub fn run(
+    device: &Arc<Device>,
+    options: &Options,
+    folder: &Path,
+    go_on: impl Fn() -> bool,
+) -> Result<()> {
+    std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, e))?;
+    let mut rows: Vec<Row> = Vec::new();
+    println!(
+        "{}; to an error bound of {} %",
+        device.name(),
+        100.0 * options.residual
+    );
+    println!("{HEADER}");
+    for name in &options.scenes {
+        let paper = SCENES
+            .iter()
+            .find(|s| s.0 == name)
+            .map(|s| s.1)
+            .ok_or_else(|| {
+                let names = SCENES.map(|s| s.0).join(", ");
+                Error::Usage(format!("--scene {name}: must be one of {names}"))
+            })?;
+        let builtin = BuiltinOptions {
+            patches: options.patches,
+            statue: None,
+        };
+        let scene = load(name, &builtin)?;
+        let mut under = Vec::new();
+        for (kind, transport, k) in [
+            ("lambert", Transport::Lambert, 16),
+            ("16", Transport::Physical, 16),
+            ("32", Transport::Physical, 32),
+            ("64", Transport::Physical, 64),
+        ] {
+            let minutes = [16, 32, 64]
+                .iter()
+                .position(|&n| kind == n.to_string())
+                .map(|i| paper[i]);
+            under.push(begin(
+                device,
+                &scene,
+                options,
+                kind,
+                (transport, k),
+                minutes,
+            )?);
+        }
+        let mut found = in_turns(under, &go_on)?;
+        if options.high_poly && go_on() {
+            let fine = displace(&scene);
+            let lambert = (Transport::Lambert, 16);
+            let under = begin(device, &fine, options, "high-poly", lambert, None)?;
+            found.extend(in_turns(vec![under], &go_on)?);
+        }
+        for row in &found {
+            println!("{}", line(row, &found));
+        }
+        rows.extend(found);
+        write(&rows, folder)?;
+    }
+    Ok(())
+}
+
+fn begin(
+    device: &Arc<Device>,
+    scene: &Scene,
+    options: &Options,
+    kind: &str,
+    (transport, k): (Transport, u32),
+    paper_minutes: Option<f64>,
+) -> Result<Under> {
+    let settings = Settings {
+        residual: options.residual,
+        relief: ReliefOptions {
+            transport,
+            directions: Directions::new(k)?,
+            cache: None,
+        },
+        ..Settings::default()
+    };
+    let start = Instant::now();
+    let elements = bake::elements(device, scene, &settings)?;
+    let relief_seconds = start.elapsed().as_secs_f64();
+    let meso_elements = elements.relief.as_ref().map_or(0, |r| r.count() as u64);
+    let solver = Solver::new(device, elements, &scene.point_lights, &settings)?;
+    Ok(Under {
+        row: Row {
+            scene: scene.name.clone(),
+            kind: kind.into(),
+            elements: scene.triangles.len() as u64,
+            meso_elements,
+            sources: solver.sources.list.len() as u64,
+            hemicubes: 0,
+            error_bound: None,
+            relief_seconds,
+            seconds: start.elapsed().as_secs_f64(),
+            paper_minutes,
+        },
+        solver,
+        done: false,
+    })
+}
+
+fn in_turns(mut under: Vec<Under>, go_on: &impl Fn() -> bool) -> Result<Vec<Row>> {
+    while under.iter().any(|u| !u.done) && go_on() {
+        for bake in under.iter_mut().filter(|u| !u.done) {
+            let turn = Instant::now();
+            bake.solver.run(|_| turn.elapsed() < TURN)?;
+            let report = bake.solver.report();
+            bake.done = report.stop != StopReason::Interrupted;
+            bake.row.seconds += turn.elapsed().as_secs_f64();
+            bake.row.hemicubes = report.hemicubes;
+            bake.row.error_bound = report.error_bound;
+            tracing::info!(
+                "{} {}: {} hemicubes in {:.0} s, error bound {:.2} %",
+                bake.row.scene,
+                bake.row.kind,
+                report.hemicubes,
+                bake.row.seconds,
+                100.0 * report.error_bound.unwrap_or(f64::NAN)
+            );
+        }
+    }
+    Ok(under
+        .into_iter()
+        .filter(|u| u.done)
+        .map(|u| u.row)
+        .collect())
+}
+
+const HEADER: &str = "scene             bake       elements  meso  hemicubes  seconds  of it relief  over K=16  over lambert  paper, min";
+
+/// A row as it is printed, with its time over those of the same scene's K = 16 and `lambert`.
+fn line(row: &Row, scene: &[Row]) -> String {
+    let over = |kind: &str| {
+        scene
+            .iter()
+            .find(|r| r.kind == kind)
+            .map_or("-".into(), |r| format!("{:.3}", row.seconds / r.seconds))
+    };
+    format!(
+        "{:<17} {:<10} {:>8} {:>4.0}% {:>10} {:>8.1} {:>13.2} {:>10} {:>13} {:>11}",
+        row.scene,
+        match row.kind.parse::<u32>() {
+            Ok(k) => format!("K = {k}"),
+            Err(_) => row.kind.clone(),
+        },
+        row.elements,
+        100.0 * row.meso_elements as f64 / row.elements as f64,
+        row.hemicubes,
+        row.seconds,
+        row.relief_seconds,
+        over("16"),
+        over("lambert"),
+        row.paper_minutes.map_or("-".into(), |m| format!("{m:.1}")),
+    )
+}
+
+fn write(rows: &[Row], folder: &Path) -> Result<()> {
+    let bad = |path: &Path, e: String| Error::file(path, e);
+    let json = folder.join("table1.json");
+    let text = serde_json::to_string_pretty(rows).map_err(|e| bad(&json, e.to_string()))?;
+    write_atomically(&json, |out| out.write_all(text.as_bytes()))?;
+    write_atomically(&folder.join("table1.csv"), |out| {
+        writeln!(
+            out,
+            "scene,bake,elements,meso_elements,sources,hemicubes,error_bound,relief_seconds,seconds,paper_minutes"
+        )?;
+        for r in rows {
+            let optional = |v: Option<f64>| v.map_or(String::new(), |v| v.to_string());
+            writeln!(
+                out,
+                "{},{},{},{},{},{},{},{},{},{}",
+                r.scene,
+                r.kind,
+                r.elements,
+                r.meso_elements,
+                r.sources,
+                r.hemicubes,
+                optional(r.error_bound),
+                r.relief_seconds,
+                r.seconds,
+                optional(r.paper_minutes)
+            )?;
+        }
+        Ok(())
+    })?;
+    let path = folder.join("table1.svg");
+    let mut svg = String::new();
+    plot(rows, &mut svg).map_err(|e| bad(&path, format!("cannot be drawn: {e}")))?;
+    write_atomically(&path, |out| out.write_all(svg.as_bytes()))
+}
+
+/// Bars of seconds, one group a scene.
+fn plot(rows: &[Row], svg: &mut String) -> std::result::Result<(), Box<dyn std::error::Error>> {
+    const KINDS: [(&str, RGBColor); 5] = [
+        ("lambert", RGBColor(120, 120, 120)),
+        ("16", RGBColor(158, 202, 225)),
+        ("32", RGBColor(66, 146, 198)),
+        ("64", RGBColor(8, 69, 148)),
+        ("high-poly", RGBColor(217, 95, 14)),
+    ];
+    let mut scenes: Vec<&str> = Vec::new();
+    for row in rows {
+        if !scenes.contains(&row.scene.as_str()) {
+            scenes.push(&row.scene);
+        }
+    }
+    let highest = rows.iter().map(|r| r.seconds).fold(1.0, f64::max);
+    let root = SVGBackend::with_string(svg, (900, 480)).into_drawing_area();
+    root.fill(&WHITE)?;
+    let mut chart = ChartBuilder::on(&root)
+        .caption("Time of a bake", ("sans-serif", 22))
+        .margin(12)
+        .x_label_area_size(34)
+        .y_label_area_size(60)
+        .build_cartesian_2d(0.0..scenes.len() as f64, 0.0..1.12 * highest)?;
+    let name = |x: &f64| {
+        let middle = (x.fract() - 0.5).abs() < 1e-6;
+        let scene = scenes.get(*x as usize).filter(|_| middle);
+        scene.map_or(String::new(), |s| (*s).to_owned())
+    };
+    chart
+        .configure_mesh()
+        .disable_x_mesh()
+        .x_labels(2 * scenes.len() + 1)
+        .x_label_formatter(&name)
+        .y_desc("seconds")
+        .draw()?;
+    for (k, (kind, colour)) in KINDS.iter().enumerate() {
+        let bars = rows.iter().filter(|r| r.kind == *kind).map(|r| {
+            let scene = scenes.iter().position(|s| *s == r.scene).unwrap_or(0) as f64;
+            let x = scene + 0.1 + 0.16 * k as f64;
+            (x, r.seconds)
+        });
+        let bars: Vec<_> = bars.collect();
+        let label = kind
+            .parse::<u32>()
+            .map_or((*kind).to_owned(), |k| format!("K = {k}"));
+        chart
+            .draw_series(
+                bars.iter()
+                    .map(|&(x, s)| Rectangle::new([(x, 0.0), (x + 0.14, s)], colour.filled())),
+            )?
+            .label(label)
+            .legend(|(x, y)| Rectangle::new([(x, y - 5), (x + 12, y + 5)], colour.filled()));
+        chart.draw_series(bars.iter().map(|&(x, s)| {
+            Text::new(
+                format!("{s:.0}"),
+                (x, s + 0.035 * highest),
+                ("sans-serif", 13),
+            )
+        }))?;
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::UpperLeft)
+        .background_style(WHITE.mix(0.8))
+        .border_style(BLACK.mix(0.3))
+        .draw()?;
+    root.present()?;
+    Ok(())
+}
