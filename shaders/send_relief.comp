@@ -1,6 +1,6 @@
 // The light that the chosen sources with a relief send, by direction in the hemicube's frame (the paper's equation (3), and
 // ΔB_iq of equation (2)): each member's response to its moments, turned into the common frame, less what was sent before.
-// One workgroup a slot, one invocation a direction. src/reference/send_relief.rs is the same in f64.
+// One workgroup a slot, one invocation a direction. Response::send in src/meso/response.rs is the first of the three steps.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/types.glsl"

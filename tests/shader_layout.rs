@@ -49,6 +49,7 @@ fn spirv() -> BTreeSet<Vec<u32>> {
         shaders::SELECT_COMP,
         shaders::MEASURE_COMP,
         shaders::BIN_RECEIVERS_COMP,
+        shaders::BIN_TO_RELIEF_COMP,
         shaders::ITEM_BUFFER_VERT,
     ] {
         let mut offsets: BTreeMap<u32, BTreeMap<u32, u32>> = BTreeMap::new();
@@ -99,6 +100,8 @@ fn rust_and_glsl_agree() {
     check!(true, Slot: emitted source reflected);
     check!(true, View: eye x y w);
     check!(true, Draw: index_count instance_count first_index vertex_offset first_instance);
+    check!(true, MesoElement: tangent response bitangent scale);
+    check!(true, Reflected: sum error);
     // Progress stands alone in its buffer, not in an array.
     check!(false, Progress: unshot_emitted unshot_reflected shots selected);
 }

@@ -1,5 +1,5 @@
-//! What the chosen sources with a relief send by direction: the paper's equation (3). Shader: `send_relief.comp`; twin:
-//! [`crate::reference::send_relief`].
+//! What the chosen sources with a relief send by direction: the paper's equation (3). Shader: `send_relief.comp`. On the CPU
+//! [`crate::meso::Response::send`] does the same for one element.
 
 use std::sync::Arc;
 

@@ -52,6 +52,13 @@ pub struct BatchLoop {
     _passes: Passes,
 }
 
+/// What lies on the device for as long as the solver.
+pub(super) struct OnDevice<'a> {
+    pub scene: &'a SceneBuffers,
+    pub state: &'a State,
+    pub relief: Option<&'a ReliefBuffers>,
+}
+
 struct Passes {
     measure: Measure,
     select: Select,
@@ -101,11 +108,14 @@ impl BatchLoop {
         settings: &Settings,
         item_buffer: ItemBuffer,
         batch: Batch,
-        scene: &SceneBuffers,
-        state: &State,
-        relief: Option<&ReliefBuffers>,
+        on: &OnDevice<'_>,
         stop_power: f64,
     ) -> Result<Self> {
+        let OnDevice {
+            scene,
+            state,
+            relief,
+        } = *on;
         let passes = Passes {
             measure: Measure::new(device)?,
             select: Select::new(device)?,

@@ -26,7 +26,7 @@ use crate::scene::PointLight;
 use crate::sources::{self, Grouping, Sources};
 use crate::vk::Device;
 
-use batch::BatchLoop;
+use batch::{BatchLoop, OnDevice};
 pub use relief_light::ReliefLight;
 pub use report::{Report, Seconds, Skipped, StopReason};
 pub use self_test::{ids_come_back_right, open_device};
@@ -184,9 +184,11 @@ impl Solver {
             settings,
             item_buffer,
             batch,
-            &scene,
-            &state,
-            relief.as_ref(),
+            &OnDevice {
+                scene: &scene,
+                state: &state,
+                relief: relief.as_ref(),
+            },
             stop_power,
         )?;
         let mut report = Report::new(device, settings, &elements, &sources, slots);
