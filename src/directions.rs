@@ -92,6 +92,31 @@ impl Directions {
         })
     }
 
+    /// Irradiance of a facet with unit normal `n` from the vector moments of the slots, `[slot]`: n · m_k of a slot above the
+    /// facet's horizon. Of one that the horizon crosses, the share above it of light spread evenly over the slot, since
+    /// the positive part of n · m_k alone loses up to 2.3 % of a uniform sky at K = 32 and 45°.
+    pub fn irradiance(&self, moments: &[DVec3], n: DVec3) -> f64 {
+        let mut above = vec![(DVec3::ZERO, 0.0, f64::INFINITY); self.count()];
+        for (cell, slot) in self.fine() {
+            let (sum, positive, least) = &mut above[slot];
+            let cosine = n.dot(cell.direction);
+            *sum += cell.direction;
+            *positive += cosine.max(0.0);
+            *least = least.min(cosine);
+        }
+        above
+            .iter()
+            .zip(moments)
+            .map(|(&(sum, positive, least), m)| {
+                if least >= 0.0 {
+                    m.dot(n).max(0.0)
+                } else {
+                    positive * m.dot(sum).max(0.0) / sum.length_squared()
+                }
+            })
+            .sum()
+    }
+
     /// Place in the grid of cells, 0..columns × 0..rows.
     fn cell_coordinates(&self, direction: DVec3) -> DVec2 {
         let size = DVec2::new(f64::from(self.columns), f64::from(self.rows));
@@ -128,11 +153,6 @@ impl FineCell {
             }
         })
     }
-}
-
-/// Irradiance of a facet with unit normal `n` from the vector moments of the slots: Σ_k (n · m_k)⁺.
-pub fn irradiance(moments: &[DVec3], n: DVec3) -> f64 {
-    moments.iter().map(|m| m.dot(n).max(0.0)).sum()
 }
 
 /// From the square −1..1 to the hemisphere z ≥ 0.
@@ -228,17 +248,19 @@ mod tests {
     fn tilted_facet_under_a_uniform_sky() {
         for (k, most) in [(16, 0.035), (32, 0.02), (64, 0.01)] {
             let d = Directions::new(k).expect("a number of the paper");
-            let mut moments = vec![DVec3::ZERO; d.count()];
-            let weight = 2.0 * PI / f64::from(FINE * FINE);
-            for (cell, slot) in d.fine() {
-                moments[slot] += weight * cell.direction;
+            // A sum over 512² cells, independent of the one inside.
+            let (mut moments, size) = (vec![DVec3::ZERO; d.count()], 512);
+            let centre = |i: u32| (2.0 * f64::from(i) + 1.0) / f64::from(size) - 1.0;
+            for i in 0..size * size {
+                let direction = from_square(DVec2::new(centre(i % size), centre(i / size)));
+                moments[d.slot_of(direction)] += 2.0 * PI / f64::from(size * size) * direction;
             }
             let exact = PI * (1.0 + FRAC_PI_4.cos()) / 2.0;
             let largest = (0..360)
                 .map(|degrees| {
                     let (sin, cos) = f64::from(degrees).to_radians().sin_cos();
                     let n = DVec3::new(cos, sin, 1.0) * FRAC_PI_4.cos();
-                    (irradiance(&moments, n) / exact - 1.0).abs()
+                    (d.irradiance(&moments, n) / exact - 1.0).abs()
                 })
                 .fold(0.0, f64::max);
             println!(
