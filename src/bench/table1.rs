@@ -64,14 +64,21 @@ struct Under {
 /// How long a bake goes on before the next one has its turn.
 const TURN: Duration = Duration::from_secs(4);
 
-/// Bakes, prints and writes `table1.csv`, `table1.json` and `table1.svg` into `folder` after every scene. `go_on` may stop it
-/// between turns; finished scenes are kept.
+/// Bakes, prints and writes `table1.csv`, `table1.json` and `table1.svg` into `folder` whenever bakes are
+/// done. `go_on` may stop it between turns; finished bakes are kept.
 pub fn run(
     device: &Arc<Device>,
     options: &Options,
     folder: &Path,
     go_on: impl Fn() -> bool,
 ) -> Result<()> {
+    let mut scenes = Vec::new();
+    for name in &options.scenes {
+        scenes.push(*SCENES.iter().find(|s| s.0 == name).ok_or_else(|| {
+            let names = SCENES.map(|s| s.0).join(", ");
+            Error::Usage(format!("--scene {name}: must be one of {names}"))
+        })?);
+    }
     std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, e))?;
     let mut rows: Vec<Row> = Vec::new();
     println!(
@@ -80,52 +87,37 @@ pub fn run(
         100.0 * options.residual
     );
     println!("{HEADER}");
-    for name in &options.scenes {
-        let paper = SCENES
-            .iter()
-            .find(|s| s.0 == name)
-            .map(|s| s.1)
-            .ok_or_else(|| {
-                let names = SCENES.map(|s| s.0).join(", ");
-                Error::Usage(format!("--scene {name}: must be one of {names}"))
-            })?;
+    for (name, paper) in scenes {
         let builtin = BuiltinOptions {
             patches: options.patches,
             statue: None,
         };
         let scene = load(name, &builtin)?;
         let mut under = Vec::new();
-        for (kind, transport, k) in [
-            ("lambert", Transport::Lambert, 16),
-            ("16", Transport::Physical, 16),
-            ("32", Transport::Physical, 32),
-            ("64", Transport::Physical, 64),
-        ] {
-            let minutes = [16, 32, 64]
-                .iter()
-                .position(|&n| kind == n.to_string())
-                .map(|i| paper[i]);
-            under.push(begin(
-                device,
-                &scene,
-                options,
-                kind,
-                (transport, k),
-                minutes,
-            )?);
+        let mut start = |kind: &str, transport, k, minutes| -> Result<()> {
+            let bake = (transport, k);
+            under.push(begin(device, &scene, options, kind, bake, minutes)?);
+            Ok(())
+        };
+        start("lambert", Transport::Lambert, 16, None)?;
+        for (k, minutes) in [16, 32, 64].into_iter().zip(paper) {
+            start(&k.to_string(), Transport::Physical, k, Some(minutes))?;
         }
-        let mut found = in_turns(under, &go_on)?;
+        let first = rows.len();
+        let mut keep = |found: Vec<Row>| -> Result<()> {
+            for row in found {
+                rows.push(row);
+                println!("{}", line(&rows[rows.len() - 1], &rows[first..]));
+            }
+            write(&rows, folder)
+        };
+        keep(in_turns(under, &go_on)?)?;
         if options.high_poly && go_on() {
             let fine = displace(&scene);
             let lambert = (Transport::Lambert, 16);
             let under = begin(device, &fine, options, "high-poly", lambert, None)?;
-            found.extend(in_turns(vec![under], &go_on)?);
+            keep(in_turns(vec![under], &go_on)?)?;
         }
-        for row in &found {
-            println!("{}", line(row, &found));
-        }
-        rows.extend(found);
-        write(&rows, folder)?;
     }
     Ok(())
 }

@@ -4,9 +4,11 @@
 //! height map ─► height field ─► visibility (GPU, cached) ─► response ─► relief of the elements
 //! ```
 
+mod exchange;
 mod height_field;
 mod relief;
 mod response;
+mod transfer;
 mod visibility;
 
 pub use height_field::{Facet, HeightField};

@@ -223,14 +223,17 @@ impl Relief {
 
     /// Most of what reaches any relief that leaves it again.
     pub fn highest_albedo(&self) -> f32 {
-        self.class
+        let mut scales = vec![0.0_f32; self.responses.len()];
+        for (&class, scale) in self.class.iter().zip(&self.scale) {
+            if class != NONE {
+                let highest = &mut scales[class as usize];
+                *highest = highest.max(scale.max_element());
+            }
+        }
+        self.responses
             .iter()
-            .zip(&self.scale)
-            .filter(|(c, _)| **c != NONE)
-            .map(|(&c, scale)| {
-                let highest = self.responses[c as usize].highest_albedo(&self.directions);
-                highest * scale.max_element()
-            })
+            .zip(scales)
+            .map(|(response, scale)| scale * response.highest_albedo(&self.directions))
             .fold(0.0, f32::max)
     }
 }

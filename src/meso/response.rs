@@ -8,13 +8,13 @@
 //! Energy is kept to rounding: for every direction the facets together receive exactly what falls on the tile, the fit
 //! gives back linear functions and the sum over a slot exactly, the rows of W and those of G with the sky sum to 1.
 
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::visibility::RAYS;
+use super::exchange::Exchange;
+use super::transfer::{CELLS, Facets, Fit};
 use super::{HeightField, Visibility};
-use crate::constants::NONE;
-use crate::directions::{Directions, FINE, FineCell};
+use crate::directions::{Directions, FineCell};
 
 /// A slot's colour-by-vector block: `[colour]` rows that multiply a moment's vector of that colour.
 pub type Block = [Vec3; 3];
@@ -42,170 +42,6 @@ pub fn slot_shares(directions: &Directions) -> Vec<f64> {
     }
     let sum: f64 = shares.iter().sum();
     shares.iter().map(|s| s / sum).collect()
-}
-
-/// The facets of a tile with what of the sky each sees, `[facet]`, all rows over the fine cells.
-struct Facets {
-    /// Irradiance for a unit of radiance and solid angle from each fine cell, `[facet][fine cell]`.
-    transfer: Vec<f32>,
-    area: Vec<f64>,
-    /// Share of a uniform sky's light that arrives.
-    sky: Vec<f64>,
-}
-
-/// Fine cells.
-const CELLS: usize = (FINE * FINE) as usize;
-/// How far the light on a tile from one direction may be scaled to be what falls there: only grazing light, of which few
-/// facets see anything, needs more.
-const MOST_SCALE: f64 = 4.0;
-
-impl Facets {
-    fn new(field: &HeightField, normals: &[DVec3], visibility: &Visibility) -> Self {
-        let cells: Vec<FineCell> = FineCell::all().collect();
-        let azimuths: Vec<f64> = cells
-            .iter()
-            .map(|c| c.direction.y.atan2(c.direction.x))
-            .collect();
-        let count = field.facet_count();
-        let area: Vec<f64> = (0..count).map(|q| field.facet(q).area).collect();
-        let mut transfer = vec![0.0_f32; count * CELLS];
-        transfer
-            .par_chunks_mut(CELLS)
-            .enumerate()
-            .for_each(|(q, row)| {
-                for (i, cell) in cells.iter().enumerate() {
-                    let slope = visibility.horizon(q, azimuths[i]).max(0.0);
-                    let horizon = slope / (1.0 + slope * slope).sqrt();
-                    let [low, high] = cell.z_range;
-                    let seen = ((high - horizon) / (high - low)).clamp(0.0, 1.0);
-                    row[i] = (seen * normals[q].dot(cell.direction).max(0.0)) as f32;
-                }
-            });
-        // What falls on the tile from each direction must arrive on its facets.
-        let tile = 0.5 * field.aspect * count as f64;
-        let mut arriving = vec![0.0; CELLS];
-        for (row, area) in transfer.chunks(CELLS).zip(&area) {
-            for (sum, &t) in arriving.iter_mut().zip(row) {
-                *sum += area * f64::from(t);
-            }
-        }
-        let scale: Vec<f32> = arriving
-            .iter()
-            .zip(&cells)
-            .map(|(sum, cell)| (tile * cell.direction.z / sum.max(1e-300)).min(MOST_SCALE) as f32)
-            .collect();
-        let heights: f64 = cells.iter().map(|c| c.direction.z).sum();
-        let sky = transfer
-            .par_chunks_mut(CELLS)
-            .map(|row| {
-                row.iter_mut().zip(&scale).for_each(|(t, s)| *t *= s);
-                (row.iter().map(|&t| f64::from(t)).sum::<f64>() / heights).min(1.0)
-            })
-            .collect();
-        Self {
-            transfer,
-            area,
-            sky,
-        }
-    }
-}
-
-/// For each slot, the map from values at its fine cells to the vector whose dot product with a direction fits them best
-/// among those that keep their sum.
-struct Fit {
-    /// `[slot][member]`: fine cell and its column of the map.
-    columns: Vec<Vec<(usize, DVec3)>>,
-}
-
-impl Fit {
-    fn new(directions: &Directions) -> Self {
-        let mut members: Vec<Vec<(usize, DVec3)>> = vec![Vec::new(); directions.count()];
-        for (i, (cell, slot)) in directions.fine().enumerate() {
-            members[slot].push((i, cell.direction));
-        }
-        let columns = members
-            .into_iter()
-            .map(|members| {
-                let mut moment = DMat3::ZERO;
-                for (_, w) in &members {
-                    moment += DMat3::from_cols(*w * w.x, *w * w.y, *w * w.z);
-                }
-                let inverse = moment.inverse();
-                let sum: DVec3 = members.iter().map(|m| m.1).sum();
-                let along = inverse * sum;
-                members
-                    .iter()
-                    .map(|&(i, w)| {
-                        let free = inverse * w;
-                        (i, free + along * ((1.0 - sum.dot(free)) / sum.dot(along)))
-                    })
-                    .collect()
-            })
-            .collect();
-        Self { columns }
-    }
-
-    /// The vectors of one facet, `[slot]`.
-    fn apply(&self, row: &[f32]) -> Vec<Vec3> {
-        self.columns
-            .iter()
-            .map(|slot| {
-                slot.iter()
-                    .map(|&(i, column)| column * f64::from(row[i]))
-                    .sum::<DVec3>()
-                    .as_vec3()
-            })
-            .collect()
-    }
-}
-
-/// Rays that land on a facet, by the facet hit: whence they come and with which weight.
-struct Exchange {
-    first: Vec<u32>,
-    from: Vec<(u32, f32)>,
-}
-
-impl Exchange {
-    /// The blocked part of each facet's view, 1 − sky, shared among the rays that land.
-    fn new(visibility: &Visibility, sky: &[f64]) -> Self {
-        let landed = |hits: &[u32]| hits.iter().filter(|&&h| h != NONE).count();
-        let rows = || visibility.hits.chunks_exact(RAYS).enumerate();
-        let mut first = vec![0_u32; sky.len() + 1];
-        for (q, hits) in rows() {
-            for &h in hits.iter().filter(|&&h| h != NONE) {
-                first[h as usize + 1] += 1;
-            }
-            // With no ray to tell where the blocked part leads it leads to the facet's own surroundings: itself.
-            if landed(hits) == 0 {
-                first[q + 1] += 1;
-            }
-        }
-        for q in 0..sky.len() {
-            first[q + 1] += first[q];
-        }
-        let mut place = first.clone();
-        let mut from = vec![(0, 0.0); first[sky.len()] as usize];
-        let mut put = |to: usize, q: usize, weight: f64| {
-            from[place[to] as usize] = (q as u32, weight as f32);
-            place[to] += 1;
-        };
-        for (q, hits) in rows() {
-            let blocked = 1.0 - sky[q];
-            match landed(hits) {
-                0 => put(q, q, blocked),
-                count => {
-                    for &h in hits.iter().filter(|&&h| h != NONE) {
-                        put(h as usize, q, blocked / count as f64);
-                    }
-                }
-            }
-        }
-        Self { first, from }
-    }
-
-    fn to(&self, facet: usize) -> &[(u32, f32)] {
-        &self.from[self.first[facet] as usize..self.first[facet + 1] as usize]
-    }
 }
 
 /// Bounces stop when the largest change is this share of the largest value.

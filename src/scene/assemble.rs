@@ -21,6 +21,24 @@ pub(super) struct Mesh {
     pub notes: Vec<String>,
 }
 
+impl Mesh {
+    /// Triangles of one material, without texture coordinates.
+    pub fn bare(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Self {
+        Self {
+            positions,
+            triangles: triangles
+                .into_iter()
+                .map(|corners| MeshTriangle {
+                    corners,
+                    uv: None,
+                    material: 0,
+                })
+                .collect(),
+            ..Self::default()
+        }
+    }
+}
+
 #[derive(Debug, Clone, Copy)]
 pub(super) struct MeshTriangle {
     /// Indices into [`Mesh::positions`].

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::round_cone::{RoundCone, cone, smooth_union};
+use super::round_cone::{RoundCone, cone, figure};
 
 /// On the plane x = 0; units of its own, the head looks towards −z, y is up.
 const TRUNK: [RoundCone; 5] = [
@@ -36,12 +36,7 @@ const BLEND: f64 = 0.06;
 pub(super) const LOW: DVec3 = DVec3::new(-0.48, -0.05, -0.52);
 pub(super) const HIGH: DVec3 = DVec3::new(0.48, 1.62, 0.68);
 
-/// Negative inside. Nearly the distance.
+/// See [`figure`].
 pub(super) fn distance(p: DVec3) -> f64 {
-    let aside = DVec3::new(p.x.abs(), p.y, p.z);
-    let trunk = TRUNK.iter().map(|part| part.distance(p));
-    let limbs = LIMBS.iter().map(|part| part.distance(aside));
-    trunk
-        .chain(limbs)
-        .fold(f64::INFINITY, |a, b| smooth_union(a, b, BLEND))
+    figure(&TRUNK, &LIMBS, BLEND, p)
 }

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 
 use super::surface_nets::{Surface, polygonise};
-use crate::scene::assemble::{Mesh, MeshTriangle};
+use crate::scene::assemble::Mesh;
 
 /// Grids to try, and the share of the triangles wanted that is near enough to stop at.
 const ATTEMPTS: u32 = 60;
@@ -151,18 +151,7 @@ fn exactly(mut positions: Vec<DVec3>, mut triangles: Vec<[u32; 3]>, count: usize
         heap.push(entry(&positions, a, middle));
         heap.push(entry(&positions, middle, b));
     }
-    Mesh {
-        positions,
-        triangles: triangles
-            .into_iter()
-            .map(|corners| MeshTriangle {
-                corners,
-                uv: None,
-                material: 0,
-            })
-            .collect(),
-        ..Mesh::default()
-    }
+    Mesh::bare(positions, triangles)
 }
 
 #[cfg(test)]

@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 
-use super::round_cone::{RoundCone, cone, smooth_union};
+use super::round_cone::{RoundCone, cone, figure};
 use super::surface_nets::{Surface, polygonise};
-use crate::scene::assemble::{Mesh, MeshTriangle};
+use crate::scene::assemble::Mesh;
 
 /// On the plane x = 0.
 const TRUNK: [RoundCone; 10] = [
@@ -63,29 +63,12 @@ pub(super) fn build(triangles: usize) -> Mesh {
     let Some(surface) = surface else {
         unreachable!("of a hundred grids one gives a manifold");
     };
-    Mesh {
-        positions: surface.positions,
-        triangles: surface
-            .triangles
-            .into_iter()
-            .map(|corners| MeshTriangle {
-                corners,
-                uv: None,
-                material: 0,
-            })
-            .collect(),
-        ..Mesh::default()
-    }
+    Mesh::bare(surface.positions, surface.triangles)
 }
 
-/// Negative inside. Nearly the distance, which is all that polygonising needs.
+/// See [`figure`].
 pub(super) fn distance(p: DVec3) -> f64 {
-    let aside = DVec3::new(p.x.abs(), p.y, p.z);
-    let trunk = TRUNK.iter().map(|part| part.distance(p));
-    let limbs = LIMBS.iter().map(|part| part.distance(aside));
-    trunk
-        .chain(limbs)
-        .fold(f64::INFINITY, |a, b| smooth_union(a, b, BLEND))
+    figure(&TRUNK, &LIMBS, BLEND, p)
 }
 
 #[cfg(test)]

@@ -1,0 +1,122 @@
+//! What the facets of a tile take of the sky's light, and its fit over the slots.
+
+use glam::{DMat3, DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::{HeightField, Visibility};
+use crate::directions::{Directions, FINE, FineCell};
+
+/// The facets of a tile with what of the sky each sees, `[facet]`, all rows over the fine cells.
+pub(super) struct Facets {
+    /// Irradiance for a unit of radiance and solid angle from each fine cell, `[facet][fine cell]`.
+    pub(super) transfer: Vec<f32>,
+    pub(super) area: Vec<f64>,
+    /// Share of a uniform sky's light that arrives.
+    pub(super) sky: Vec<f64>,
+}
+
+/// Fine cells.
+pub(super) const CELLS: usize = (FINE * FINE) as usize;
+/// How far the light on a tile from one direction may be scaled to be what falls there: only grazing light, of which few
+/// facets see anything, needs more.
+const MOST_SCALE: f64 = 4.0;
+
+impl Facets {
+    pub(super) fn new(field: &HeightField, normals: &[DVec3], visibility: &Visibility) -> Self {
+        let cells: Vec<FineCell> = FineCell::all().collect();
+        let azimuths: Vec<f64> = cells
+            .iter()
+            .map(|c| c.direction.y.atan2(c.direction.x))
+            .collect();
+        let count = field.facet_count();
+        let area: Vec<f64> = (0..count).map(|q| field.facet(q).area).collect();
+        let mut transfer = vec![0.0_f32; count * CELLS];
+        transfer
+            .par_chunks_mut(CELLS)
+            .enumerate()
+            .for_each(|(q, row)| {
+                for (i, cell) in cells.iter().enumerate() {
+                    let slope = visibility.horizon(q, azimuths[i]).max(0.0);
+                    let horizon = slope / (1.0 + slope * slope).sqrt();
+                    let [low, high] = cell.z_range;
+                    let seen = ((high - horizon) / (high - low)).clamp(0.0, 1.0);
+                    row[i] = (seen * normals[q].dot(cell.direction).max(0.0)) as f32;
+                }
+            });
+        // What falls on the tile from each direction must arrive on its facets.
+        let tile = 0.5 * field.aspect * count as f64;
+        let mut arriving = vec![0.0; CELLS];
+        for (row, area) in transfer.chunks(CELLS).zip(&area) {
+            for (sum, &t) in arriving.iter_mut().zip(row) {
+                *sum += area * f64::from(t);
+            }
+        }
+        let scale: Vec<f32> = arriving
+            .iter()
+            .zip(&cells)
+            .map(|(sum, cell)| (tile * cell.direction.z / sum.max(1e-300)).min(MOST_SCALE) as f32)
+            .collect();
+        let heights: f64 = cells.iter().map(|c| c.direction.z).sum();
+        let sky = transfer
+            .par_chunks_mut(CELLS)
+            .map(|row| {
+                row.iter_mut().zip(&scale).for_each(|(t, s)| *t *= s);
+                (row.iter().map(|&t| f64::from(t)).sum::<f64>() / heights).min(1.0)
+            })
+            .collect();
+        Self {
+            transfer,
+            area,
+            sky,
+        }
+    }
+}
+
+/// For each slot, the map from values at its fine cells to the vector whose dot product with a direction fits them best
+/// among those that keep their sum.
+pub(super) struct Fit {
+    /// `[slot][member]`: fine cell and its column of the map.
+    columns: Vec<Vec<(usize, DVec3)>>,
+}
+
+impl Fit {
+    pub(super) fn new(directions: &Directions) -> Self {
+        let mut members: Vec<Vec<(usize, DVec3)>> = vec![Vec::new(); directions.count()];
+        for (i, (cell, slot)) in directions.fine().enumerate() {
+            members[slot].push((i, cell.direction));
+        }
+        let columns = members
+            .into_iter()
+            .map(|members| {
+                let mut moment = DMat3::ZERO;
+                for (_, w) in &members {
+                    moment += DMat3::from_cols(*w * w.x, *w * w.y, *w * w.z);
+                }
+                let inverse = moment.inverse();
+                let sum: DVec3 = members.iter().map(|m| m.1).sum();
+                let along = inverse * sum;
+                members
+                    .iter()
+                    .map(|&(i, w)| {
+                        let free = inverse * w;
+                        (i, free + along * ((1.0 - sum.dot(free)) / sum.dot(along)))
+                    })
+                    .collect()
+            })
+            .collect();
+        Self { columns }
+    }
+
+    /// The vectors of one facet, `[slot]`.
+    pub(super) fn apply(&self, row: &[f32]) -> Vec<Vec3> {
+        self.columns
+            .iter()
+            .map(|slot| {
+                slot.iter()
+                    .map(|&(i, column)| column * f64::from(row[i]))
+                    .sum::<DVec3>()
+                    .as_vec3()
+            })
+            .collect()
+    }
+}
