@@ -1,7 +1,10 @@
 //! Benchmarks: release builds, median and spread, alternatives side by side.
 
+mod difference;
 pub mod hemicube;
 pub mod table1;
+
+pub use difference::{Difference, plain_pairs};
 
 /// Median, and the 10 % and 90 % points.
 pub fn spread(values: &mut [f64]) -> (f64, f64, f64) {

@@ -6,6 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use glam::Vec3;
 use plotters::prelude::*;
 use serde::Serialize;
 
@@ -17,6 +18,8 @@ use crate::meso::{Options as ReliefOptions, Transport};
 use crate::scene::{BuiltinOptions, Scene, displace, load};
 use crate::solver::{Settings, Solver, StopReason};
 use crate::vk::Device;
+
+use super::{Difference, plain_pairs};
 
 /// A scene of the paper with its minutes for K = 16, 32, 64 (on hardware of 2013 that it does not name).
 pub const SCENES: [(&str, [f64; 3]); 3] = [
@@ -52,6 +55,23 @@ pub struct Row {
     /// All of the bake but reading the scene.
     pub seconds: f64,
     pub paper_minutes: Option<f64>,
+    /// How far the triangles without relief are from those of the high-poly bake; none before that is done.
+    pub plain: Option<Difference>,
+}
+
+impl Row {
+    fn name(&self) -> String {
+        match self.kind.parse::<u32>() {
+            Ok(k) => format!("K = {k}"),
+            Err(_) => self.kind.clone(),
+        }
+    }
+}
+
+/// A bake that is done, with its irradiance, `[triangle]` in the order of the input.
+struct Done {
+    row: Row,
+    irradiance: Vec<Vec3>,
 }
 
 /// A bake under way.
@@ -104,19 +124,31 @@ pub fn run(
             start(&k.to_string(), Transport::Physical, k, Some(minutes))?;
         }
         let first = rows.len();
-        let mut keep = |found: Vec<Row>| -> Result<()> {
-            for row in found {
-                rows.push(row);
-                println!("{}", line(&rows[rows.len() - 1], &rows[first..]));
+        let mut keep = |found: &[Done]| -> Result<()> {
+            for done in found {
+                rows.push(done.row.clone());
+                println!("{}", line(&done.row, &rows[first..]));
             }
             write(&rows, folder)
         };
-        keep(in_turns(under, &go_on)?)?;
+        let low = in_turns(under, &go_on)?;
+        keep(&low)?;
         if options.high_poly && go_on() {
             let fine = displace(&scene);
             let lambert = (Transport::Lambert, 16);
             let under = begin(device, &fine, options, "high-poly", lambert, None)?;
-            keep(in_turns(vec![under], &go_on)?)?;
+            let high = in_turns(vec![under], &go_on)?;
+            keep(&high)?;
+            if let [high] = &high[..] {
+                let pairs = plain_pairs(&scene, &fine);
+                for (row, done) in rows[first..].iter_mut().zip(&low) {
+                    let light = (&done.irradiance[..], &high.irradiance[..]);
+                    let difference = Difference::new(&scene, &pairs, light);
+                    println!("{}", against_high_poly(row, &high.row, &difference));
+                    row.plain = Some(difference);
+                }
+                write(&rows, folder)?;
+            }
         }
     }
     Ok(())
@@ -156,13 +188,14 @@ fn begin(
             relief_seconds,
             seconds: start.elapsed().as_secs_f64(),
             paper_minutes,
+            plain: None,
         },
         solver,
         done: false,
     })
 }
 
-fn in_turns(mut under: Vec<Under>, go_on: &impl Fn() -> bool) -> Result<Vec<Row>> {
+fn in_turns(mut under: Vec<Under>, go_on: &impl Fn() -> bool) -> Result<Vec<Done>> {
     while under.iter().any(|u| !u.done) && go_on() {
         for bake in under.iter_mut().filter(|u| !u.done) {
             let turn = Instant::now();
@@ -182,11 +215,27 @@ fn in_turns(mut under: Vec<Under>, go_on: &impl Fn() -> bool) -> Result<Vec<Row>
             );
         }
     }
-    Ok(under
-        .into_iter()
-        .filter(|u| u.done)
-        .map(|u| u.row)
-        .collect())
+    let done = under.into_iter().filter(|u| u.done).map(|u| {
+        let light = u.solver.light()?;
+        Ok(Done {
+            irradiance: u.solver.elements.to_input_order(&light.irradiance),
+            row: u.row,
+        })
+    });
+    done.collect()
+}
+
+/// What a bake of relief gains and loses against the same relief as geometry.
+fn against_high_poly(row: &Row, high: &Row, difference: &Difference) -> String {
+    format!(
+        "{:<17} {:<10} {:.2} times as fast as high-poly; its {} plain triangles against it: bias {:+.2} %, rms {:.2} %",
+        row.scene,
+        row.name(),
+        high.seconds / row.seconds,
+        difference.triangles,
+        100.0 * difference.bias,
+        100.0 * difference.rms
+    )
 }
 
 const HEADER: &str = "scene             bake       elements  meso  hemicubes  seconds  of it relief  over K=16  over lambert  paper, min";
@@ -202,10 +251,7 @@ fn line(row: &Row, scene: &[Row]) -> String {
     format!(
         "{:<17} {:<10} {:>8} {:>4.0}% {:>10} {:>8.1} {:>13.2} {:>10} {:>13} {:>11}",
         row.scene,
-        match row.kind.parse::<u32>() {
-            Ok(k) => format!("K = {k}"),
-            Err(_) => row.kind.clone(),
-        },
+        row.name(),
         row.elements,
         100.0 * row.meso_elements as f64 / row.elements as f64,
         row.hemicubes,
@@ -225,13 +271,13 @@ fn write(rows: &[Row], folder: &Path) -> Result<()> {
     write_atomically(&folder.join("table1.csv"), |out| {
         writeln!(
             out,
-            "scene,bake,elements,meso_elements,sources,hemicubes,error_bound,relief_seconds,seconds,paper_minutes"
+            "scene,bake,elements,meso_elements,sources,hemicubes,error_bound,relief_seconds,seconds,paper_minutes,plain_bias,plain_rms"
         )?;
         for r in rows {
             let optional = |v: Option<f64>| v.map_or(String::new(), |v| v.to_string());
             writeln!(
                 out,
-                "{},{},{},{},{},{},{},{},{},{}",
+                "{},{},{},{},{},{},{},{},{},{},{},{}",
                 r.scene,
                 r.kind,
                 r.elements,
@@ -241,7 +287,9 @@ fn write(rows: &[Row], folder: &Path) -> Result<()> {
                 optional(r.error_bound),
                 r.relief_seconds,
                 r.seconds,
-                optional(r.paper_minutes)
+                optional(r.paper_minutes),
+                optional(r.plain.map(|d| d.bias)),
+                optional(r.plain.map(|d| d.rms))
             )?;
         }
         Ok(())
