@@ -27,6 +27,7 @@ pub mod bench;
 pub mod charts;
 pub mod constants;
 pub mod contour;
+pub mod corners;
 pub mod directions;
 pub mod elements;
 pub mod error;

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! height map ─► height field ─► visibility (GPU, cached) ─► response ─► relief of the elements
+//! solution ─► vertices
 //! ```
 
 mod exchange;
@@ -9,9 +10,11 @@ mod height_field;
 mod relief;
 mod response;
 mod transfer;
+mod vertices;
 mod visibility;
 
 pub use height_field::{Facet, HeightField};
 pub use relief::{Class, Options, Relief, Transport};
 pub use response::{Block, Response, slot_shares};
+pub use vertices::MesoVertices;
 pub use visibility::Visibility;

@@ -1,0 +1,148 @@
+//! Light by direction at the vertices of a surface with a relief, gathered from the elements about them: the paper's
+//! Figure 1, from slots to slots between the frames of neighbours.
+
+use std::collections::HashMap;
+
+use glam::{DMat3, DVec3, Vec3};
+use rayon::prelude::*;
+
+use crate::corners::Corners;
+use crate::directions::Directions;
+use crate::scene::Scene;
+use crate::solution::DirectionalLight;
+
+/// Cosine of 45°: elements whose tangents are further apart meet in a seam of their texture coordinates.
+const SEAM_COS: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
+/// The vertices that meso elements share where one's surface and texture continue the other's.
+pub struct MesoVertices {
+    /// Tangent, bitangent and normal, `[vertex]`: those of the elements about it, by angle, made orthonormal; alike on
+    /// both sides of a shared edge.
+    pub frames: Vec<[Vec3; 3]>,
+    /// The vertex of each corner, `[meso element][corner]`, meso elements as in [`DirectionalLight::elements`].
+    pub corners: Vec<[u32; 3]>,
+    /// Meso elements about each vertex, with weights that sum to 1.
+    around: Vec<Vec<(u32, f64)>>,
+}
+
+impl MesoVertices {
+    pub fn new(scene: &Scene, light: &DirectionalLight) -> Self {
+        let meso: HashMap<usize, u32> = (0..)
+            .zip(&light.elements)
+            .map(|(m, &e)| (e as usize, m))
+            .collect();
+        let neighbours = Corners::new(scene);
+        let frame = |m: u32| light.frames[m as usize].map(Vec3::as_dvec3);
+        let turn = |[t, b, n]: [DVec3; 3]| t.cross(b).dot(n) > 0.0;
+        let mut known: HashMap<(u32, Vec<u32>), u32> = HashMap::new();
+        let mut vertices = Self {
+            frames: Vec::new(),
+            corners: Vec::with_capacity(light.elements.len()),
+            around: Vec::new(),
+        };
+        for (m, &e) in (0_u32..).zip(&light.elements) {
+            let triangle = &scene.triangles[e as usize];
+            let own = frame(m);
+            let corners = triangle.vertices.map(|vertex| {
+                let around: Vec<(u32, f64)> = neighbours
+                    .smooth(e as usize, vertex)
+                    .filter_map(|(other, angle)| Some((*meso.get(&other)?, other, angle)))
+                    .filter(|&(n, other, _)| {
+                        let theirs = frame(n);
+                        n == m
+                            || (scene.triangles[other].material == triangle.material
+                                && theirs[0].dot(own[0]) >= SEAM_COS
+                                && turn(theirs) == turn(own))
+                    })
+                    .map(|(n, _, angle)| (n, angle))
+                    .collect();
+                let key = (vertex, around.iter().map(|a| a.0).collect());
+                *known
+                    .entry(key)
+                    .or_insert_with(|| vertices.push(around, frame, own))
+            });
+            vertices.corners.push(corners);
+        }
+        vertices
+    }
+
+    fn push(
+        &mut self,
+        mut around: Vec<(u32, f64)>,
+        frame: impl Fn(u32) -> [DVec3; 3],
+        own: [DVec3; 3],
+    ) -> u32 {
+        let whole: f64 = around.iter().map(|a| a.1).sum();
+        let count = around.len() as f64;
+        for (_, weight) in &mut around {
+            *weight = if whole > 0.0 {
+                *weight / whole
+            } else {
+                1.0 / count
+            };
+        }
+        let mean = |axis: usize| -> DVec3 {
+            around
+                .iter()
+                .map(|&(n, weight)| frame(n)[axis] * weight)
+                .sum()
+        };
+        let normal = mean(2).try_normalize().unwrap_or(own[2]);
+        let tangent = mean(0);
+        let tangent = (tangent - normal * normal.dot(tangent))
+            .try_normalize()
+            .unwrap_or(own[0]);
+        let bitangent = normal.cross(tangent);
+        let bitangent = if bitangent.dot(own[1]) < 0.0 {
+            -bitangent
+        } else {
+            bitangent
+        };
+        self.frames
+            .push([tangent, bitangent, normal].map(|v| v.as_vec3()));
+        self.around.push(around);
+        self.frames.len() as u32 - 1
+    }
+
+    /// Vector moments at the vertices, `[vertex][slot][colour]`, of those of the elements, `[meso element][slot][colour]`,
+    /// W·m⁻², each in its own frame.
+    ///
+    /// A moment is turned as a vector from the element's frame into the vertex's and counts in the slot that it points
+    /// into, so that the light as a vector is kept. What then lies below the vertex's horizon is laid onto it.
+    pub fn gather(
+        &self,
+        directions: &Directions,
+        light: &DirectionalLight,
+        moments: &[[Vec3; 3]],
+    ) -> Vec<[Vec3; 3]> {
+        let k = directions.count();
+        let columns = |frame: &[Vec3; 3]| {
+            let [t, b, n] = frame.map(Vec3::as_dvec3);
+            DMat3::from_cols(t, b, n)
+        };
+        self.frames
+            .par_iter()
+            .zip(&self.around)
+            .flat_map_iter(|(frame, around)| {
+                let to_vertex = columns(frame).transpose();
+                let mut sums = vec![[DVec3::ZERO; 3]; k];
+                for &(m, weight) in around {
+                    let turn = to_vertex * columns(&light.frames[m as usize]);
+                    for moment in &moments[m as usize * k..][..k] {
+                        // One slot for the colours: they are fitted together.
+                        let turned = moment.map(|c| turn * c.as_dvec3());
+                        let whole = turned[0] + turned[1] + turned[2];
+                        let Some(towards) = whole.try_normalize() else {
+                            continue;
+                        };
+                        let sum = &mut sums[directions.slot_of(towards)];
+                        for c in 0..3 {
+                            sum[c] += weight * turned[c].with_z(turned[c].z.max(0.0));
+                        }
+                    }
+                }
+                sums.into_iter().map(|sum| sum.map(|c| c.as_vec3()))
+            })
+            .collect()
+    }
+}
