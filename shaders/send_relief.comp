@@ -28,6 +28,9 @@ layout(scalar, binding = 11) coherent buffer MemberExits { vec3 member_exits[]; 
 // [slot][emitted, reflected][direction]
 layout(scalar, binding = 12) writeonly buffer Exits { vec3 exits[]; };
 
+// Slots without light that were left out so far, [relief source].
+layout(scalar, binding = 13) buffer DarkSlots { uint dark_slots[]; };
+
 layout(push_constant, scalar) uniform Parameters {
     uint first_source;
     uint source_count;
@@ -72,6 +75,7 @@ void main() {
     bool mine = j < count;
 
     // Respond: every member's light in its own frame.
+    uint dark = 0;
     for (uint i = 0; mine && i < s.element_count; i++) {
         uint m = s.first_element + i - first_element;
         MesoElement meso = meso_elements[m];
@@ -83,6 +87,7 @@ void main() {
             vec3 b = moments_direct[at + 2] + moments_indirect[at + 2];
             // A moment of light from above has a z above 0.
             if (r.z == 0.0 && g.z == 0.0 && b.z == 0.0) {
+                dark++;
                 continue;
             }
             uint row = (meso.response * count + k) * 9 * count + j;
@@ -93,6 +98,9 @@ void main() {
             sent.b += matrices[row] * b.x + matrices[row + count] * b.y + matrices[row + 2 * count] * b.z;
         }
         member_exits[(first_member + i) * count + j] = sent * meso.scale;
+    }
+    if (j == 0) {
+        dark_slots[shot.source - first_source] += dark;
     }
     memoryBarrierBuffer();
     barrier();

@@ -40,6 +40,8 @@ pub struct ReliefBuffers {
     pub member_exits: Buffer,
     /// `[slot][emitted, reflected][direction]`.
     pub exits: Buffer,
+    /// Slots without light that were left out, `[relief source]`.
+    pub dark_slots: Buffer,
 }
 
 impl ReliefBuffers {
@@ -130,6 +132,7 @@ impl ReliefBuffers {
             shot_exits: zeroed("shot exits", 12 * k * of_relief.len() as u64)?,
             member_exits: storage("member exits", 12 * k * slots * u64::from(most_members))?,
             exits: storage("exits", 24 * k * slots)?,
+            dark_slots: zeroed("dark slots", 4 * of_relief.len() as u64)?,
         })
     }
 

@@ -1,5 +1,5 @@
-//! What the chosen sources with a relief send by direction: the paper's equation (3). Shader: `send_relief.comp`. On the CPU
-//! [`crate::meso::Response::send`] does the same for one element.
+//! What the chosen sources with a relief send by direction: the paper's equation (3). Shader: `send_relief.comp`; twin:
+//! [`crate::reference::send_relief`].
 
 use std::sync::Arc;
 
@@ -20,7 +20,7 @@ impl SendRelief {
                 device,
                 "send relief",
                 shaders::SEND_RELIEF_COMP,
-                &[Binding::Storage; 13],
+                &[Binding::Storage; 14],
                 24,
                 &[],
                 false,
@@ -50,6 +50,7 @@ impl SendRelief {
                 &relief.shot_exits,
                 &relief.member_exits,
                 &relief.exits,
+                &relief.dark_slots,
             ]
             .map(Bind::Buffer),
         )

@@ -7,4 +7,5 @@ pub mod item_buffer;
 pub mod measure;
 pub mod relief_visibility;
 pub mod select;
+pub mod send_relief;
 pub mod shade;

@@ -293,11 +293,15 @@ impl BatchLoop {
             cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
             Ok(())
         })?;
-        let slots: Vec<Slot> = download(device, &self.batch.slots, self.batch.slot_count as usize)?;
         Ok((
             readback.read(0, texels),
-            slots.iter().map(|s| s.source).collect(),
+            self.slots(device)?.iter().map(|s| s.source).collect(),
         ))
+    }
+
+    /// What the last batch chose.
+    pub(super) fn slots(&self, device: &Arc<Device>) -> Result<Vec<Slot>> {
+        download(device, &self.batch.slots, self.batch.slot_count as usize)
     }
 }
 

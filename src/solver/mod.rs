@@ -21,7 +21,7 @@ use crate::passes::buffers::{Batch, SceneBuffers, State, download};
 use crate::passes::cull::Culling;
 use crate::passes::item_buffer::ItemBuffer;
 use crate::passes::relief_buffers::ReliefBuffers;
-use crate::passes::types::{Progress, Reflected};
+use crate::passes::types::{Progress, Reflected, Slot};
 use crate::scene::PointLight;
 use crate::sources::{self, Grouping, Sources};
 use crate::vk::Device;
@@ -274,6 +274,11 @@ impl Solver {
         report.seconds.solve_wall += start.elapsed().as_secs_f64();
         let behind: Vec<u32> = download(&self.device, &self.state.behind, self.elements.len())?;
         report.skipped.receivers_behind_source = behind.iter().map(|&b| u64::from(b)).sum();
+        if let Some(relief) = &self.relief {
+            let sources = relief.source_count as usize;
+            let dark: Vec<u32> = download(&self.device, &relief.dark_slots, sources)?;
+            report.skipped.dark_slots = dark.iter().map(|&d| u64::from(d)).sum();
+        }
         Ok(())
     }
 
@@ -320,6 +325,25 @@ impl Solver {
         })
     }
 
+    /// What the sources with a relief sent by direction in the last batch, and all that they have been given to send; for
+    /// comparison with the pass's twin. None without relief.
+    pub fn relief_exits(&self) -> Result<Option<ReliefExits>> {
+        let Some(relief) = &self.relief else {
+            return Ok(None);
+        };
+        let k = relief.directions.count();
+        let slots = self.batches.slots(&self.device)?;
+        Ok(Some(ReliefExits {
+            exits: download(&self.device, &relief.exits, 2 * k * slots.len())?,
+            kept: download(
+                &self.device,
+                &relief.shot_exits,
+                k * relief.source_count as usize,
+            )?,
+            slots,
+        }))
+    }
+
     /// The item buffers of the last batch, `[row][slot][column]`, and the sources that they belong to.
     pub fn item_buffers(&self) -> Result<(Vec<u32>, Vec<u32>)> {
         self.batches.item_buffers(&self.device)
@@ -327,6 +351,16 @@ impl Solver {
 }
 
 pub use batch::{BatchResult, Stages};
+
+/// See [`Solver::relief_exits`]; radiosity πL, RGB, W·m⁻².
+pub struct ReliefExits {
+    /// The chosen sources, with what each had to send.
+    pub slots: Vec<Slot>,
+    /// `[slot][emitted, reflected][direction]` in the hemicube's frame; of slots without such a source, anything.
+    pub exits: Vec<Vec3>,
+    /// `[relief source][direction]`.
+    pub kept: Vec<Vec3>,
+}
 
 /// Power that a unit of unshot power can still turn into: ρ + ρ² + … = ρ/(1 − ρ) for the largest ρ. None at ρ = 1.
 fn bound_factor(elements: &Elements) -> Option<f64> {

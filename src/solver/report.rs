@@ -49,6 +49,8 @@ pub struct Skipped {
     pub triangles_culled: u64,
     /// Pairs of shot and element in which the source lay behind the element.
     pub receivers_behind_source: u64,
+    /// Slots that held no light when their element was to send by direction.
+    pub dark_slots: u64,
 }
 
 #[derive(Debug, Clone, Serialize)]

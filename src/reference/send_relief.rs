@@ -1,0 +1,111 @@
+//! Twin of the sending pass: what a source with a relief sends by direction.
+
+use glam::{DVec3, Vec3};
+
+use crate::elements::Elements;
+use crate::meso::{Relief, slot_shares};
+use crate::sources::Source;
+
+/// Light by direction of the hemicube's frame, `[direction]`, as radiosity πL.
+pub struct Sent {
+    pub emitted: Vec<DVec3>,
+    pub reflected: Vec<DVec3>,
+    /// All reflected light that the source has been given to send, this included.
+    pub kept: Vec<DVec3>,
+}
+
+/// What `source` sends of its unshot emitted and reflected radiosity. `moments` are those of its members, `[member][slot]
+/// [colour]`; `before` is what it had been given to send up to now, `[direction]`.
+pub fn send_relief(
+    (elements, relief): (&Elements, &Relief),
+    source: &Source,
+    moments: &[[Vec3; 3]],
+    before: &[DVec3],
+    (emitted, reflected): (DVec3, DVec3),
+) -> Sent {
+    let directions = &relief.directions;
+    let k = directions.count();
+    let first = source.first_element as usize;
+    let members = first..first + source.element_count as usize;
+    // Respond: Σ_k R_jk m_k of each member.
+    let responded: Vec<Vec<DVec3>> = members
+        .clone()
+        .zip(moments.chunks_exact(k))
+        .map(|(e, moments)| {
+            let response = relief.response(e);
+            (0..k)
+                .map(|out| {
+                    let sum: DVec3 = (0..k)
+                        .map(|slot| {
+                            let block = response.matrix[slot * k + out];
+                            let m = moments[slot];
+                            let colour = |c: usize| block[c].as_dvec3().dot(m[c].as_dvec3());
+                            DVec3::new(colour(0), colour(1), colour(2))
+                        })
+                        .sum();
+                    sum * relief.scale[e].as_dvec3()
+                })
+                .collect()
+        })
+        .collect();
+    // Turn: the mean over the members that face the direction, by projected area.
+    let mean = |j: usize, of: &dyn Fn(usize, usize) -> DVec3| {
+        let local = directions.centre(j);
+        let world = source.tangent * local.x + source.bitangent * local.y + source.normal * local.z;
+        let (mut sum, mut facing) = (DVec3::ZERO, 0.0);
+        for (i, e) in members.clone().enumerate() {
+            let n = elements.normal[e];
+            let weight = elements.area[e] * n.dot(world).max(0.0);
+            let seen = DVec3::new(
+                relief.tangent[e].as_dvec3().dot(world),
+                relief.bitangent[e].as_dvec3().dot(world),
+                n.dot(world),
+            );
+            facing += weight;
+            if weight > 0.0 {
+                for (slot, share) in directions.bilinear(seen) {
+                    sum += of(i, slot) * (weight * share);
+                }
+            }
+        }
+        if facing > 0.0 {
+            sum / facing
+        } else {
+            DVec3::ZERO
+        }
+    };
+    let emission = |i: usize, slot: usize| {
+        let response = relief.response(members.start + i);
+        (response.emission[slot] / response.mean_emission).as_dvec3()
+    };
+    let kept: Vec<DVec3> = (0..k)
+        .map(|j| mean(j, &|i, slot| responded[i][slot]))
+        .collect();
+    let new: Vec<DVec3> = kept
+        .iter()
+        .zip(before)
+        .map(|(now, before)| *now - *before)
+        .collect();
+    let glow: Vec<DVec3> = (0..k).map(|j| emitted * mean(j, &emission)).collect();
+    let shares = slot_shares(directions);
+    Sent {
+        emitted: with_power(glow, &shares, emitted),
+        reflected: with_power(new, &shares, reflected),
+        kept,
+    }
+}
+
+/// Brings a distribution to the power that it must have: scaled, or where less than half of it is there, shifted.
+fn with_power(mut values: Vec<DVec3>, shares: &[f64], wanted: DVec3) -> Vec<DVec3> {
+    let power: DVec3 = values.iter().zip(shares).map(|(v, &s)| *v * s).sum();
+    for value in &mut values {
+        for c in 0..3 {
+            if power[c] > 0.5 * wanted[c] {
+                value[c] *= wanted[c] / power[c];
+            } else {
+                value[c] += wanted[c] - power[c];
+            }
+        }
+    }
+    values
+}
