@@ -80,16 +80,17 @@ fn scaled_by_powers_of_two_and_moved() {
 }
 
 /// Runs a bake with a number of threads of the program and of the software device.
-fn bake(folder: &Path, name: &str, threads: &str) -> PathBuf {
+fn bake(folder: &Path, scene: &str, name: &str, threads: &str) -> PathBuf {
     let out = folder.join(name);
     let run = Command::new(env!("CARGO_BIN_EXE_mesolux"))
         .args([
             "bake",
-            "cornell",
+            scene,
             "--patches",
-            "4200",
+            "8000",
             "--shots",
             "150",
+            "--no-cache",
             "--validate",
         ])
         .args(["--threads", threads, "-o"])
@@ -107,25 +108,33 @@ fn bake(folder: &Path, name: &str, threads: &str) -> PathBuf {
 
 #[test]
 fn runs_and_threads_give_the_same_bytes() {
-    let folder = tempfile::tempdir().expect("a folder for the test");
-    let files = [("a", "1"), ("b", "2"), ("c", "2")]
-        .map(|(name, threads)| bake(folder.path(), name, threads));
-    let bytes = files.map(|f| std::fs::read(f).expect("the bake was written"));
-    let tensors = |bytes: &[u8]| {
-        let file = safetensors::SafeTensors::deserialize(bytes).expect("a safetensors file");
-        let mut all: Vec<_> = file
-            .tensors()
-            .into_iter()
-            .map(|(n, t)| (n, t.data().to_vec()))
-            .collect();
-        all.sort();
-        all
-    };
-    let first = tensors(&bytes[0]);
-    assert_eq!(first.len(), 7);
-    for other in &bytes[1..] {
-        for ((name, a), (_, b)) in first.iter().zip(tensors(other)) {
-            assert!(*a == b, "{name} differs between runs or numbers of threads");
+    // With relief: visibility, moments and light by direction too.
+    for (scene, tensor_count) in [("cornell", 7), ("cornell-relief", 13)] {
+        let folder = tempfile::tempdir().expect("a folder for the test");
+        let files = [("a", "1"), ("b", "2"), ("c", "2")]
+            .map(|(name, threads)| bake(folder.path(), scene, name, threads));
+        let bytes = files.map(|f| std::fs::read(f).expect("the bake was written"));
+        let first = tensors(&bytes[0]);
+        assert_eq!(first.len(), tensor_count);
+        for other in &bytes[1..] {
+            for ((name, a), (_, b)) in first.iter().zip(tensors(other)) {
+                assert!(
+                    *a == b,
+                    "{scene}: {name} differs between runs or numbers of threads"
+                );
+            }
         }
     }
+}
+
+/// The tensors of a bake by name.
+fn tensors(bytes: &[u8]) -> Vec<(String, Vec<u8>)> {
+    let file = safetensors::SafeTensors::deserialize(bytes).expect("a safetensors file");
+    let mut all: Vec<_> = file
+        .tensors()
+        .into_iter()
+        .map(|(n, t)| (n, t.data().to_vec()))
+        .collect();
+    all.sort();
+    all
 }
