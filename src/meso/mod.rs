@@ -6,15 +6,19 @@
 //! ```
 
 mod exchange;
+mod factors;
 mod height_field;
 mod relief;
 mod response;
+mod tiles;
 mod transfer;
 mod vertices;
 mod visibility;
 
+pub use factors::{CORNERS, Factors, MOST_RANK, RANK_STEP};
 pub use height_field::{Facet, HeightField};
 pub use relief::{Class, Options, Relief, Transport};
 pub use response::{Block, Response, slot_shares};
+pub use tiles::{Frame, Shading, Tile, tiles};
 pub use vertices::MesoVertices;
 pub use visibility::Visibility;

@@ -13,6 +13,36 @@ pub(super) struct Facets {
     pub(super) area: Vec<f64>,
     /// Share of a uniform sky's light that arrives.
     pub(super) sky: Vec<f64>,
+    /// What brings the light from each direction to what falls on the tile, `[fine cell]`.
+    pub(super) scale: Vec<f32>,
+}
+
+/// How much of each fine cell of the sky a facet sees, 0..=1.
+pub(super) struct Sight<'a> {
+    pub(super) cells: Vec<FineCell>,
+    azimuths: Vec<f64>,
+    visibility: &'a Visibility,
+}
+
+impl<'a> Sight<'a> {
+    pub(super) fn new(visibility: &'a Visibility) -> Self {
+        let cells: Vec<FineCell> = FineCell::all().collect();
+        Self {
+            azimuths: cells
+                .iter()
+                .map(|c| c.direction.y.atan2(c.direction.x))
+                .collect(),
+            cells,
+            visibility,
+        }
+    }
+
+    pub(super) fn of(&self, facet: usize, i: usize) -> f64 {
+        let slope = self.visibility.horizon(facet, self.azimuths[i]).max(0.0);
+        let horizon = slope / (1.0 + slope * slope).sqrt();
+        let [low, high] = self.cells[i].z_range;
+        ((high - horizon) / (high - low)).clamp(0.0, 1.0)
+    }
 }
 
 /// Fine cells.
@@ -23,11 +53,8 @@ const MOST_SCALE: f64 = 4.0;
 
 impl Facets {
     pub(super) fn new(field: &HeightField, normals: &[DVec3], visibility: &Visibility) -> Self {
-        let cells: Vec<FineCell> = FineCell::all().collect();
-        let azimuths: Vec<f64> = cells
-            .iter()
-            .map(|c| c.direction.y.atan2(c.direction.x))
-            .collect();
+        let sight = Sight::new(visibility);
+        let cells = &sight.cells;
         let count = field.facet_count();
         let area: Vec<f64> = (0..count).map(|q| field.facet(q).area).collect();
         let mut transfer = vec![0.0_f32; count * CELLS];
@@ -36,11 +63,7 @@ impl Facets {
             .enumerate()
             .for_each(|(q, row)| {
                 for (i, cell) in cells.iter().enumerate() {
-                    let slope = visibility.horizon(q, azimuths[i]).max(0.0);
-                    let horizon = slope / (1.0 + slope * slope).sqrt();
-                    let [low, high] = cell.z_range;
-                    let seen = ((high - horizon) / (high - low)).clamp(0.0, 1.0);
-                    row[i] = (seen * normals[q].dot(cell.direction).max(0.0)) as f32;
+                    row[i] = (sight.of(q, i) * normals[q].dot(cell.direction).max(0.0)) as f32;
                 }
             });
         // What falls on the tile from each direction must arrive on its facets.
@@ -53,7 +76,7 @@ impl Facets {
         }
         let scale: Vec<f32> = arriving
             .iter()
-            .zip(&cells)
+            .zip(cells)
             .map(|(sum, cell)| (tile * cell.direction.z / sum.max(1e-300)).min(MOST_SCALE) as f32)
             .collect();
         let heights: f64 = cells.iter().map(|c| c.direction.z).sum();
@@ -68,6 +91,7 @@ impl Facets {
             transfer,
             area,
             sky,
+            scale,
         }
     }
 }

@@ -1,0 +1,296 @@
+//! Light on the texels of a relief as a short sum of products: E_q = Σ_r a_qr β_r, with the factors a of the relief alone
+//! and the coefficients β of the incident light alone. What a frame costs then does not depend on the number of slots.
+//!
+//! The rows of the transfer, what a facet takes of the light in each slot, are all nearly combinations of a few: those with
+//! the greatest singular values. A row is measured by its values over the directions, not by its coefficients.
+
+use std::ops::Range;
+
+use glam::{DMat3, DVec2, DVec3, Vec3};
+use nalgebra::{DMatrix, SymmetricEigen};
+use rayon::prelude::*;
+
+use super::tiles::Shading;
+use super::transfer::{CELLS, Facets, Fit, Sight};
+use super::visibility::RAYS;
+use super::{HeightField, Visibility};
+use crate::constants::NONE;
+use crate::directions::Directions;
+
+/// Factors of one tile.
+#[derive(Debug, Clone)]
+pub struct Factors {
+    pub rank: usize,
+    /// β_r = Σ_k basis_rk · m_k for the vector moments of each colour, `[rank][slot]`.
+    pub basis: Vec<Vec3>,
+    /// Irradiance of each corner of each cell for a unit of β, light that bounces inside the relief included, RGB,
+    /// `[cell][corner][rank]`, corners (0, 0), (1, 0), (0, 1), (1, 1) in u and v.
+    pub corners: Vec<Vec3>,
+    /// Root mean square, over facets and directions, of what the sum leaves out of the light that arrives directly, over
+    /// that of the light.
+    pub error: f64,
+}
+
+/// Corners of a cell.
+pub const CORNERS: usize = 4;
+/// Ranks are whole multiples of this.
+pub const RANK_STEP: usize = 4;
+/// Highest rank.
+pub const MOST_RANK: usize = 24;
+
+const CONVERGED: f32 = 1e-5;
+const MOST_BOUNCES: usize = 500;
+
+impl Factors {
+    /// The least rank whose error is at most `error`, or [`MOST_RANK`].
+    pub fn new(
+        directions: &Directions,
+        field: &HeightField,
+        visibility: &Visibility,
+        shading: &Shading,
+        error: f64,
+    ) -> Self {
+        let facets = Facets::new(field, &shading.normals, visibility);
+        let fit = Fit::new(directions);
+        let whitening = Whitening::new(directions);
+        let width = 3 * directions.count();
+        let rows: Vec<f64> = facets
+            .transfer
+            .par_chunks(CELLS)
+            .flat_map_iter(|row| whitening.apply(&fit.apply(row)))
+            .collect();
+        let rows = DMatrix::from_row_slice(facets.area.len(), width, &rows);
+        let eigen = SymmetricEigen::new(rows.transpose() * &rows);
+        let mut order: Vec<usize> = (0..width).collect();
+        order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+        let power =
+            |of: &[usize]| -> f64 { of.iter().map(|&i| eigen.eigenvalues[i].max(0.0)).sum() };
+        let whole = power(&order);
+        let left_out = |rank: usize| (power(&order[rank..]) / whole).sqrt();
+        let most = MOST_RANK.min(width);
+        let rank = (RANK_STEP..most)
+            .step_by(RANK_STEP)
+            .find(|&rank| left_out(rank) <= error)
+            .unwrap_or(most);
+        let axes = DMatrix::from_fn(width, rank, |i, r| eigen.eigenvectors[(i, order[r])]);
+        let basis = (0..rank)
+            .flat_map(|r| whitening.undo(axes.column(r).as_slice()))
+            .collect();
+        let direct = &rows * &axes;
+        let inside = inside(visibility, &facets.sky, &shading.reflectance, &direct);
+        let sight = Sight::new(visibility);
+        let corners = (0..field.facet_count() / 2 * CORNERS)
+            .into_par_iter()
+            .flat_map_iter(|at| {
+                let corner = Corner::new(field, at / CORNERS, at % CORNERS);
+                let row = corner.transfer(&sight, shading, &facets.scale);
+                let row = whitening.apply(&fit.apply(&row));
+                let share = 1.0 / corner.facets.len() as f32;
+                let (axes, inside) = (&axes, &inside);
+                (0..rank).map(move |r| {
+                    let own: f64 = row
+                        .iter()
+                        .zip(axes.column(r).iter())
+                        .map(|(a, b)| a * b)
+                        .sum();
+                    let bounced: Vec3 = corner.facets.clone().map(|q| inside[q * rank + r]).sum();
+                    Vec3::splat(own as f32) + bounced * share
+                })
+            })
+            .collect();
+        Self {
+            rank,
+            basis,
+            corners,
+            error: left_out(rank),
+        }
+    }
+
+    /// β of one place's moments, `[slot][colour]`: `[rank]`, RGB.
+    pub fn coefficients<'a>(&'a self, moments: &'a [[Vec3; 3]]) -> impl Iterator<Item = Vec3> + 'a {
+        self.basis.chunks_exact(moments.len()).map(move |basis| {
+            basis
+                .iter()
+                .zip(moments)
+                .map(|(b, m)| Vec3::new(b.dot(m[0]), b.dot(m[1]), b.dot(m[2])))
+                .sum()
+        })
+    }
+
+    /// Irradiance at a place in cells, bilinear between the corners of its cell, for coefficients `[rank]`.
+    pub fn irradiance(&self, field: &HeightField, at: DVec2, coefficients: &[Vec3]) -> Vec3 {
+        let low = at.floor();
+        let f = (at - low).as_vec2();
+        let wrap = |i: f64, size: u32| (i as i64).rem_euclid(i64::from(size)) as usize;
+        let cell = wrap(low.y, field.rows) * field.columns as usize + wrap(low.x, field.columns);
+        let weights = [
+            (1.0 - f.x) * (1.0 - f.y),
+            f.x * (1.0 - f.y),
+            (1.0 - f.x) * f.y,
+            f.x * f.y,
+        ];
+        (0..CORNERS)
+            .map(|corner| {
+                let row = &self.corners[(cell * CORNERS + corner) * self.rank..][..self.rank];
+                let sum: Vec3 = row.iter().zip(coefficients).map(|(a, b)| *a * *b).sum();
+                sum * weights[corner]
+            })
+            .sum()
+    }
+}
+
+/// A corner of a cell, seen from inside the cell.
+struct Corner {
+    /// Facets of the cell that have it.
+    facets: Range<usize>,
+    /// Of the bilinear surface over the cell.
+    normal: DVec3,
+}
+
+impl Corner {
+    fn new(field: &HeightField, cell: usize, corner: usize) -> Self {
+        let columns = field.columns as usize;
+        let (i, j) = ((cell % columns) as i64, (cell / columns) as i64);
+        let (right, up) = ((corner % 2) as i64, (corner / 2) as i64);
+        let along = field.point(i + 1, j + up) - field.point(i, j + up);
+        let across = field.point(i + right, j + 1) - field.point(i + right, j);
+        Self {
+            facets: match corner {
+                0 => 2 * cell..2 * cell + 1,
+                3 => 2 * cell + 1..2 * cell + 2,
+                _ => 2 * cell..2 * cell + 2,
+            },
+            normal: DVec3::new(-along, -across / field.aspect, 1.0).normalize(),
+        }
+    }
+
+    /// What it takes of the light from each fine cell: what its facets see, by its own normal or by the map's.
+    fn transfer(&self, sight: &Sight<'_>, shading: &Shading, scale: &[f32]) -> Vec<f32> {
+        let normal = if shading.from_map {
+            let sum: DVec3 = self.facets.clone().map(|q| shading.normals[q]).sum();
+            sum.normalize_or(self.normal)
+        } else {
+            self.normal
+        };
+        let share = 1.0 / self.facets.len() as f64;
+        let seen = |i: usize| self.facets.clone().map(|q| sight.of(q, i)).sum::<f64>() * share;
+        sight
+            .cells
+            .iter()
+            .zip(scale)
+            .enumerate()
+            .map(|(i, (cell, scale))| match normal.dot(cell.direction) {
+                cosine if cosine > 0.0 => scale * (cosine * seen(i)) as f32,
+                _ => 0.0,
+            })
+            .collect()
+    }
+}
+
+/// Coordinates in which the length of a slot's vector v is the root of Σ (v · ω)² over the slot.
+struct Whitening {
+    /// `[slot]`, Lᵀ and its inverse, with L Lᵀ = Σ ω ωᵀ.
+    turns: Vec<(DMat3, DMat3)>,
+}
+
+impl Whitening {
+    fn new(directions: &Directions) -> Self {
+        let mut moments = vec![DMat3::ZERO; directions.count()];
+        for (cell, slot) in directions.fine() {
+            let w = cell.direction;
+            moments[slot] += DMat3::from_cols(w * w.x, w * w.y, w * w.z);
+        }
+        let turns = moments
+            .into_iter()
+            .map(|m| {
+                // Cholesky, column by column.
+                let a = m.x_axis.x.sqrt();
+                let (b, c) = (m.x_axis.y / a, m.x_axis.z / a);
+                let d = (m.y_axis.y - b * b).sqrt();
+                let e = (m.y_axis.z - b * c) / d;
+                let f = (m.z_axis.z - c * c - e * e).sqrt();
+                let lower = DMat3::from_cols(
+                    DVec3::new(a, b, c),
+                    DVec3::new(0.0, d, e),
+                    DVec3::new(0.0, 0.0, f),
+                );
+                let upper = lower.transpose();
+                (upper, upper.inverse())
+            })
+            .collect();
+        Self { turns }
+    }
+
+    /// From vectors `[slot]` to coordinates `[slot][axis]`.
+    fn apply(&self, vectors: &[Vec3]) -> Vec<f64> {
+        let turned = self.turns.iter().zip(vectors);
+        turned
+            .flat_map(|((upper, _), v)| (*upper * v.as_dvec3()).to_array())
+            .collect()
+    }
+
+    fn undo(&self, coordinates: &[f64]) -> Vec<Vec3> {
+        let turned = self.turns.iter().zip(coordinates.chunks_exact(3));
+        turned
+            .map(|((_, inverse), c)| (*inverse * DVec3::from_slice(c)).as_vec3())
+            .collect()
+    }
+}
+
+/// Irradiance of the facets by light from other facets, `[facet][rank]`, RGB: x = G ρ (a + x).
+fn inside(
+    visibility: &Visibility,
+    sky: &[f64],
+    reflectance: &[Vec3],
+    direct: &DMatrix<f64>,
+) -> Vec<Vec3> {
+    let rank = direct.ncols();
+    let own = |q: usize, r: usize| Vec3::splat(direct[(q, r)] as f32);
+    let mut light = vec![Vec3::ZERO; sky.len() * rank];
+    for _ in 0..MOST_BOUNCES {
+        let sent: Vec<Vec3> = light
+            .par_chunks(rank)
+            .enumerate()
+            .flat_map_iter(|(q, x)| {
+                let sent = move |(r, x): (usize, &Vec3)| reflectance[q] * (own(q, r) + *x);
+                x.iter().enumerate().map(sent)
+            })
+            .collect();
+        let next: Vec<Vec3> = (0..sky.len())
+            .into_par_iter()
+            .flat_map_iter(|q| {
+                let hits = &visibility.hits[q * RAYS..][..RAYS];
+                let landed: Vec<usize> = match hits.iter().filter(|&&h| h != NONE).count() {
+                    0 => vec![q],
+                    _ => hits
+                        .iter()
+                        .filter(|&&h| h != NONE)
+                        .map(|&h| h as usize)
+                        .collect(),
+                };
+                let weight = (1.0 - sky[q]) as f32 / landed.len() as f32;
+                let mut sums = vec![Vec3::ZERO; rank];
+                for h in landed {
+                    for (sum, sent) in sums.iter_mut().zip(&sent[h * rank..]) {
+                        *sum += *sent * weight;
+                    }
+                }
+                sums
+            })
+            .collect();
+        let size = |values: &[Vec3]| {
+            values
+                .iter()
+                .fold(0.0_f32, |m, v| m.max(v.abs().max_element()))
+        };
+        let change = next
+            .iter()
+            .zip(&light)
+            .fold(0.0_f32, |m, (a, b)| m.max((*a - *b).abs().max_element()));
+        light = next;
+        if change <= CONVERGED * size(&light) {
+            break;
+        }
+    }
+    light
+}
