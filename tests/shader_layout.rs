@@ -24,6 +24,7 @@ fn glsl() -> BTreeMap<String, Vec<(String, u32)>> {
                 members.push(((*name).to_owned(), *offset));
                 *offset += match *kind {
                     "vec3" => 12,
+                    "vec2" => 8,
                     "float" | "uint" | "int" => 4,
                     other => panic!("types.glsl: {other} has no size here"),
                 };
@@ -51,6 +52,7 @@ fn spirv() -> BTreeSet<Vec<u32>> {
         shaders::BIN_RECEIVERS_COMP,
         shaders::BIN_TO_RELIEF_COMP,
         shaders::ITEM_BUFFER_VERT,
+        shaders::RELIEF_RAYS_COMP,
     ] {
         let mut offsets: BTreeMap<u32, BTreeMap<u32, u32>> = BTreeMap::new();
         let mut strides = BTreeMap::new();
@@ -102,6 +104,9 @@ fn rust_and_glsl_agree() {
     check!(true, Draw: index_count instance_count first_index vertex_offset first_instance);
     check!(true, MesoElement: tangent response bitangent scale);
     check!(true, Reflected: sum error);
+    check!(true, HeightTile: first width height top highest);
+    check!(true, HeightRay: from tile to);
+    check!(true, HeightHit: t cell local height gradient steps);
     // Progress stands alone in its buffer, not in an array.
     check!(false, Progress: unshot_emitted unshot_reflected shots selected);
 }

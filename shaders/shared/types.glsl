@@ -86,3 +86,29 @@ struct Reflected {
     vec3 sum;
     vec3 error;
 };
+
+// One height map's part of the buffer of pyramids.
+struct HeightTile {
+    uint first;         // of its values in the buffer
+    uint width;         // texels
+    uint height;
+    uint top;           // the coarsest level that a march uses
+    float highest;
+};
+
+// A straight segment over a height map.
+struct HeightRay {
+    vec3 from;          // u, v, height
+    uint tile;
+    vec3 to;
+};
+
+// Where a segment first passes below the surface.
+struct HeightHit {
+    float t;            // 0 at the segment's start, 1 at its end
+    uint cell;          // row * width + column of the texel at its low corner; NONE: no hit
+    vec2 local;         // place in the cell, 0..1 to the next column and the next row
+    float height;       // of the surface there
+    vec2 gradient;      // dh/du, dh/dv of the cell's bilinear patch
+    uint steps;         // of the march, hit or not
+};

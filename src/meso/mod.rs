@@ -8,6 +8,7 @@
 mod exchange;
 mod factors;
 mod height_field;
+mod height_pyramid;
 mod relief;
 mod response;
 mod tiles;
@@ -17,6 +18,7 @@ mod visibility;
 
 pub use factors::{CORNERS, Factors, MOST_RANK, RANK_STEP};
 pub use height_field::{Facet, HeightField};
+pub use height_pyramid::HeightPyramid;
 pub use relief::{Class, Options, Relief, Transport};
 pub use response::{Block, Response, slot_shares};
 pub use tiles::{Frame, Shading, Tile, tiles};

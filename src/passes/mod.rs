@@ -9,6 +9,7 @@ pub mod item_buffer;
 pub mod measure;
 pub mod measure_relief;
 pub mod relief_buffers;
+pub mod relief_rays;
 pub mod relief_visibility;
 pub mod select;
 pub mod send_relief;

@@ -2,10 +2,11 @@
 //! `tests/shader_layout.rs` compares every offset.
 
 use bytemuck::{Pod, Zeroable};
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use crate::constants::KIND_SURFACE;
 use crate::meshlets;
+use crate::meso::HeightPyramid;
 use crate::sources;
 
 #[repr(C)]
@@ -156,4 +157,55 @@ pub struct MesoElement {
 pub struct Reflected {
     pub sum: Vec3,
     pub error: Vec3,
+}
+
+/// One height map's part of the buffer of pyramids.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct HeightTile {
+    pub first: u32,
+    pub width: u32,
+    pub height: u32,
+    pub top: u32,
+    pub highest: f32,
+}
+
+impl HeightTile {
+    /// `first` counts the values before this pyramid's in the buffer.
+    pub fn new(pyramid: &HeightPyramid, first: u32) -> Self {
+        Self {
+            first,
+            width: pyramid.width,
+            height: pyramid.height,
+            top: pyramid.top(),
+            highest: pyramid.highest(),
+        }
+    }
+}
+
+/// A straight segment over a height map: (u, v, height) at its ends.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct HeightRay {
+    pub from: Vec3,
+    pub tile: u32,
+    pub to: Vec3,
+}
+
+/// Where a segment first passes below the surface.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct HeightHit {
+    /// 0 at the segment's start, 1 at its end.
+    pub t: f32,
+    /// `row * width + column` of the texel at the low corner of the cell that holds the hit; `NONE` where there is none.
+    pub cell: u32,
+    /// Place in the cell, 0..=1 to the next column and to the next row.
+    pub local: Vec2,
+    /// Height of the surface there.
+    pub height: f32,
+    /// ∂h/∂u and ∂h/∂v of the cell's bilinear patch.
+    pub gradient: Vec2,
+    /// Steps of the march, hit or not.
+    pub steps: u32,
 }

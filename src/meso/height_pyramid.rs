@@ -1,0 +1,88 @@
+//! A height map's maxima over ever larger blocks, by which a ray passes over what it cannot touch.
+
+use std::iter::successors;
+
+use crate::scene::HeightMap;
+
+/// The texels of a periodic height map and the maxima of its bilinear surface, level by level, for
+/// `shaders/shared/height_march.glsl`.
+///
+/// Cell (i, j) lies between the centres of the texels (i, j), (i + 1, j), (i, j + 1) and (i + 1, j + 1), each index modulo
+/// the map's size, so that a period has as many cells as texels. A bilinear surface is highest in a corner: level 0 is
+/// the greatest of the four texels. Level n holds the maxima over blocks of 2ⁿ × 2ⁿ cells, counted from cell (0, 0); the
+/// last block of a row or column ends at the period's border, whatever is left for it. The last level is one block.
+///
+/// A maximum is the greatest of stored f32 values, so that nothing is rounded and no bound is too low.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeightPyramid {
+    /// Texels.
+    pub width: u32,
+    pub height: u32,
+    /// `[row][column]` of the texels as the map has them (rows from the top, heights in the map's units), then
+    /// `[level][row][column]` of the maxima.
+    pub values: Vec<f32>,
+    /// Where each level starts in `values`.
+    pub offsets: Vec<usize>,
+}
+
+impl HeightPyramid {
+    pub fn new(map: &HeightMap) -> Self {
+        let (width, height) = (map.width as usize, map.height as usize);
+        assert!(
+            width * height > 0 && map.values.len() == width * height,
+            "a height map has a value for each of its texels"
+        );
+        let mut values = map.values.clone();
+        let texel = |column: usize, row: usize| map.values[row % height * width + column % width];
+        for row in 0..height {
+            for column in 0..width {
+                let upper = texel(column, row).max(texel(column + 1, row));
+                let lower = texel(column, row + 1).max(texel(column + 1, row + 1));
+                values.push(upper.max(lower));
+            }
+        }
+        let sizes: Vec<_> = successors(Some((width, height)), |&(columns, rows)| {
+            (columns.max(rows) > 1).then(|| (columns.div_ceil(2), rows.div_ceil(2)))
+        })
+        .collect();
+        let mut offsets = vec![width * height];
+        for pair in sizes.windows(2) {
+            let [(columns, rows), (next_columns, next_rows)] = [pair[0], pair[1]];
+            let from = offsets[offsets.len() - 1];
+            offsets.push(values.len());
+            for row in 0..next_rows {
+                for column in 0..next_columns {
+                    let highest = (2 * row..rows.min(2 * row + 2))
+                        .flat_map(|j| {
+                            (2 * column..columns.min(2 * column + 2)).map(move |i| (i, j))
+                        })
+                        .map(|(i, j)| values[from + j * columns + i])
+                        .fold(f32::NEG_INFINITY, f32::max);
+                    values.push(highest);
+                }
+            }
+        }
+        Self {
+            width: map.width,
+            height: map.height,
+            values,
+            offsets,
+        }
+    }
+
+    /// The level of one block.
+    pub fn top(&self) -> u32 {
+        self.offsets.len() as u32 - 1
+    }
+
+    /// The highest texel.
+    pub fn highest(&self) -> f32 {
+        self.values[self.values.len() - 1]
+    }
+
+    /// Columns and rows of blocks at a level.
+    pub fn blocks(&self, level: u32) -> (u32, u32) {
+        let side = 1 << level;
+        (self.width.div_ceil(side), self.height.div_ceil(side))
+    }
+}

@@ -1,0 +1,83 @@
+//! Segments over height maps. Shader: `relief_rays.comp`; twin: [`crate::reference::relief_rays`].
+
+use std::sync::Arc;
+
+use bytemuck::{Pod, Zeroable};
+
+use super::buffers::{download, upload};
+use super::types::{HeightHit, HeightRay, HeightTile};
+use super::{groups, shaders};
+use crate::error::Result;
+use crate::vk::{Bind, Binding, Buffer, BufferUse, Commands, ComputePipeline, Device};
+
+pub struct ReliefRays {
+    pipeline: ComputePipeline,
+    device: Arc<Device>,
+}
+
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+struct Parameters {
+    first: u32,
+    count: u32,
+}
+
+/// Segments marched in a submission: far from any driver's time limit.
+const SUBMISSION: u32 = 1 << 18;
+
+impl ReliefRays {
+    pub fn new(device: &Arc<Device>) -> Result<Self> {
+        Ok(Self {
+            pipeline: ComputePipeline::new(
+                device,
+                "relief rays",
+                shaders::RELIEF_RAYS_COMP,
+                &[Binding::Storage; 4],
+                size_of::<Parameters>(),
+                &[],
+                false,
+            )?,
+            device: Arc::clone(device),
+        })
+    }
+
+    /// The hit of each segment. `pyramids` holds the values that the tiles point into.
+    pub fn run(
+        &self,
+        tiles: &[HeightTile],
+        pyramids: &[f32],
+        rays: &[HeightRay],
+    ) -> Result<Vec<HeightHit>> {
+        let tiles = upload(&self.device, "height tiles", tiles, BufferUse::Storage)?;
+        let pyramids = upload(
+            &self.device,
+            "height pyramids",
+            pyramids,
+            BufferUse::Storage,
+        )?;
+        let count = rays.len() as u32;
+        let rays = upload(&self.device, "height rays", rays, BufferUse::Storage)?;
+        let bytes = u64::from(count) * size_of::<HeightHit>() as u64;
+        let hits = Buffer::new(&self.device, "height hits", bytes, BufferUse::Storage)?;
+        let set = self.pipeline.bind(
+            "relief rays",
+            &[&tiles, &pyramids, &rays, &hits].map(Bind::Buffer),
+        )?;
+        for first in (0..count).step_by(SUBMISSION as usize) {
+            let parameters = Parameters {
+                first,
+                count: SUBMISSION.min(count - first),
+            };
+            Commands::run(&self.device, "relief rays", |cmd| {
+                cmd.dispatch(
+                    &self.pipeline,
+                    &set,
+                    &parameters,
+                    [groups(parameters.count), 1, 1],
+                );
+                Ok(())
+            })?;
+        }
+        download(&self.device, &hits, count as usize)
+    }
+}
