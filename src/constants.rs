@@ -31,4 +31,16 @@ shared! {
     AZIMUTHS = 128;
     /// A side of the grid of rays from each facet of a relief to the facets that it sees; RAY_STRATA² rays.
     RAY_STRATA = 8;
+    /// Most factors of the light on a relief.
+    MOST_RANK = 24;
+    /// How relief is drawn: displaced; only lit, at its mean height; so too, and shifted by its height.
+    SHADING_RELIEF = 0;
+    SHADING_NORMAL = 1;
+    SHADING_PARALLAX = 2;
+    /// What is drawn of a relief.
+    VIEW_SHADED = 0;
+    VIEW_ALBEDO = 1;
+    VIEW_NORMAL = 2;
+    VIEW_HEIGHT = 3;
+    VIEW_IRRADIANCE = 4;
 }

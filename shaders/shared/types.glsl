@@ -112,3 +112,37 @@ struct HeightHit {
     vec2 gradient;      // dh/du, dh/dv of the cell's bilinear patch
     uint steps;         // of the march, hit or not
 };
+
+// A triangle with relief, extruded to the lowest and the highest of its height map. Corners a, b, c ascend by the mesh's
+// vertex, so that neighbours cut the side that they share along one diagonal.
+struct Prism {
+    vec3 low_a;         // from the eye, internal units
+    vec3 low_b;
+    vec3 low_c;
+    vec3 high_a;
+    vec3 high_b;
+    vec3 high_c;
+    vec2 uv_a;
+    vec2 uv_b;
+    vec2 uv_c;
+    uint light_a;       // light vertices
+    uint light_b;
+    uint light_c;
+    uint surface;
+    vec3 tangent;       // frame of the triangle
+    float texel;        // internal units
+    vec3 bitangent;
+    vec3 normal;
+};
+
+// A relief as it is drawn.
+struct ReliefSurface {
+    float lowest;       // of the prisms, in the map's heights
+    float top;
+    float mean;
+    uint columns;       // of the height field that the factors belong to
+    uint rows;
+    uint rank;
+    uint first_factor;
+    vec2 slope;         // scene heights a texture repeat in u and in v for a unit of height
+};

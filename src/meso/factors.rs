@@ -14,7 +14,7 @@ use super::tiles::Shading;
 use super::transfer::{CELLS, Facets, Fit, Sight};
 use super::visibility::RAYS;
 use super::{HeightField, Visibility};
-use crate::constants::NONE;
+use crate::constants::{MOST_RANK, NONE};
 use crate::directions::Directions;
 
 /// Factors of one tile.
@@ -35,8 +35,6 @@ pub struct Factors {
 pub const CORNERS: usize = 4;
 /// Ranks are whole multiples of this.
 pub const RANK_STEP: usize = 4;
-/// Highest rank.
-pub const MOST_RANK: usize = 24;
 
 const CONVERGED: f32 = 1e-5;
 const MOST_BOUNCES: usize = 500;
@@ -67,7 +65,7 @@ impl Factors {
             |of: &[usize]| -> f64 { of.iter().map(|&i| eigen.eigenvalues[i].max(0.0)).sum() };
         let whole = power(&order);
         let left_out = |rank: usize| (power(&order[rank..]) / whole).sqrt();
-        let most = MOST_RANK.min(width);
+        let most = (MOST_RANK as usize).min(width);
         let rank = (RANK_STEP..most)
             .step_by(RANK_STEP)
             .find(|&rank| left_out(rank) <= error)

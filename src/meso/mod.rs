@@ -16,7 +16,7 @@ mod transfer;
 mod vertices;
 mod visibility;
 
-pub use factors::{CORNERS, Factors, MOST_RANK, RANK_STEP};
+pub use factors::{CORNERS, Factors, RANK_STEP};
 pub use height_field::{Facet, HeightField};
 pub use height_pyramid::HeightPyramid;
 pub use relief::{Class, Options, Relief, Transport};

@@ -209,3 +209,43 @@ pub struct HeightHit {
     /// Steps of the march, hit or not.
     pub steps: u32,
 }
+
+/// A triangle with relief, extruded; see `shaders/shared/types.glsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct Prism {
+    pub low_a: Vec3,
+    pub low_b: Vec3,
+    pub low_c: Vec3,
+    pub high_a: Vec3,
+    pub high_b: Vec3,
+    pub high_c: Vec3,
+    pub uv_a: Vec2,
+    pub uv_b: Vec2,
+    pub uv_c: Vec2,
+    pub light_a: u32,
+    pub light_b: u32,
+    pub light_c: u32,
+    pub surface: u32,
+    pub tangent: Vec3,
+    pub texel: f32,
+    pub bitangent: Vec3,
+    pub normal: Vec3,
+}
+
+/// A relief as it is drawn.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct ReliefSurface {
+    /// Of the prisms, in the map's heights.
+    pub lowest: f32,
+    pub top: f32,
+    pub mean: f32,
+    /// Of the height field that the factors belong to.
+    pub columns: u32,
+    pub rows: u32,
+    pub rank: u32,
+    pub first_factor: u32,
+    /// Scene heights a texture repeat in u and in v for a unit of height.
+    pub slope: Vec2,
+}
