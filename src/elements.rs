@@ -46,18 +46,7 @@ pub struct Elements {
 
 impl Elements {
     pub fn new(scene: &Scene) -> Self {
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for v in &scene.vertices {
-            low = low.min(*v);
-            high = high.max(*v);
-        }
-        let half = (0.5 * (high - low)).max_element();
-        let unit = if half > 0.0 {
-            half.log2().ceil().exp2()
-        } else {
-            1.0
-        };
-        let origin = 0.5 * (low + high);
+        let (origin, unit) = scene.local_frame();
         let vertices: Vec<_> = scene
             .vertices
             .iter()

@@ -36,6 +36,7 @@ pub mod hemicube;
 pub mod meshlets;
 pub mod meso;
 pub mod passes;
+pub mod path_tracer;
 pub mod reference;
 pub mod render;
 pub mod scene;

@@ -1,14 +1,12 @@
 //! `mesolux bake`.
 
-use std::io::IsTerminal;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
-use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
+use super::progress::{Bar, catch_interrupts, interrupted};
 use super::{Builtin, DeviceOptions};
 use mesolux::directions::Directions;
 use mesolux::error::{Error, Result};
@@ -63,7 +61,7 @@ pub struct SolveOptions {
     shots: Option<u32>,
     /// Turns the hemicubes about their axes: another seed, other aliasing
     #[arg(long, value_name = "N", default_value_t = 0)]
-    seed: u64,
+    pub seed: u64,
     /// Directions of the light on relief: 16, 32 or 64
     #[arg(long, value_name = "K", default_value_t = 64)]
     directions: u32,
@@ -97,18 +95,19 @@ enum EstimatorName {
 }
 
 impl SolveOptions {
-    pub fn settings(&self) -> Result<Settings> {
-        let budget = match self.budget {
-            None => None,
+    pub fn budget(&self) -> Result<Option<Duration>> {
+        match self.budget {
+            None => Ok(None),
             Some(seconds) if (0.0..=1e9).contains(&seconds) => {
-                Some(Duration::from_secs_f64(seconds))
+                Ok(Some(Duration::from_secs_f64(seconds)))
             }
-            Some(seconds) => {
-                return Err(Error::Usage(format!(
-                    "--budget {seconds}: must be seconds, 0 or more"
-                )));
-            }
-        };
+            Some(seconds) => Err(Error::Usage(format!(
+                "--budget {seconds}: must be seconds, 0 or more"
+            ))),
+        }
+    }
+
+    pub fn settings(&self) -> Result<Settings> {
         Ok(Settings {
             estimator: match self.estimator {
                 EstimatorName::Receiver => Estimator::Receiver,
@@ -116,7 +115,7 @@ impl SolveOptions {
             },
             hemicube: self.hemicube,
             residual: self.residual,
-            budget,
+            budget: self.budget()?,
             shots: self.shots,
             seed: self.seed,
             relief: meso::Options {
@@ -163,8 +162,6 @@ struct Printed<'a> {
     report: &'a Report,
 }
 
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
-
 pub fn run(options: &Options) -> Result<()> {
     let start = Instant::now();
     set_threads(options.threads)?;
@@ -177,7 +174,7 @@ pub fn run(options: &Options) -> Result<()> {
     catch_interrupts();
     let bar = Bar::new();
     let solution = mesolux::bake::bake(&device, &scene, &settings, |update| {
-        bar.show(update);
+        bar.show(progress(update));
         !interrupted()
     });
     bar.finish();
@@ -266,23 +263,6 @@ pub fn writable(path: &std::path::Path) -> Result<()> {
         .map_err(|e| Error::write(path, e))
 }
 
-/// The first Ctrl-C asks the solver to stop and keep its result, the second ends the program.
-pub fn catch_interrupts() {
-    let caught = ctrlc::set_handler(|| {
-        if INTERRUPTED.swap(true, Ordering::SeqCst) {
-            std::process::exit(130);
-        }
-        eprintln!("stopping after this batch; the result so far is kept (again: stop at once)");
-    });
-    if let Err(error) = caught {
-        tracing::warn!("Ctrl-C will not keep the result: {error}");
-    }
-}
-
-pub fn interrupted() -> bool {
-    INTERRUPTED.load(Ordering::SeqCst)
-}
-
 fn peak_resident_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
@@ -290,60 +270,19 @@ fn peak_resident_bytes() -> Option<u64> {
     Some(kib * 1024)
 }
 
-/// Progress on stderr: a live line on a terminal, a line now and then elsewhere.
-struct Bar {
-    bar: Option<ProgressBar>,
-    last: std::cell::Cell<Option<Instant>>,
-}
-
-/// Between two lines of progress where there is no terminal.
-const QUIET: Duration = Duration::from_secs(10);
-
-impl Bar {
-    fn new() -> Self {
-        let bar = std::io::stderr().is_terminal().then(|| {
-            let bar = ProgressBar::new_spinner();
-            if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}") {
-                bar.set_style(style);
-            }
-            bar
-        });
-        Self {
-            bar,
-            last: std::cell::Cell::new(Some(Instant::now())),
-        }
-    }
-
-    fn show(&self, update: &Update) {
-        let bound = update
-            .error_bound
-            .map_or("none".to_owned(), |b| format!("{:.2} %", 100.0 * b));
-        let left = update.left.map_or(String::new(), |left| {
-            format!(", about {:.0} s left", left.as_secs_f64())
-        });
-        let text = format!(
-            "{} shots from {} sources in {:.0} s, unshot {:.3} %, error bound {bound}{left}",
-            update.shots,
-            update.sources,
-            update.elapsed.as_secs_f64(),
-            100.0 * update.unshot_share
-        );
-        match &self.bar {
-            Some(bar) => {
-                bar.set_message(text);
-                bar.tick();
-            }
-            None if self.last.get().is_none_or(|last| last.elapsed() >= QUIET) => {
-                self.last.set(Some(Instant::now()));
-                tracing::info!("{text}");
-            }
-            None => {}
-        }
-    }
-
-    fn finish(&self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
-        }
-    }
+/// A line on how far the solver is.
+fn progress(update: &Update) -> String {
+    let bound = update
+        .error_bound
+        .map_or("none".to_owned(), |b| format!("{:.2} %", 100.0 * b));
+    let left = update.left.map_or(String::new(), |left| {
+        format!(", about {:.0} s left", left.as_secs_f64())
+    });
+    format!(
+        "{} shots from {} sources in {:.0} s, unshot {:.3} %, error bound {bound}{left}",
+        update.shots,
+        update.sources,
+        update.elapsed.as_secs_f64(),
+        100.0 * update.unshot_share
+    )
 }

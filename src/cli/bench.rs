@@ -78,9 +78,9 @@ fn run_table1(options: &Table1Options) -> Result<()> {
         high_poly: !options.no_high_poly,
     };
     let device = options.device.open()?;
-    super::bake::catch_interrupts();
+    super::progress::catch_interrupts();
     table1::run(&device, &wanted, &options.output, || {
-        !super::bake::interrupted()
+        !super::progress::interrupted()
     })?;
     options.device.check()
 }

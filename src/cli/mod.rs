@@ -3,6 +3,8 @@
 mod bake;
 mod bench;
 mod info;
+mod progress;
+mod reference;
 mod render;
 mod scene;
 

@@ -5,15 +5,17 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::bake::{SolveOptions, writable};
+use super::reference::{self, ReferenceOptions};
 use super::{Builtin, DeviceOptions};
 use mesolux::error::{Error, Result};
-use mesolux::render::{FileKind, View, render};
+use mesolux::render::{FileKind, Picture, View, render};
 use mesolux::scene::{Camera, Scene};
 use mesolux::solution::Bake;
 
 /// Draw a scene or a bake to a picture
 ///
-/// A PNG is exposed and tone-mapped; an EXR holds linear radiance. A SCENE is baked first, with the options of `bake`.
+/// A PNG is exposed and tone-mapped; an EXR holds linear radiance. A SCENE is baked first, with the options of `bake`, or
+/// path traced with --reference.
 #[derive(Args)]
 pub struct Options {
     /// A scene (see `bake`) or a bake (.safetensors)
@@ -31,6 +33,8 @@ pub struct Options {
     /// Multiplies the light by 2^EV; found from the picture if not given
     #[arg(long, value_name = "EV", allow_hyphen_values = true)]
     exposure: Option<f32>,
+    #[command(flatten)]
+    reference: ReferenceOptions,
     #[command(flatten)]
     solve: SolveOptions,
     #[command(flatten)]
@@ -62,6 +66,15 @@ pub fn run(options: &Options) -> Result<()> {
     let is_bake = path
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("safetensors"));
+    if options.reference.reference {
+        if is_bake {
+            return Err(Error::Usage(format!(
+                "{}: --reference draws a scene, not a bake",
+                options.input
+            )));
+        }
+        return run_reference(options);
+    }
     let (scene, irradiance, device) = if is_bake {
         let bake = Bake::load(path)?;
         let builtin = Builtin {
@@ -89,22 +102,45 @@ pub fn run(options: &Options) -> Result<()> {
         let solution = mesolux::bake::bake(&device, &scene, &settings, |_| true)?;
         (scene, solution.irradiance, device)
     };
-    let view = View {
-        camera: camera(&scene, options.camera.as_deref())?,
-        width: options.size.0,
-        height: options.size.1,
-    };
+    let view = options.view(&scene)?;
     let picture = render(&device, &scene, &irradiance, &view)?;
     options.device.check()?;
-    picture.write(&options.output, options.exposure)?;
-    tracing::info!(
-        "{}: {}x{}, camera {}",
-        options.output.display(),
-        view.width,
-        view.height,
-        view.camera.name
-    );
-    Ok(())
+    options.write(&picture, &view)
+}
+
+/// The same by the path tracer.
+fn run_reference(options: &Options) -> Result<()> {
+    let settings = options
+        .reference
+        .settings(options.solve.budget()?, options.solve.seed);
+    let scene = options.builtin.load(&options.input)?;
+    options.view(&scene)?;
+    let scene = reference::tessellated(scene);
+    let view = options.view(&scene)?;
+    let film = reference::draw(&scene, &view, &settings)?;
+    options.write(&film.picture(), &view)
+}
+
+impl Options {
+    fn view<'a>(&self, scene: &'a Scene) -> Result<View<'a>> {
+        Ok(View {
+            camera: camera(scene, self.camera.as_deref())?,
+            width: self.size.0,
+            height: self.size.1,
+        })
+    }
+
+    fn write(&self, picture: &Picture, view: &View<'_>) -> Result<()> {
+        picture.write(&self.output, self.exposure)?;
+        tracing::info!(
+            "{}: {}x{}, camera {}",
+            self.output.display(),
+            view.width,
+            view.height,
+            view.camera.name
+        );
+        Ok(())
+    }
 }
 
 fn camera<'a>(scene: &'a Scene, name: Option<&str>) -> Result<&'a Camera> {

@@ -19,6 +19,7 @@ use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 pub use picture::{FileKind, Picture, SAMPLES};
+pub(crate) use projection::Projection;
 pub use smooth::corner_irradiance;
 
 use crate::error::{Error, Result};
@@ -27,7 +28,7 @@ use crate::passes::shade::{Draw, Parameters, Shade, Target, Vertex};
 use crate::scene::{Camera, Scene, Triangle};
 use crate::vk::{Buffer, BufferUse, Commands, DescriptorSet, Device};
 use picture::Samples;
-use projection::{Projection, Tile};
+use projection::Tile;
 use textures::Textures;
 
 /// What is to be seen.
@@ -39,6 +40,33 @@ pub struct View<'a> {
     pub height: u32,
 }
 
+impl View<'_> {
+    /// # Errors
+    /// A size of 0 or above [`MOST_PIXELS`].
+    pub(crate) fn check(&self) -> Result<()> {
+        for (name, side) in [("width", self.width), ("height", self.height)] {
+            if !(1..=MOST_PIXELS).contains(&side) {
+                return Err(Error::Usage(format!(
+                    "picture {name} {side} must be in 1..={MOST_PIXELS}"
+                )));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Which part of the light is drawn.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Light {
+    /// All of it.
+    #[default]
+    Global,
+    /// What emitters show of themselves, and what has come straight from them and from point lights.
+    Direct,
+    /// The rest: what has been reflected more than once.
+    Indirect,
+}
+
 /// Most pixels along a side of a picture.
 pub const MOST_PIXELS: u32 = 16_384;
 
@@ -48,9 +76,6 @@ const TILE: u32 = 2048 / SAMPLES;
 /// A pixel keeps its samples where a channel's lowest is below this share of its highest: nearer together, the tone curve is
 /// straight enough that the mean alone gives the same code.
 const CONTRAST: f32 = 0.8;
-
-/// What the 90th percentile of luminance is brought to without an exposure.
-const METER_TARGET: f32 = 0.6;
 
 /// Renders `scene` under `irradiance` E, `[triangle]` in the order of the input, W·m⁻²: L = ρ(u, v) · E / π + Le on fronts,
 /// black on backs, which block all the same.
@@ -68,13 +93,7 @@ pub fn render(
         scene.triangles.len(),
         "one irradiance a triangle"
     );
-    for (name, side) in [("width", view.width), ("height", view.height)] {
-        if !(1..=MOST_PIXELS).contains(&side) {
-            return Err(Error::Usage(format!(
-                "picture {name} {side} must be in 1..={MOST_PIXELS}"
-            )));
-        }
-    }
+    view.check()?;
     let projection = Projection::new(scene, view)?;
     let shade = Shade::new(device)?;
     let textures = Textures::new(device, &shade, scene)?;
@@ -264,25 +283,11 @@ impl Gathered {
 
     fn into_picture(mut self, view: &View<'_>) -> Picture {
         self.contrasts.par_sort_unstable_by_key(|c| c.0);
-        let seen = self.metered.len();
-        let bright = if seen > 0 {
-            let (_, percentile, _) = self
-                .metered
-                .select_nth_unstable_by((seen - 1) * 9 / 10, f32::total_cmp);
-            *percentile
-        } else {
-            0.0
-        };
         Picture {
             width: view.width,
             height: view.height,
             radiance: self.radiance,
-            // In the dark there is nothing to expose for.
-            automatic_exposure: if bright > 0.0 {
-                (METER_TARGET / bright).log2()
-            } else {
-                0.0
-            },
+            automatic_exposure: picture::automatic_exposure(&mut self.metered),
             contrasts: self.contrasts,
         }
     }

@@ -32,6 +32,24 @@ pub struct Picture {
     pub(super) contrasts: Vec<(u32, Samples)>,
 }
 
+/// What the 90th percentile of luminance is brought to without an exposure.
+const METER_TARGET: f32 = 0.6;
+
+/// The exposure, as a power of two, for pixels of these luminances.
+pub(super) fn automatic_exposure(metered: &mut [f32]) -> f32 {
+    if metered.is_empty() {
+        return 0.0;
+    }
+    let place = (metered.len() - 1) * 9 / 10;
+    let (_, &mut bright, _) = metered.select_nth_unstable_by(place, f32::total_cmp);
+    // In the dark there is nothing to expose for.
+    if bright > 0.0 {
+        (METER_TARGET / bright).log2()
+    } else {
+        0.0
+    }
+}
+
 /// A kind of picture file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FileKind {
@@ -58,6 +76,28 @@ impl FileKind {
 }
 
 impl Picture {
+    /// A picture of pixels without samples of their own, `[row][column]` from the top left; `metered` says at which of them
+    /// an exposure meter looks.
+    pub(crate) fn new(
+        (width, height): (u32, u32),
+        radiance: Vec<[f32; 3]>,
+        metered: &[bool],
+    ) -> Self {
+        let mut luminances: Vec<_> = radiance
+            .iter()
+            .zip(metered)
+            .filter(|(_, metered)| **metered)
+            .map(|(&radiance, _)| tone::luminance(radiance))
+            .collect();
+        Self {
+            width,
+            height,
+            automatic_exposure: automatic_exposure(&mut luminances),
+            radiance,
+            contrasts: Vec::new(),
+        }
+    }
+
     /// Writes the picture, by the ending of `path`: `.png` as 8-bit sRGB, exposed by 2^`exposure` and tone-mapped, or
     /// `.exr` as linear 32-bit float radiance, W·m⁻²·sr⁻¹, neither exposed nor tone-mapped.
     ///

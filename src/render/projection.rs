@@ -48,18 +48,20 @@ impl Projection {
         let up = right.cross(forward);
         let size = [f64::from(view.width), f64::from(view.height)];
         let scale = 1.0 / half_angle.tan();
-        let (low, high) = scene.bounds();
-        let half = (0.5 * (high - low)).max_element();
         Ok(Self {
             eye: camera.position,
-            unit: if half > 0.0 {
-                half.log2().ceil().exp2()
-            } else {
-                1.0
-            },
+            unit: scene.local_frame().1,
             rows: [right * (scale * size[1] / size[0]), -up * scale, forward],
             size,
         })
+    }
+
+    /// The direction, a unit vector, in which a place in the picture is seen; pixels from the left top corner.
+    pub fn ray(&self, column: f64, row: f64) -> DVec3 {
+        let [x, y, w] = self.rows;
+        let across = 2.0 * column / self.size[0] - 1.0;
+        let down = 2.0 * row / self.size[1] - 1.0;
+        (w + x * (across / x.length_squared()) + y * (down / y.length_squared())).normalize()
     }
 
     /// Rows x, y and w over a tile alone.

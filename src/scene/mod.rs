@@ -75,6 +75,19 @@ impl Scene {
                 (low.min(p), high.max(p))
             })
     }
+
+    /// The middle of the scene and the length of an *internal unit*, both in scene units. The unit is a power of two: about
+    /// the middle every internal coordinate lies in −1..1.
+    pub(crate) fn local_frame(&self) -> (DVec3, f64) {
+        let (low, high) = self.bounds();
+        let half = (0.5 * (high - low)).max_element();
+        let unit = if half > 0.0 {
+            half.log2().ceil().exp2()
+        } else {
+            1.0
+        };
+        (0.5 * (low + high), unit)
+    }
 }
 
 /// One triangle, counter-clockwise seen from its front, the side that sends and receives light.

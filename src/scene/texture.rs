@@ -70,7 +70,8 @@ impl Texture {
         self.bilinear(f64::from(u), f64::from(v))
     }
 
-    fn bilinear(&self, u: f64, v: f64) -> [f32; 3] {
+    /// The same for coordinates that have not been rounded.
+    pub(crate) fn bilinear(&self, u: f64, v: f64) -> [f32; 3] {
         let (columns, x) = neighbours(u, self.width);
         let (rows, y) = neighbours(1.0 - v, self.height);
         let (x, y) = (x as f32, y as f32);

@@ -1,0 +1,102 @@
+//! `mesolux render --reference`.
+
+use std::time::Duration;
+
+use clap::{Args, ValueEnum};
+
+use super::progress::{Bar, catch_interrupts, interrupted};
+use mesolux::error::Result;
+use mesolux::path_tracer::{Film, PathTracer, Settings};
+use mesolux::render::{Light, View};
+use mesolux::scene::{Scene, displace};
+
+/// What the path tracer is asked for.
+#[derive(Args)]
+pub struct ReferenceOptions {
+    /// Trace paths on the CPU instead of baking: unbiased, relief as geometry, no Vulkan device
+    ///
+    /// Tells the picture's mean with its 95 % confidence interval. Ctrl-C, or --budget, keeps the paths so far.
+    #[arg(long, conflicts_with_all = [
+        "estimator", "hemicube", "residual", "shots", "directions", "transport", "cache", "no_cache", "device", "validate",
+    ])]
+    pub reference: bool,
+    /// Paths of each pixel [default: 256]
+    #[arg(long, value_name = "N", requires = "reference")]
+    paths: Option<u32>,
+    /// Which light is drawn [default: global]
+    #[arg(long, value_enum, requires = "reference")]
+    light: Option<LightName>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum LightName {
+    /// All of it
+    Global,
+    /// Emitters, and what comes straight from them and from point lights
+    Direct,
+    /// What has been reflected more than once
+    Indirect,
+}
+
+impl ReferenceOptions {
+    pub fn settings(&self, budget: Option<Duration>, seed: u64) -> Settings {
+        let default = Settings::default();
+        Settings {
+            paths: self.paths.unwrap_or(default.paths),
+            budget,
+            seed,
+            light: match self.light {
+                None | Some(LightName::Global) => Light::Global,
+                Some(LightName::Direct) => Light::Direct,
+                Some(LightName::Indirect) => Light::Indirect,
+            },
+        }
+    }
+}
+
+/// The scene with its relief as geometry.
+pub fn tessellated(scene: Scene) -> Scene {
+    if !scene.materials.iter().any(|m| m.has_relief()) {
+        return scene;
+    }
+    let fine = displace(&scene);
+    tracing::info!(
+        "relief as geometry: {} triangles instead of {}",
+        fine.triangles.len(),
+        scene.triangles.len()
+    );
+    fine
+}
+
+/// Traces the picture and tells how sure it is.
+pub fn draw(scene: &Scene, view: &View<'_>, settings: &Settings) -> Result<Film> {
+    let tracer = PathTracer::new(scene)?;
+    catch_interrupts();
+    let bar = Bar::new();
+    let film = tracer.render(view, settings, |progress| {
+        bar.show(format!(
+            "{} of {} paths a pixel in {:.0} s",
+            progress.paths,
+            progress.of,
+            progress.elapsed.as_secs_f64()
+        ));
+        !interrupted()
+    });
+    bar.finish();
+    let film = film?;
+    let (mean, half) = film.mean();
+    tracing::info!(
+        "{} paths a pixel in {:.1} s; mean radiance {:.6} {:.6} {:.6} ± {:.2e} {:.2e} {:.2e} (95 %); \
+         rms relative standard error of a pixel {:.2} %",
+        film.paths,
+        film.elapsed.as_secs_f64(),
+        mean.x,
+        mean.y,
+        mean.z,
+        half.x,
+        half.y,
+        half.z,
+        100.0 * film.relative_error()
+    );
+    Ok(film)
+}

@@ -1,0 +1,228 @@
+//! The nearest surface along a ray: a bounding volume hierarchy in f32 about exact tests in f64.
+
+use std::time::Duration;
+
+use glam::{DVec2, DVec3, Vec3A};
+use obvhs::aabb::Aabb;
+use obvhs::cwbvh::CwBvh;
+use obvhs::cwbvh::builder::build_cwbvh;
+use obvhs::ray::{Ray, RayHit};
+use obvhs::{Boundable, BvhBuildParams};
+use rayon::prelude::*;
+
+use crate::error::{Error, Result};
+use crate::scene::Scene;
+
+/// What a ray starts above its surface, internal units: far above the rounding of f64, also 10⁶ units from the origin, far
+/// below any shape. As near behind a front, a back is its own surface's other side.
+pub const ABOVE: f64 = 1.0 / (1u64 << 30) as f64;
+
+/// What boxes are wider than their triangles: rays of length 4 in f32 miss a place by less.
+const BOX_MARGIN: f32 = 1.0 / (1u32 << 17) as f32;
+
+/// Half side of the cube, about the scene's own of 1, at which a ray from outside begins.
+const CUBE: f64 = 1.0 + 1.0 / 16.0;
+
+/// The scene's triangles in internal units: about the scene's middle, coordinates in −1..1, as [`crate::elements`] has them.
+pub struct Geometry {
+    pub origin: DVec3,
+    /// Scene units of one internal unit.
+    pub unit: f64,
+    /// `[triangle]` in the order of the input.
+    corners: Vec<[DVec3; 3]>,
+    bvh: CwBvh,
+}
+
+/// Where a ray ends.
+#[derive(Debug, Clone, Copy)]
+pub struct Hit {
+    /// In the order of the input.
+    pub triangle: usize,
+    /// Internal units.
+    pub place: DVec3,
+    /// Unit normal of the front.
+    pub normal: DVec3,
+    /// Whether the ray came from there.
+    pub front: bool,
+    pub distance: f64,
+    /// Barycentric weights of the corners.
+    weights: [f64; 3],
+}
+
+impl Hit {
+    /// The value at the hit of what is linear over the triangle.
+    pub fn interpolate(&self, corners: [DVec2; 3]) -> DVec2 {
+        (0..3).map(|k| corners[k] * self.weights[k]).sum()
+    }
+}
+
+struct Bounds<'a>(&'a [DVec3; 3]);
+
+impl Boundable for Bounds<'_> {
+    fn aabb(&self) -> Aabb {
+        let mut bounds = Aabb::from_points(&self.0.map(|p| p.as_vec3a()));
+        bounds.min -= Vec3A::splat(BOX_MARGIN);
+        bounds.max += Vec3A::splat(BOX_MARGIN);
+        bounds
+    }
+}
+
+impl Geometry {
+    /// # Errors
+    /// A scene without triangles, or with corners that are missing or no numbers.
+    pub fn new(scene: &Scene) -> Result<Self> {
+        let refuse = |what: &str| {
+            Err(Error::Scene {
+                scene: scene.name.clone(),
+                what: what.into(),
+            })
+        };
+        if scene.triangles.is_empty() {
+            return refuse("there is no triangle in it");
+        }
+        let held = |t: &crate::scene::Triangle| {
+            (t.material as usize) < scene.materials.len()
+                && t.vertices
+                    .iter()
+                    .all(|&v| (v as usize) < scene.vertices.len())
+        };
+        let (origin, unit) = scene.local_frame();
+        if !scene.triangles.iter().all(held) || !origin.is_finite() || !unit.is_finite() {
+            return refuse("a triangle has a corner or a material that is not there");
+        }
+        let corners: Vec<_> = scene
+            .triangles
+            .par_iter()
+            .map(|t| scene.corners(t).map(|p| (p - origin) / unit))
+            .collect();
+        let bounds: Vec<_> = corners.iter().map(Bounds).collect();
+        let bvh = build_cwbvh(
+            &bounds,
+            BvhBuildParams::medium_build(),
+            &mut Duration::default(),
+        );
+        Ok(Self {
+            origin,
+            unit,
+            corners,
+            bvh,
+        })
+    }
+
+    /// Scene units to internal ones.
+    pub fn inside(&self, place: DVec3) -> DVec3 {
+        (place - self.origin) / self.unit
+    }
+
+    /// Corners of a triangle, internal units.
+    pub fn corners(&self, triangle: usize) -> [DVec3; 3] {
+        self.corners[triangle]
+    }
+
+    /// The nearest surface from `from` along the unit vector `direction`. Of a front and a back in one place it is the side
+    /// that faces the ray.
+    pub fn hit(&self, from: DVec3, direction: DVec3) -> Option<Hit> {
+        let skipped = distance_to_cube(from, direction)?;
+        let start = from + skipped * direction;
+        let mut nearest = f64::INFINITY;
+        let mut best = None;
+        let ray = Ray::new(start.as_vec3a(), direction.as_vec3a(), 0.0, f32::INFINITY);
+        self.bvh.ray_traverse(ray, &mut RayHit::none(), |_, place| {
+            let triangle = self.bvh.primitive_indices[place] as usize;
+            let Some(crossing) = Crossing::of(&self.corners[triangle], start, direction) else {
+                return f32::INFINITY;
+            };
+            let rank = crossing.distance + if crossing.front { 0.0 } else { 2.0 * ABOVE };
+            if rank >= nearest {
+                return f32::INFINITY;
+            }
+            nearest = rank;
+            best = Some((triangle, crossing));
+            rank as f32
+        });
+        let (triangle, crossing) = best?;
+        let [a, b, c] = self.corners[triangle];
+        let [wa, wb, wc] = crossing.weights;
+        Some(Hit {
+            triangle,
+            place: a * wa + b * wb + c * wc,
+            normal: (b - a).cross(c - a).normalize_or_zero(),
+            front: crossing.front,
+            distance: skipped + crossing.distance,
+            weights: crossing.weights,
+        })
+    }
+
+    /// Whether nothing stands between two places, neither of which is on a surface.
+    pub fn sees(&self, from: DVec3, to: DVec3) -> bool {
+        let length = from.distance(to);
+        let direction = (to - from) / length;
+        let Some(skipped) = distance_to_cube(from, direction) else {
+            return true;
+        };
+        let start = from + skipped * direction;
+        let ray = Ray::new(start.as_vec3a(), direction.as_vec3a(), 0.0, f32::INFINITY);
+        self.bvh.ray_traverse_miss(ray, |_, place| {
+            let triangle = self.bvh.primitive_indices[place] as usize;
+            match Crossing::of(&self.corners[triangle], start, direction) {
+                Some(crossing) if skipped + crossing.distance < length => 0.0,
+                _ => f32::INFINITY,
+            }
+        })
+    }
+}
+
+struct Crossing {
+    distance: f64,
+    front: bool,
+    weights: [f64; 3],
+}
+
+impl Crossing {
+    /// Both sides of an edge find the same volume with the opposite sign, to the bit: no ray passes between two triangles.
+    fn of(corners: &[DVec3; 3], from: DVec3, direction: DVec3) -> Option<Self> {
+        let [a, b, c] = corners.map(|p| p - from);
+        let volumes = [
+            direction.dot(b.cross(c)),
+            direction.dot(c.cross(a)),
+            direction.dot(a.cross(b)),
+        ];
+        let ahead = volumes.iter().all(|&v| v >= 0.0);
+        if !ahead && !volumes.iter().all(|&v| v <= 0.0) {
+            return None;
+        }
+        let whole: f64 = volumes.iter().sum();
+        if whole == 0.0 {
+            return None;
+        }
+        let weights = volumes.map(|v| v / whole);
+        let distance = (a * weights[0] + b * weights[1] + c * weights[2]).dot(direction);
+        // A negative volume: the corners run counter-clockwise as the ray sees them.
+        (distance > 0.0).then_some(Self {
+            distance,
+            front: !ahead,
+            weights,
+        })
+    }
+}
+
+/// Distance to the cube about the scene, 0 from within it; none for a ray that misses it or is no ray.
+fn distance_to_cube(from: DVec3, direction: DVec3) -> Option<f64> {
+    if !from.is_finite() || !direction.is_normalized() {
+        return None;
+    }
+    let (mut first, mut last) = (0.0_f64, f64::INFINITY);
+    for axis in 0..3 {
+        let (p, d) = (from[axis], direction[axis]);
+        if d == 0.0 {
+            if p.abs() > CUBE {
+                return None;
+            }
+            continue;
+        }
+        let ends = [(-CUBE - p) / d, (CUBE - p) / d];
+        first = first.max(ends[0].min(ends[1]));
+        last = last.min(ends[0].max(ends[1]));
+    }
+    (first <= last).then_some(first)
+}

@@ -1,0 +1,138 @@
+//! What shines of itself, and light straight from it.
+
+use std::f64::consts::PI;
+
+use glam::{DVec2, DVec3, Vec3};
+
+use super::geometry::{ABOVE, Geometry, Hit};
+use super::sampling::{Choice, on_triangle};
+use crate::render::tone::luminance;
+use crate::scene::Scene;
+
+/// Emitters by power and point lights by intensity.
+pub struct Lights {
+    areas: Choice,
+    /// Emitting triangles, in the order of the input, with area in internal units and radiance.
+    emitters: Vec<Emitter>,
+    /// `[triangle]`, its place in `emitters`.
+    emitter_of: Vec<u32>,
+    points: Choice,
+    point_lights: Vec<Point>,
+}
+
+struct Emitter {
+    corners: [DVec3; 3],
+    normal: DVec3,
+    area: f64,
+    radiance: DVec3,
+}
+
+struct Point {
+    place: DVec3,
+    /// Irradiance at one internal unit.
+    intensity: DVec3,
+}
+
+const NONE: u32 = u32::MAX;
+
+impl Lights {
+    pub fn new(scene: &Scene, geometry: &Geometry) -> Self {
+        let mut emitters = Vec::new();
+        let mut emitter_of = vec![NONE; scene.triangles.len()];
+        for (index, triangle) in scene.triangles.iter().enumerate() {
+            let material = &scene.materials[triangle.material as usize];
+            let corners = geometry.corners(index);
+            let cross = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+            if material.emits() && cross.length() > 0.0 {
+                emitter_of[index] = emitters.len() as u32;
+                emitters.push(Emitter {
+                    corners,
+                    normal: cross.normalize(),
+                    area: 0.5 * cross.length(),
+                    radiance: Vec3::from_array(material.ke).as_dvec3(),
+                });
+            }
+        }
+        let point_lights: Vec<_> = scene
+            .point_lights
+            .iter()
+            .map(|light| Point {
+                place: geometry.inside(light.position),
+                intensity: Vec3::from_array(light.intensity).as_dvec3() / geometry.unit.powi(2),
+            })
+            .collect();
+        let bright = |colour: DVec3| f64::from(luminance(colour.as_vec3().to_array()));
+        Self {
+            areas: Choice::new(emitters.iter().map(|e| e.area * bright(e.radiance))),
+            emitters,
+            emitter_of,
+            points: Choice::new(
+                scene
+                    .point_lights
+                    .iter()
+                    .map(|light| f64::from(luminance(light.intensity))),
+            ),
+            point_lights,
+        }
+    }
+
+    /// Radiance that the front of a triangle emits.
+    pub fn emitted(&self, triangle: usize) -> DVec3 {
+        match self.emitter_of[triangle] {
+            NONE => DVec3::ZERO,
+            place => self.emitters[place as usize].radiance,
+        }
+    }
+
+    /// One sample of the irradiance at `place` from point lights, and of that from emitters weighted by the balance
+    /// heuristic (Veach 1997) against a direction of density cos θ / π.
+    pub fn sample(
+        &self,
+        geometry: &Geometry,
+        place: DVec3,
+        normal: DVec3,
+        choices: (f64, f64),
+        at: DVec2,
+    ) -> DVec3 {
+        let above = place + ABOVE * normal;
+        let mut sum = DVec3::ZERO;
+        if let Some((index, probability)) = self.points.choose(choices.0) {
+            let light = &self.point_lights[index];
+            let to = light.place - place;
+            let cosine = normal.dot(to.normalize_or_zero());
+            if cosine > 0.0 && geometry.sees(above, light.place) {
+                sum += light.intensity * (cosine / (to.length_squared() * probability));
+            }
+        }
+        if let Some((index, probability)) = self.areas.choose(choices.1) {
+            let emitter = &self.emitters[index];
+            let target = on_triangle(emitter.corners, at);
+            let to = target - place;
+            let direction = to.normalize_or_zero();
+            let (here, there) = (normal.dot(direction), -emitter.normal.dot(direction));
+            if here > 0.0 && there > 0.0 && geometry.sees(above, target + ABOVE * emitter.normal) {
+                let density = probability / emitter.area * to.length_squared() / there;
+                sum += emitter.radiance * (here / (density + here / PI));
+            }
+        }
+        sum
+    }
+
+    /// The balance heuristic's weight of an emitter met by a direction of density cos θ / π.
+    pub fn weight_when_met(&self, hit: &Hit, direction: DVec3, cosine: f64) -> f64 {
+        let place = self.emitter_of[hit.triangle];
+        if place == NONE {
+            return 1.0;
+        }
+        let there = -hit.normal.dot(direction);
+        let probability = self.areas.probability(place as usize);
+        let density =
+            probability / self.emitters[place as usize].area * hit.distance.powi(2) / there;
+        let met = cosine / PI;
+        if probability > 0.0 {
+            met / (met + density)
+        } else {
+            1.0
+        }
+    }
+}

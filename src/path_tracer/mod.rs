@@ -1,0 +1,304 @@
+//! The reference: an unbiased path tracer on the CPU that knows its own error. Slow, and independent of all that bakes.
+//!
+//! A front shows L = Le + ρ/π · E, a back is black and blocks; light leaves fronts alone (Kajiya 1986, diffuse). At each place
+//! of a path emitters and point lights are sampled, and emitters that the path itself meets count by the balance heuristic
+//! (Veach 1997); Russian roulette ends a path, no depth does. Relief is drawn as it is in the scene: give it the geometry of
+//! [`scene::displace`](crate::scene::displace) to see it.
+//!
+//! ```text
+//! scene ─► geometry (bounding volume hierarchy) ─┐
+//!       └► lights (by power) ────────────────────┼─► paths ─► film ─► Picture
+//! camera ─► sampling (a stream a sample) ────────┘               └──► confidence intervals
+//! ```
+
+mod film;
+mod geometry;
+mod lights;
+mod sampling;
+
+use std::f64::consts::PI;
+use std::time::{Duration, Instant};
+
+use glam::{DVec2, DVec3, Vec3};
+use rayon::prelude::*;
+
+pub use film::Film;
+
+use crate::error::{Error, Result};
+use crate::render::{Light, Projection, View};
+use crate::scene::Scene;
+use film::Batch;
+use geometry::{ABOVE, Geometry, Hit};
+use lights::Lights;
+use sampling::{Random, cosine_direction};
+
+/// Most pixels of a picture: 64 Mi take 3.5 GiB of sums.
+pub const MOST_PIXELS: u64 = 1 << 26;
+
+/// Most paths of a pixel: far below the ends of u32 once they are rounded up to whole passes.
+pub const MOST_PATHS: u32 = 1 << 30;
+
+/// Batches that [`Settings::paths`] are split into at least, where there are as many: fewer tell little of their spread.
+const LEAST_PASSES: u32 = 8;
+
+/// Most strata along a side of a pixel: beyond 4, what is left is noise of the paths and not of the pixel's edges.
+const MOST_STRATA: u32 = 4;
+
+/// Paths of a pass, about: some seconds, after which it can be stopped.
+const PASS_PATHS: u64 = 1 << 22;
+
+/// Bounces before roulette: most of the light has been found by then.
+const SURE_BOUNCES: u32 = 3;
+
+/// Most chance to go on after that: a closed white room would otherwise be walked for ever.
+const MOST_CHANCE: f64 = 0.98;
+
+/// Paths that are summed by one thread at a time: fixed, so that the sum does not depend on the threads.
+const CHUNK: u32 = 1024;
+
+/// How a picture is traced.
+#[derive(Debug, Clone, Copy)]
+pub struct Settings {
+    /// Paths of each pixel, at least 2; rounded up to whole passes.
+    pub paths: u32,
+    /// No pass is begun that would probably end after it; two are made in any case.
+    pub budget: Option<Duration>,
+    /// Another seed is another, independent picture.
+    pub seed: u64,
+    pub light: Light,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            paths: 256,
+            budget: None,
+            seed: 0,
+            light: Light::Global,
+        }
+    }
+}
+
+/// How far a picture is.
+#[derive(Debug, Clone, Copy)]
+pub struct Progress {
+    /// Paths of each pixel so far, and in the end.
+    pub paths: u32,
+    pub of: u32,
+    pub elapsed: Duration,
+}
+
+/// A scene ready to be traced.
+pub struct PathTracer<'a> {
+    scene: &'a Scene,
+    geometry: Geometry,
+    lights: Lights,
+}
+
+impl<'a> PathTracer<'a> {
+    /// # Errors
+    /// A scene without triangles, or with corners or materials that are missing.
+    pub fn new(scene: &'a Scene) -> Result<Self> {
+        let geometry = Geometry::new(scene)?;
+        let lights = Lights::new(scene, &geometry);
+        Ok(Self {
+            scene,
+            geometry,
+            lights,
+        })
+    }
+
+    /// Traces a picture: box filter over the pixel, jittered strata. The same settings give the same bits, whatever the
+    /// threads. `go_on` is asked after each pass from the second on; at its no, what there is, is the result.
+    ///
+    /// # Errors
+    /// Paths not in 2..=[`MOST_PATHS`]; a size of 0, above [`crate::render::MOST_PIXELS`] a side or above [`MOST_PIXELS`]; a camera that
+    /// looks nowhere.
+    pub fn render(
+        &self,
+        view: &View<'_>,
+        settings: &Settings,
+        mut go_on: impl FnMut(&Progress) -> bool,
+    ) -> Result<Film> {
+        view.check()?;
+        let pixels = u64::from(view.width) * u64::from(view.height);
+        if pixels > MOST_PIXELS {
+            return Err(Error::Usage(format!(
+                "picture of {}x{}: the path tracer takes no more than {MOST_PIXELS} pixels",
+                view.width, view.height
+            )));
+        }
+        if !(2..=MOST_PATHS).contains(&settings.paths) {
+            return Err(Error::Usage(format!(
+                "paths {}: must be in 2..={MOST_PATHS}; two have a spread, from which the error is found",
+                settings.paths
+            )));
+        }
+        let projection = Projection::new(self.scene, view)?;
+        let most = u64::from(settings.paths / LEAST_PASSES).min(PASS_PATHS / pixels);
+        let strata = (most.isqrt() as u32).clamp(1, MOST_STRATA);
+        let batch = strata * strata;
+        let passes = settings.paths.div_ceil(batch);
+
+        let start = Instant::now();
+        let mut film = Film::new(view.width, view.height);
+        while film.passes < passes {
+            let first = u64::from(film.paths);
+            film.add(batch, |column, row| {
+                let pixel = u64::from(row) * u64::from(view.width) + u64::from(column);
+                let (mut sum, mut metered) = (DVec3::ZERO, true);
+                for stratum in 0..batch {
+                    let mut random = Random::new(settings.seed, pixel, first + u64::from(stratum));
+                    let cell = DVec2::new(f64::from(stratum % strata), f64::from(stratum / strata));
+                    let within = (cell + random.square()) / f64::from(strata);
+                    let direction =
+                        projection.ray(f64::from(column) + within.x, f64::from(row) + within.y);
+                    let seen = self
+                        .geometry
+                        .hit(self.geometry.inside(projection.eye), direction);
+                    metered &= seen.is_some_and(|hit| {
+                        hit.front && self.lights.emitted(hit.triangle) == DVec3::ZERO
+                    });
+                    if let Some(hit) = seen {
+                        sum += self.radiance(&hit, settings.light, &mut random);
+                    }
+                }
+                Batch {
+                    mean: sum / f64::from(batch),
+                    metered,
+                }
+            });
+            film.elapsed = start.elapsed();
+            let progress = Progress {
+                paths: film.paths,
+                of: passes * batch,
+                elapsed: film.elapsed,
+            };
+            let next_ends = film.elapsed + film.elapsed / film.passes;
+            let in_time = settings.budget.is_none_or(|budget| next_ends <= budget);
+            if film.passes >= 2 && !(go_on(&progress) && in_time) {
+                break;
+            }
+        }
+        Ok(film)
+    }
+
+    /// Irradiance at a place of the scene (scene units) about a unit normal, and its standard error, W·m⁻², RGB. At least two
+    /// paths are traced.
+    ///
+    /// An independent check of the radiosity solver: at a place on an element, with its normal, it is what `irradiance` of
+    /// the solution tells of the element there.
+    pub fn irradiance(
+        &self,
+        point: DVec3,
+        normal: DVec3,
+        paths: u32,
+        seed: u64,
+        light: Light,
+    ) -> (Vec3, Vec3) {
+        let paths = paths.max(2);
+        let (place, normal) = (self.geometry.inside(point), normal.normalize_or_zero());
+        let sums: Vec<[DVec3; 2]> = (0..paths.div_ceil(CHUNK))
+            .into_par_iter()
+            .map(|chunk| {
+                let mut sums = [DVec3::ZERO; 2];
+                for path in chunk * CHUNK..paths.min((chunk + 1).saturating_mul(CHUNK)) {
+                    let mut random = Random::new(seed, u64::MAX, u64::from(path));
+                    let found = self.gathered(place, normal, light, &mut random);
+                    sums[0] += found;
+                    sums[1] += found * found;
+                }
+                sums
+            })
+            .collect();
+        let [sum, squares] = sums
+            .iter()
+            .fold([DVec3::ZERO; 2], |[a, b], [c, d]| [a + c, b + d]);
+        let count = f64::from(paths);
+        let error = film::standard_error(sum, squares, count);
+        ((sum / count).as_vec3(), error.as_vec3())
+    }
+
+    /// One sample of the radiance that leaves a hit towards the eye.
+    fn radiance(&self, hit: &Hit, light: Light, random: &mut Random) -> DVec3 {
+        if !hit.front {
+            return DVec3::ZERO;
+        }
+        let emitted = match light {
+            Light::Global | Light::Direct => self.lights.emitted(hit.triangle),
+            Light::Indirect => DVec3::ZERO,
+        };
+        let reflectance = self.reflectance(hit);
+        if reflectance == DVec3::ZERO {
+            return emitted;
+        }
+        emitted + reflectance / PI * self.gathered(hit.place, hit.normal, light, random)
+    }
+
+    /// One sample of the irradiance at a place, internal units.
+    fn gathered(&self, place: DVec3, normal: DVec3, light: Light, random: &mut Random) -> DVec3 {
+        let (mut place, mut normal) = (place, normal);
+        let mut sum = DVec3::ZERO;
+        // What irradiance here counts for where the path began.
+        let mut carried = DVec3::ONE;
+        for bounce in 0_u32.. {
+            let counts = match light {
+                Light::Global => true,
+                Light::Direct => bounce == 0,
+                Light::Indirect => bounce > 0,
+            };
+            // Sample the lights
+            if counts {
+                let choices = (random.unit(), random.unit());
+                let at = random.square();
+                sum += carried
+                    * self
+                        .lights
+                        .sample(&self.geometry, place, normal, choices, at);
+            }
+            // Go on in a direction of density cos θ / π
+            let direction = cosine_direction(normal, random.square());
+            let Some(hit) = self.geometry.hit(place + ABOVE * normal, direction) else {
+                break;
+            };
+            if !hit.front {
+                break;
+            }
+            if counts {
+                let cosine = normal.dot(direction);
+                let weight = self.lights.weight_when_met(&hit, direction, cosine);
+                sum += carried * self.lights.emitted(hit.triangle) * (PI * weight);
+            }
+            carried *= self.reflectance(&hit);
+            if light == Light::Direct || carried == DVec3::ZERO {
+                break;
+            }
+            // End the path by roulette
+            if bounce >= SURE_BOUNCES {
+                let chance = carried.max_element().min(MOST_CHANCE);
+                if random.unit() >= chance {
+                    break;
+                }
+                carried /= chance;
+            }
+            (place, normal) = (hit.place, hit.normal);
+        }
+        sum
+    }
+
+    /// ρ at a hit, textures looked up bilinearly.
+    fn reflectance(&self, hit: &Hit) -> DVec3 {
+        let triangle = &self.scene.triangles[hit.triangle];
+        let material = &self.scene.materials[triangle.material as usize];
+        let plain = Vec3::from_array(material.kd).as_dvec3();
+        let Some(texture) = &material.map_kd else {
+            return plain;
+        };
+        let uv = hit.interpolate(
+            triangle
+                .uv
+                .map(|[u, v]| DVec2::new(f64::from(u), f64::from(v))),
+        );
+        plain * Vec3::from_array(texture.bilinear(uv.x, uv.y)).as_dvec3()
+    }
+}
