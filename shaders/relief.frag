@@ -52,6 +52,7 @@ struct Place {
     float along;         // on the ray, from corner_position
     vec2 gradient;       // dh/du, dh/dv
     float height;
+    bool under;          // seen from below
 };
 
 // Barycentric coordinates along the ray: at + s step.
@@ -121,6 +122,7 @@ bool meet(Prism p, ReliefSurface surface, vec3 along, bool plane, out Place plac
         parts[i] = cut(position_of(p, corners[i][0]), position_of(p, corners[i][1]), position_of(p, corners[i][2]),
                        position_of(p, corners[i][3]), corner_position, along);
     }
+    place.under = false;
     for (uint round = 0; round < 3; round++) {
         // The nearest of those not yet passed.
         uint nearest = 3;
@@ -158,10 +160,8 @@ bool meet(Prism p, ReliefSurface surface, vec3 along, bool plane, out Place plac
             if (!march(tiles[p.surface], from, to, hit)) {
                 continue;
             }
-            // A ray that comes up through the surface shows its underside.
-            if (hit.t == 0.0 && to.z >= from.z) {
-                return false;
-            }
+            // A ray that is on its way up through the surface shows its underside, where it comes in.
+            place.under = hit.t == 0.0 && to.z >= from.z;
             t = hit.t;
             place.gradient = hit.gradient;
             place.height = hit.height;
@@ -209,9 +209,12 @@ vec3 mean_sent(Prism p, vec3 share, vec3 to_eye) {
 }
 
 void main() {
+    // Nothing lies at the depth of 0, so that this is drawn nowhere.
+    radiance = vec4(0.0);
+    gl_FragDepth = 0.0;
     // The back of a prism is seen from outside and from inside, and once.
     if (gl_FrontFacing) {
-        discard;
+        return;
     }
     Prism p = prisms[corner_prism];
     ReliefSurface surface = surfaces[p.surface];
@@ -220,7 +223,7 @@ void main() {
     bool wide = shading == SHADING_RELIEF && footprint > WIDEST_SAMPLE;
     Place place;
     if (!meet(p, surface, along, shading != SHADING_RELIEF || wide, place)) {
-        discard;
+        return;
     }
     if (shading == SHADING_PARALLAX) {
         vec3 to_eye = -normalize(along);
@@ -235,6 +238,9 @@ void main() {
 
     float level = log2(max(footprint / float(tiles[p.surface].width) * float(textureSize(albedo, 0).x), 1e-6));
     vec3 rho = reflectance * textureLod(albedo, vec2(place.uv.x, 1.0 - place.uv.y), level).rgb;
+    if (place.under) {
+        return;
+    }
     vec3 shown;
     switch (view) {
     case VIEW_ALBEDO:

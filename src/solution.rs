@@ -244,6 +244,8 @@ pub struct Bake {
     pub origin: Origin,
     /// W·m⁻², RGB, `[triangle]` in the order of the input.
     pub irradiance: Vec<Vec3>,
+    pub irradiance_direct: Vec<Vec3>,
+    pub relief: Option<DirectionalLight>,
 }
 
 impl Bake {
@@ -268,23 +270,97 @@ impl Bake {
             .and_then(|s| serde_json::from_str(s).ok())
             .ok_or_else(|| bad("not a bake: it does not name its scene".into()))?;
         let file = SafeTensors::deserialize(&bytes).map_err(|e| bad(e.to_string()))?;
-        let tensor = file
-            .tensor("irradiance")
-            .map_err(|e| bad(format!("irradiance: {e}")))?;
-        if tensor.dtype() != Dtype::F32 || tensor.shape().len() != 2 || tensor.shape()[1] != 3 {
-            return Err(bad("irradiance: not f32 [E, 3]".into()));
-        }
-        let values: Vec<f32> = tensor
-            .data()
-            .chunks_exact(4)
-            .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
-            .collect();
-        if values.iter().any(|v| !v.is_finite()) {
-            return Err(bad("irradiance: not all numbers are finite".into()));
-        }
-        Ok(Self {
+        let tensors = Tensors { file: &file, path };
+        let irradiance = tensors.vectors("irradiance", &[])?;
+        let bake = Self {
             origin,
-            irradiance: values.chunks_exact(3).map(Vec3::from_slice).collect(),
-        })
+            irradiance_direct: tensors.vectors("irradiance_direct", &[])?,
+            relief: tensors.relief(irradiance.len())?,
+            irradiance,
+        };
+        match bake.irradiance.len() == bake.irradiance_direct.len() {
+            true => Ok(bake),
+            false => Err(bad(
+                "irradiance and irradiance_direct differ in length".into()
+            )),
+        }
+    }
+}
+
+/// Tensors of a bake file.
+struct Tensors<'a> {
+    file: &'a SafeTensors<'a>,
+    path: &'a Path,
+}
+
+impl Tensors<'_> {
+    fn bad(&self, name: &str, what: &str) -> Error {
+        Error::file(self.path, format!("{name}: {what}"))
+    }
+
+    /// Values of a tensor of so many dimensions whose last ones are `inner`.
+    fn tensor(&self, name: &str, dtype: Dtype, inner: &[usize]) -> Result<Vec<[u8; 4]>> {
+        let tensor = self
+            .file
+            .tensor(name)
+            .map_err(|e| self.bad(name, &e.to_string()))?;
+        let shape = tensor.shape();
+        if tensor.dtype() != dtype || shape.len() != 1 + inner.len() || shape[1..] != *inner {
+            return Err(self.bad(name, &format!("not {dtype:?} [N, {inner:?}]")));
+        }
+        let words = tensor.data().chunks_exact(4);
+        Ok(words.map(|b| [b[0], b[1], b[2], b[3]]).collect())
+    }
+
+    /// Vectors, `[N][inner]`.
+    fn vectors(&self, name: &str, inner: &[usize]) -> Result<Vec<Vec3>> {
+        let words = self.tensor(name, Dtype::F32, &[inner, &[3]].concat())?;
+        let values: Vec<f32> = words.into_iter().map(f32::from_le_bytes).collect();
+        if values.iter().any(|v| !v.is_finite()) {
+            return Err(self.bad(name, "not all numbers are finite"));
+        }
+        Ok(values.chunks_exact(3).map(Vec3::from_slice).collect())
+    }
+
+    /// Light by direction of some of so many triangles.
+    fn relief(&self, triangles: usize) -> Result<Option<DirectionalLight>> {
+        if !self.file.names().contains(&"meso_elements") {
+            return Ok(None);
+        }
+        let elements: Vec<u32> = self
+            .tensor("meso_elements", Dtype::U32, &[])?
+            .into_iter()
+            .map(u32::from_le_bytes)
+            .collect();
+        if elements.windows(2).any(|pair| pair[0] >= pair[1])
+            || elements.last().is_some_and(|&e| e as usize >= triangles)
+        {
+            return Err(self.bad("meso_elements", "not ascending triangles of the scene"));
+        }
+        let directions = self.vectors("directions", &[])?;
+        let k = directions.len();
+        let blocks = |values: Vec<Vec3>| -> Vec<[Vec3; 3]> {
+            values.chunks_exact(3).map(|b| [b[0], b[1], b[2]]).collect()
+        };
+        let light = DirectionalLight {
+            directions: directions.iter().map(|d| d.as_dvec3()).collect(),
+            frames: blocks(self.vectors("meso_frames", &[3])?),
+            incident_moment: blocks(self.vectors("incident_moment", &[k, 3])?),
+            incident_moment_direct: blocks(self.vectors("incident_moment_direct", &[k, 3])?),
+            exitant: self.vectors("exitant", &[k])?,
+            elements,
+        };
+        let (m, slots) = (light.elements.len(), light.elements.len() * k);
+        let fits = light.frames.len() == m
+            && light.incident_moment.len() == slots
+            && light.incident_moment_direct.len() == slots
+            && light.exitant.len() == slots;
+        match fits {
+            true => Ok(Some(light)),
+            false => Err(self.bad(
+                "meso_elements",
+                "the tensors of the relief differ in length",
+            )),
+        }
     }
 }

@@ -224,7 +224,11 @@ fn compare(map: &HeightMap, rays: &[[Vec3; 2]], found: &[HeightHit]) -> Compared
 fn a_million_rays_hit_as_the_twins() {
     let device = device();
     let mut random = Random(1);
-    for (name, map) in [("bricks", bricks()), ("noise", noise()), ("ridges", ridges())] {
+    for (name, map) in [
+        ("bricks", bricks()),
+        ("noise", noise()),
+        ("ridges", ridges()),
+    ] {
         let rays = random_rays(&map, 333_334, &mut random);
         let found = run(&device, &map, &rays);
         let c = compare(&map, &rays, &found);

@@ -7,6 +7,7 @@ mod progress;
 mod reference;
 mod render;
 mod scene;
+mod show;
 
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::progress::{Bar, catch_interrupts, interrupted};
 use mesolux::error::Result;
@@ -23,33 +23,16 @@ pub struct ReferenceOptions {
     /// Paths of each pixel [default: 256]
     #[arg(long, value_name = "N", requires = "reference")]
     paths: Option<u32>,
-    /// Which light is drawn [default: global]
-    #[arg(long, value_enum, requires = "reference")]
-    light: Option<LightName>,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum LightName {
-    /// All of it
-    Global,
-    /// Emitters, and what comes straight from them and from point lights
-    Direct,
-    /// What has been reflected more than once
-    Indirect,
 }
 
 impl ReferenceOptions {
-    pub fn settings(&self, budget: Option<Duration>, seed: u64) -> Settings {
+    pub fn settings(&self, budget: Option<Duration>, seed: u64, light: Light) -> Settings {
         let default = Settings::default();
         Settings {
             paths: self.paths.unwrap_or(default.paths),
             budget,
             seed,
-            light: match self.light {
-                None | Some(LightName::Global) => Light::Global,
-                Some(LightName::Direct) => Light::Direct,
-                Some(LightName::Indirect) => Light::Indirect,
-            },
+            light,
         }
     }
 }

@@ -6,9 +6,10 @@ use clap::Args;
 
 use super::bake::{SolveOptions, writable};
 use super::reference::{self, ReferenceOptions};
+use super::show::ShowOptions;
 use super::{Builtin, DeviceOptions};
 use mesolux::error::{Error, Result};
-use mesolux::render::{FileKind, Picture, View, render};
+use mesolux::render::{FileKind, Lighting, Picture, View, render};
 use mesolux::scene::{Camera, Scene};
 use mesolux::solution::Bake;
 
@@ -33,6 +34,8 @@ pub struct Options {
     /// Multiplies the light by 2^EV; found from the picture if not given
     #[arg(long, value_name = "EV", allow_hyphen_values = true)]
     exposure: Option<f32>,
+    #[command(flatten)]
+    show: ShowOptions,
     #[command(flatten)]
     reference: ReferenceOptions,
     #[command(flatten)]
@@ -75,7 +78,13 @@ pub fn run(options: &Options) -> Result<()> {
         }
         return run_reference(options);
     }
-    let (scene, irradiance, device) = if is_bake {
+    let solve = &options.solve;
+    let cache = solve.settings()?.relief.cache;
+    let show = |lighting| Lighting {
+        cache: cache.as_deref(),
+        ..options.show.apply(lighting)
+    };
+    if is_bake {
         let bake = Bake::load(path)?;
         let builtin = Builtin {
             patches: bake.origin.patches,
@@ -91,28 +100,29 @@ pub fn run(options: &Options) -> Result<()> {
                 ),
             ));
         }
-        camera(&scene, options.camera.as_deref())?;
+        let view = options.view(&scene)?;
         let device = options.device.open()?;
-        (scene, bake.irradiance, device)
-    } else {
-        let settings = options.solve.settings()?;
-        let scene = options.builtin.load(&options.input)?;
-        camera(&scene, options.camera.as_deref())?;
-        let device = options.device.open()?;
-        let solution = mesolux::bake::bake(&device, &scene, &settings, |_| true)?;
-        (scene, solution.irradiance, device)
-    };
+        let picture = render(&device, &scene, show((&bake).into()), &view)?;
+        options.device.check()?;
+        return options.write(&picture, &view);
+    }
+    let settings = solve.settings()?;
+    let scene = options.builtin.load(&options.input)?;
     let view = options.view(&scene)?;
-    let picture = render(&device, &scene, &irradiance, &view)?;
+    let device = options.device.open()?;
+    let solution = mesolux::bake::bake(&device, &scene, &settings, |_| true)?;
+    let picture = render(&device, &scene, show((&solution).into()), &view)?;
     options.device.check()?;
     options.write(&picture, &view)
 }
 
 /// The same by the path tracer.
 fn run_reference(options: &Options) -> Result<()> {
+    let solve = &options.solve;
+    let light = options.show.light();
     let settings = options
         .reference
-        .settings(options.solve.budget()?, options.solve.seed);
+        .settings(solve.budget()?, solve.seed, light);
     let scene = options.builtin.load(&options.input)?;
     options.view(&scene)?;
     let scene = reference::tessellated(scene);

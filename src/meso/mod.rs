@@ -19,6 +19,7 @@ mod visibility;
 pub use factors::{CORNERS, Factors, RANK_STEP};
 pub use height_field::{Facet, HeightField};
 pub use height_pyramid::HeightPyramid;
+pub(crate) use relief::visibility;
 pub use relief::{Class, Options, Relief, Transport};
 pub use response::{Block, Response, slot_shares};
 pub use tiles::{Frame, Shading, Tile, tiles};

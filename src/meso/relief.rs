@@ -209,7 +209,7 @@ impl Relief {
 }
 
 /// Visibility from the cache or from the device, and whether it came from the cache.
-pub(super) fn visibility(
+pub(crate) fn visibility(
     device: &Arc<Device>,
     field: &HeightField,
     cache: Option<&Path>,

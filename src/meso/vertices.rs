@@ -104,6 +104,22 @@ impl MesoVertices {
         self.frames.len() as u32 - 1
     }
 
+    /// Means at the vertices of values by slot, `[vertex][slot]`, of those of the elements, `[meso element][slot]`, whose frames
+    /// are taken for the vertex's.
+    pub fn mean(&self, values: &[Vec3], k: usize) -> Vec<Vec3> {
+        self.around
+            .par_iter()
+            .flat_map_iter(|around| {
+                (0..k).map(|slot| {
+                    let value = |&(m, weight): &(u32, f64)| {
+                        values[m as usize * k + slot].as_dvec3() * weight
+                    };
+                    around.iter().map(value).sum::<DVec3>().as_vec3()
+                })
+            })
+            .collect()
+    }
+
     /// Vector moments at the vertices, `[vertex][slot][colour]`, of those of the elements, `[meso element][slot][colour]`,
     /// W·m⁻², each in its own frame.
     ///

@@ -104,12 +104,17 @@ impl Shade {
         Ok(Self { pass, pipeline })
     }
 
+    pub(super) fn pass(&self) -> &RenderPass {
+        &self.pass
+    }
+
     /// Binds the texture of a material.
     pub fn bind(&self, albedo: &Image, sampler: &Sampler) -> Result<DescriptorSet> {
         self.pipeline.bind("shade", &[Bind::Image(albedo, sampler)])
     }
 
-    /// Draws into the left top `size` of the target and copies all of it to where the CPU reads it.
+    /// Draws into the left top `size` of the target, lets `then` draw there too, and copies all of it to where the CPU reads
+    /// it.
     pub fn record<'a>(
         &self,
         cmd: &Commands,
@@ -117,6 +122,7 @@ impl Shade {
         (width, height): (u32, u32),
         (vertices, indices): (&Buffer, &Buffer),
         draws: impl Iterator<Item = Draw<'a>>,
+        then: impl FnOnce(),
     ) {
         cmd.begin_render_pass(&self.pass, &target.framebuffer, [0; 4]);
         cmd.bind_indices(indices);
@@ -126,6 +132,7 @@ impl Shade {
             cmd.push_graphics(&self.pipeline, &draw.parameters);
             cmd.draw_indexed(draw.first_vertex, draw.vertex_count);
         }
+        then();
         cmd.end_render_pass();
         cmd.copy_image_to_buffer(&target.colour, &target.readback);
         cmd.barrier(&[Stage::Transfer], &[Stage::Host]);

@@ -3,12 +3,15 @@
 //!
 //! ```text
 //! irradiance ─► smooth ─┐
-//! textures ─────────────┼─► passes::shade, tile by tile ─► Picture ─► tone ─► .png
-//! projection ───────────┘                                     └──────────────► .exr
+//! textures ─────────────┼─► passes::shade ──┬─ tile by tile ─► Picture ─► tone ─► .png
+//! projection ───────────┤                   │                     └──────────────► .exr
+//! light by direction ───┴─► passes::relief ─┘
 //! ```
 
+mod lighting;
 mod picture;
 mod projection;
+mod relief;
 mod smooth;
 mod textures;
 pub mod tone;
@@ -18,17 +21,20 @@ use std::sync::Arc;
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
+pub use lighting::{Light, Lighting, ReliefShading, Show};
 pub use picture::{FileKind, Picture, SAMPLES};
 pub(crate) use projection::Projection;
 pub use smooth::corner_irradiance;
 
 use crate::error::{Error, Result};
+use crate::passes;
 use crate::passes::buffers::upload;
 use crate::passes::shade::{Draw, Parameters, Shade, Target, Vertex};
-use crate::scene::{Camera, Scene, Triangle};
-use crate::vk::{Buffer, BufferUse, Commands, DescriptorSet, Device};
+use crate::scene::{Camera, Material, Scene, Triangle};
+use crate::vk::{Buffer, BufferUse, Commands, DescriptorSet, Device, Sampler};
 use picture::Samples;
 use projection::Tile;
+use relief::ReliefMesh;
 use textures::Textures;
 
 /// What is to be seen.
@@ -55,18 +61,6 @@ impl View<'_> {
     }
 }
 
-/// Which part of the light is drawn.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Light {
-    /// All of it.
-    #[default]
-    Global,
-    /// What emitters show of themselves, and what has come straight from them and from point lights.
-    Direct,
-    /// The rest: what has been reflected more than once.
-    Indirect,
-}
-
 /// Most pixels along a side of a picture.
 pub const MOST_PIXELS: u32 = 16_384;
 
@@ -77,19 +71,20 @@ const TILE: u32 = 2048 / SAMPLES;
 /// straight enough that the mean alone gives the same code.
 const CONTRAST: f32 = 0.8;
 
-/// Renders `scene` under `irradiance` E, `[triangle]` in the order of the input, W·m⁻²: L = ρ(u, v) · E / π + Le on fronts,
-/// black on backs, which block all the same.
+/// Renders `scene` under its irradiance E: L = ρ(u, v) · E / π + Le on fronts, black on backs, which block all the same.
+/// Triangles with relief are drawn by relief mapping where their light by direction is given.
 ///
 /// # Errors
 /// A size of 0 or above [`MOST_PIXELS`]; a camera that looks nowhere; a device that lacks the memory or fails.
-pub fn render(
+pub fn render<'a>(
     device: &Arc<Device>,
     scene: &Scene,
-    irradiance: &[Vec3],
+    lighting: impl Into<Lighting<'a>>,
     view: &View<'_>,
 ) -> Result<Picture> {
+    let lighting = lighting.into();
     assert_eq!(
-        irradiance.len(),
+        lighting.irradiance.len(),
         scene.triangles.len(),
         "one irradiance a triangle"
     );
@@ -97,7 +92,8 @@ pub fn render(
     let projection = Projection::new(scene, view)?;
     let shade = Shade::new(device)?;
     let textures = Textures::new(device, &shade, scene)?;
-    let mesh = Mesh::new(device, scene, irradiance, &projection)?;
+    let mesh = Mesh::new(device, scene, &lighting, &projection)?;
+    let relief = Relief::new(device, &shade, scene, &lighting, &textures, &projection)?;
     let (width, height) = (view.width.min(TILE), view.height.min(TILE));
     let target = Target::new(device, &shade, (width * SAMPLES, height * SAMPLES))?;
 
@@ -121,7 +117,12 @@ pub fn render(
                     &target,
                     (tile.width * SAMPLES, tile.height * SAMPLES),
                     (&mesh.vertices, &mesh.indices),
-                    mesh.draws(scene, &textures, &projection, tile),
+                    mesh.draws(scene, &textures, &projection, tile, lighting.part),
+                    || {
+                        if let Some(relief) = &relief {
+                            relief.record(cmd, scene, &lighting, &projection, tile);
+                        }
+                    },
                 );
                 Ok(())
             })?;
@@ -147,15 +148,24 @@ impl Mesh {
     fn new(
         device: &Arc<Device>,
         scene: &Scene,
-        irradiance: &[Vec3],
+        lighting: &Lighting<'_>,
         projection: &Projection,
     ) -> Result<Self> {
-        let smooth = corner_irradiance(scene, irradiance);
+        let smooth = corner_irradiance(scene, &lighting.irradiance());
+        let mut elsewhere = vec![false; scene.triangles.len()];
+        for &e in lighting
+            .relief()
+            .iter()
+            .flat_map(|(light, _)| &light.elements)
+        {
+            elsewhere[e as usize] = true;
+        }
         // Which side is seen is found here in f64: a rasteriser finds it from rounded corners, wrongly for slivers.
         let mut order: Vec<_> = scene
             .triangles
             .par_iter()
             .enumerate()
+            .filter(|(e, _)| !elsewhere[*e])
             .map(|(e, t)| {
                 let [a, b, c] = scene.corners(t);
                 let front = (b - a).cross(c - a).dot(projection.eye - a) > 0.0;
@@ -189,33 +199,108 @@ impl Mesh {
         textures: &'a Textures,
         projection: &Projection,
         tile: Tile,
+        part: Light,
     ) -> impl Iterator<Item = Draw<'a>> {
-        let [x, y, w] = projection.rows(tile);
-        self.ranges.iter().map(move |&(material, first, count)| {
-            let (reflectance, emitted, metered, texture): (_, _, _, &DescriptorSet) = match material
-            {
-                Some(m) => {
-                    let material = &scene.materials[m as usize];
-                    let metered = if material.emits() { 0.0 } else { 1.0 };
-                    (material.kd, material.ke, metered, textures.of_material(m))
-                }
-                None => ([0.0; 3], [0.0; 3], 0.0, textures.white()),
-            };
-            Draw {
+        let rows = projection.rows(tile);
+        self.ranges
+            .iter()
+            .map(move |&(material, first, count)| Draw {
                 first_vertex: first,
                 vertex_count: count,
-                texture,
-                parameters: Parameters {
-                    x,
-                    y,
-                    w,
-                    near: projection::NEAR,
-                    reflectance: reflectance.into(),
-                    emitted: emitted.into(),
-                    metered,
+                texture: match material {
+                    Some(m) => textures.of_material(m),
+                    None => textures.white(),
+                },
+                parameters: parameters(rows, material.map(|m| &scene.materials[m as usize]), part),
+            })
+    }
+}
+
+/// Of a material's fronts, or of backs.
+fn parameters([x, y, w]: [Vec3; 3], material: Option<&Material>, part: Light) -> Parameters {
+    let (reflectance, emitted, metered) = match material {
+        Some(m) => (m.kd, m.ke, if m.emits() { 0.0 } else { 1.0 }),
+        None => ([0.0; 3], [0.0; 3], 0.0),
+    };
+    let shines = if part == Light::Indirect { 0.0 } else { 1.0 };
+    Parameters {
+        x,
+        y,
+        w,
+        near: projection::NEAR,
+        reflectance: reflectance.into(),
+        emitted: Vec3::from(emitted) * shines,
+        metered,
+    }
+}
+
+/// The relief of a picture, ready to be drawn.
+struct Relief {
+    pass: passes::relief::Relief,
+    mesh: ReliefMesh,
+    /// One for each range of the mesh.
+    sets: Vec<DescriptorSet>,
+    shading: u32,
+    _sampler: Sampler,
+}
+
+impl Relief {
+    /// None where nothing with relief is drawn as such.
+    fn new(
+        device: &Arc<Device>,
+        shade: &Shade,
+        scene: &Scene,
+        lighting: &Lighting<'_>,
+        textures: &Textures,
+        projection: &Projection,
+    ) -> Result<Option<Self>> {
+        let Some((light, shading)) = lighting.relief() else {
+            return Ok(None);
+        };
+        let pass = passes::relief::Relief::new(device, shade)?;
+        let mesh = ReliefMesh::new(device, scene, lighting, light, projection, lighting.cache)?;
+        let sampler = Sampler::new(device, "relief albedo", true)?;
+        let sets = mesh
+            .ranges
+            .iter()
+            .map(|&(material, ..)| pass.bind(textures.image(material), &sampler, &mesh.buffers))
+            .collect::<Result<_>>()?;
+        Ok(Some(Self {
+            pass,
+            mesh,
+            sets,
+            shading,
+            _sampler: sampler,
+        }))
+    }
+
+    fn record(
+        &self,
+        cmd: &Commands,
+        scene: &Scene,
+        lighting: &Lighting<'_>,
+        projection: &Projection,
+        tile: Tile,
+    ) {
+        let rows = projection.rows(tile);
+        let directions = self.mesh.directions;
+        let draws = self.mesh.ranges.iter().zip(&self.sets);
+        let draws = draws.map(|(&(material, first, count), set)| {
+            let material = &scene.materials[material as usize];
+            passes::relief::Draw {
+                first_prism: first,
+                prism_count: count,
+                set,
+                parameters: passes::relief::Parameters {
+                    shade: parameters(rows, Some(material), lighting.part),
+                    shading: self.shading,
+                    view: lighting.show.code(),
+                    pixel: projection.sample_angle(),
+                    cells: [directions.columns, directions.rows],
                 },
             }
-        })
+        });
+        self.pass.record(cmd, &self.mesh.buffers, draws);
     }
 }
 

@@ -64,6 +64,12 @@ impl Projection {
         (w + x * (across / x.length_squared()) + y * (down / y.length_squared())).normalize()
     }
 
+    /// Angle of a sample in the picture's middle, radians.
+    pub fn sample_angle(&self) -> f32 {
+        // Half of the picture's height is 1 / |y| at a distance of 1.
+        (2.0 / (self.rows[1].length() * self.size[1] * f64::from(super::SAMPLES))) as f32
+    }
+
     /// Rows x, y and w over a tile alone.
     pub fn rows(&self, tile: Tile) -> [Vec3; 3] {
         let [x, y, w] = self.rows;

@@ -16,7 +16,7 @@ pub struct Textures {
     sets: Vec<DescriptorSet>,
     /// `[material]`, its place in `sets`.
     of_material: Vec<usize>,
-    _images: Vec<Image>,
+    images: Vec<Image>,
     _sampler: Sampler,
 }
 
@@ -57,13 +57,17 @@ impl Textures {
         Ok(Self {
             sets,
             of_material,
-            _images: images,
+            images,
             _sampler: sampler,
         })
     }
 
     pub fn white(&self) -> &DescriptorSet {
         &self.sets[0]
+    }
+
+    pub fn image(&self, material: u32) -> &Image {
+        &self.images[self.of_material[material as usize]]
     }
 
     pub fn of_material(&self, material: u32) -> &DescriptorSet {

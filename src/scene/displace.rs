@@ -87,7 +87,6 @@ struct Refined {
 impl Refined {
     fn new(scene: &Scene) -> Self {
         let reliefs: Vec<Option<Relief>> = scene.materials.iter().map(Relief::of).collect();
-        let mut normals = vec![DVec3::ZERO; scene.vertices.len()];
         let (mut beside_relief, mut beside_flat) = (HashSet::new(), HashSet::new());
         let mut fixed = HashSet::new();
         for triangle in &scene.triangles {
@@ -100,19 +99,13 @@ impl Refined {
                 }
             };
             edges.extend(edges_of(triangle.vertices).map(|[a, b]| sorted(a, b)));
-            if raised {
-                let [a, b, c] = scene.corners(triangle);
-                for vertex in triangle.vertices {
-                    normals[vertex as usize] += (b - a).cross(c - a);
-                }
-            }
         }
         Self {
             fixed_edges: beside_relief.intersection(&beside_flat).copied().collect(),
             fixed,
             reliefs,
             vertices: scene.vertices.clone(),
-            normals: normals.into_iter().map(DVec3::normalize_or_zero).collect(),
+            normals: relief_normals(scene),
             pieces: scene
                 .triangles
                 .iter()
@@ -266,6 +259,21 @@ impl Refined {
         };
         self.vertices.iter().enumerate().map(moved).collect()
     }
+}
+
+/// Along which each vertex is displaced, `[vertex]`: the smooth unit normal of the triangles with relief about it, weighted
+/// by area; zero where there are none or where they cancel.
+pub fn relief_normals(scene: &Scene) -> Vec<DVec3> {
+    let mut normals = vec![DVec3::ZERO; scene.vertices.len()];
+    for triangle in &scene.triangles {
+        if scene.materials[triangle.material as usize].has_relief() {
+            let [a, b, c] = scene.corners(triangle);
+            for vertex in triangle.vertices {
+                normals[vertex as usize] += (b - a).cross(c - a);
+            }
+        }
+    }
+    normals.into_iter().map(DVec3::normalize_or_zero).collect()
 }
 
 fn without_relief(material: &Material) -> Material {

@@ -35,7 +35,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-pub use displace::displace;
+pub use displace::{displace, relief_normals};
 pub use load::{BuiltinOptions, load};
 pub use maps::{HeightMap, NormalMap};
 pub use material::Material;

@@ -1,0 +1,95 @@
+//! What of a scene's light is drawn, and how.
+
+use clap::{Args, ValueEnum};
+
+use mesolux::render::{Light, Lighting, ReliefShading, Show};
+
+#[derive(Args)]
+pub struct ShowOptions {
+    /// Which light is drawn
+    #[arg(long, value_enum, default_value = "global")]
+    light: LightName,
+    /// How surfaces with relief are drawn
+    #[arg(
+        long,
+        value_enum,
+        default_value = "factored",
+        conflicts_with = "reference"
+    )]
+    shading: ShadingName,
+    /// What is drawn of surfaces with relief
+    #[arg(
+        long,
+        value_enum,
+        default_value = "shaded",
+        conflicts_with = "reference"
+    )]
+    view: ViewName,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum LightName {
+    /// All of it
+    Global,
+    /// Emitters, and what comes straight from them and from point lights
+    Direct,
+    /// What has been reflected more than once
+    Indirect,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum ShadingName {
+    /// Relief mapping, lit by the factors of the relief's response
+    Factored,
+    /// Flat and lit by the relief's response
+    Normal,
+    /// The same, its texture shifted by the height
+    Parallax,
+    /// As plain triangles
+    None,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum ViewName {
+    /// Light
+    Shaded,
+    /// Reflectance
+    Albedo,
+    /// Normals in the world, -1..1 as 0..1
+    Normal,
+    /// From the lowest, black, to the highest, white
+    Height,
+    /// Irradiance over pi, as on a white surface
+    Irradiance,
+}
+
+impl ShowOptions {
+    pub fn light(&self) -> Light {
+        match self.light {
+            LightName::Global => Light::Global,
+            LightName::Direct => Light::Direct,
+            LightName::Indirect => Light::Indirect,
+        }
+    }
+
+    /// The same light, shown as asked for.
+    pub fn apply<'a>(&self, lighting: Lighting<'a>) -> Lighting<'a> {
+        Lighting {
+            part: self.light(),
+            shading: match self.shading {
+                ShadingName::Factored => ReliefShading::Factored,
+                ShadingName::Normal => ReliefShading::Normal,
+                ShadingName::Parallax => ReliefShading::Parallax,
+                ShadingName::None => ReliefShading::None,
+            },
+            show: match self.view {
+                ViewName::Shaded => Show::Shaded,
+                ViewName::Albedo => Show::Albedo,
+                ViewName::Normal => Show::Normal,
+                ViewName::Height => Show::Height,
+                ViewName::Irradiance => Show::Irradiance,
+            },
+            ..lighting
+        }
+    }
+}

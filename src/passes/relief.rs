@@ -1,0 +1,193 @@
+//! Draws triangles with relief by following each pixel's ray through the prism over the triangle. Shaders: `relief.vert`,
+//! `relief.frag`, `shared/height_march.glsl`; twin: [`crate::reference::relief`].
+
+use std::sync::Arc;
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+use super::buffers::upload;
+use super::shade::Shade;
+use super::shaders;
+use super::types::{HeightTile, Prism, ReliefSurface};
+use crate::error::Result;
+use crate::vk::{
+    Bind, Binding, Buffer, BufferUse, Commands, DescriptorSet, Device, Format, GraphicsPipeline,
+    GraphicsState, Image, Sampler, VertexAttribute,
+};
+
+/// One corner of a prism.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct Vertex {
+    /// From the eye, internal units, along the world's axes.
+    pub position: Vec3,
+    pub prism: u32,
+}
+
+/// Push constants of one draw.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct Parameters {
+    /// As in [`super::shade::Parameters`].
+    pub shade: super::shade::Parameters,
+    /// SHADING_… and VIEW_… of [`crate::constants`].
+    pub shading: u32,
+    pub view: u32,
+    /// Angle of a sample, radians.
+    pub pixel: f32,
+    /// Columns and rows of the directions.
+    pub cells: [u32; 2],
+}
+
+/// What a picture's relief is made of, `[prism]` and `[surface]`.
+pub struct Parts<'a> {
+    pub prisms: &'a [Prism],
+    pub surfaces: &'a [ReliefSurface],
+    pub tiles: &'a [HeightTile],
+    pub pyramids: &'a [f32],
+    /// `[surface][cell][corner][rank]`
+    pub factors: &'a [Vec3],
+    /// `[light vertex][MOST_RANK]`
+    pub coefficients: &'a [Vec3],
+    /// `[light vertex][direction]`
+    pub exits: &'a [Vec3],
+}
+
+/// [`Parts`] on the device.
+pub struct Buffers {
+    parts: [Buffer; 7],
+    vertices: Buffer,
+    indices: Buffer,
+}
+
+/// A run of prisms of one material.
+pub struct Draw<'a> {
+    pub first_prism: u32,
+    pub prism_count: u32,
+    pub set: &'a DescriptorSet,
+    pub parameters: Parameters,
+}
+
+pub struct Relief {
+    pipeline: GraphicsPipeline,
+}
+
+const CORNERS: u32 = 6;
+/// Triangles of a prism's hull, outward where a, b, c turn to the left seen from above: 0 to 2 are the low a, b, c and 3
+/// to 5 the high ones. A side is cut from its lower corner's low to its higher corner's high end.
+const HULL: [u32; 24] = [
+    0, 2, 1, 3, 4, 5, // caps
+    0, 1, 4, 0, 4, 3, // a to b
+    1, 2, 5, 1, 5, 4, // b to c
+    0, 5, 2, 0, 3, 5, // a to c
+];
+
+impl Relief {
+    /// Draws into the targets of `shade`.
+    pub fn new(device: &Arc<Device>, shade: &Shade) -> Result<Self> {
+        let attribute = |format, offset: usize| VertexAttribute {
+            format,
+            offset: offset as u32,
+        };
+        let mut bindings = [Binding::Storage; 8];
+        bindings[0] = Binding::Sampled;
+        Ok(Self {
+            pipeline: GraphicsPipeline::new(
+                device,
+                shade.pass(),
+                &GraphicsState {
+                    name: "relief",
+                    vertex: shaders::RELIEF_VERT,
+                    fragment: shaders::RELIEF_FRAG,
+                    bindings: &bindings,
+                    push_bytes: size_of::<Parameters>(),
+                    vertex_stride: size_of::<Vertex>() as u32,
+                    attributes: &[
+                        attribute(
+                            Format::R32G32B32_SFLOAT,
+                            std::mem::offset_of!(Vertex, position),
+                        ),
+                        attribute(Format::R32_UINT, std::mem::offset_of!(Vertex, prism)),
+                    ],
+                },
+            )?,
+        })
+    }
+
+    pub fn bind(
+        &self,
+        albedo: &Image,
+        sampler: &Sampler,
+        buffers: &Buffers,
+    ) -> Result<DescriptorSet> {
+        let [a, b, c, d, e, f, g] = &buffers.parts;
+        let buffer = Bind::Buffer;
+        self.pipeline.bind(
+            "relief",
+            &[
+                Bind::Image(albedo, sampler),
+                buffer(a),
+                buffer(b),
+                buffer(c),
+                buffer(d),
+                buffer(e),
+                buffer(f),
+                buffer(g),
+            ],
+        )
+    }
+
+    /// Draws within the render pass that is under way.
+    pub fn record<'a>(
+        &self,
+        cmd: &Commands,
+        buffers: &Buffers,
+        draws: impl Iterator<Item = Draw<'a>>,
+    ) {
+        cmd.bind_indices(&buffers.indices);
+        for draw in draws {
+            cmd.bind_graphics(&self.pipeline, draw.set, &buffers.vertices);
+            cmd.push_graphics(&self.pipeline, &draw.parameters);
+            let indices = HULL.len() as u32;
+            cmd.draw_indexed(draw.first_prism * indices, draw.prism_count * indices);
+        }
+    }
+}
+
+impl Buffers {
+    /// `mirrored` tells of each prism whether its a, b, c turn to the right seen from above.
+    pub fn new(device: &Arc<Device>, parts: &Parts<'_>, mirrored: &[bool]) -> Result<Self> {
+        let vertices: Vec<Vertex> = (0..)
+            .zip(parts.prisms)
+            .flat_map(|(prism, p)| {
+                [p.low_a, p.low_b, p.low_c, p.high_a, p.high_b, p.high_c]
+                    .map(|position| Vertex { position, prism })
+            })
+            .collect();
+        let indices: Vec<u32> = (0..)
+            .zip(mirrored)
+            .flat_map(|(prism, &mirrored)| {
+                let turn = move |i: usize| {
+                    let swapped = if mirrored { [0, 2, 1][i % 3] } else { i % 3 };
+                    CORNERS * prism + HULL[i - i % 3 + swapped]
+                };
+                (0..HULL.len()).map(turn)
+            })
+            .collect();
+        let storage = BufferUse::Storage;
+        Ok(Self {
+            parts: [
+                upload(device, "relief prisms", parts.prisms, storage)?,
+                upload(device, "relief surfaces", parts.surfaces, storage)?,
+                upload(device, "relief tiles", parts.tiles, storage)?,
+                upload(device, "relief pyramids", parts.pyramids, storage)?,
+                upload(device, "relief factors", parts.factors, storage)?,
+                upload(device, "relief coefficients", parts.coefficients, storage)?,
+                upload(device, "relief exits", parts.exits, storage)?,
+            ],
+            vertices: upload(device, "relief vertices", &vertices, BufferUse::Geometry)?,
+            indices: upload(device, "relief indices", &indices, BufferUse::Geometry)?,
+        })
+    }
+}

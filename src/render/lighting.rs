@@ -1,0 +1,199 @@
+//! The light that a picture shows, and how.
+
+use std::path::Path;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use crate::constants::{
+    SHADING_NORMAL, SHADING_PARALLAX, SHADING_RELIEF, VIEW_ALBEDO, VIEW_HEIGHT, VIEW_IRRADIANCE,
+    VIEW_NORMAL, VIEW_SHADED,
+};
+use crate::scene::Scene;
+use crate::solution::{Bake, DirectionalLight, Solution};
+
+/// Which part of the light is drawn.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Light {
+    /// All of it.
+    #[default]
+    Global,
+    /// What emitters show of themselves, and what has come straight from them and from point lights.
+    Direct,
+    /// The rest: what has been reflected more than once.
+    Indirect,
+}
+
+impl Light {
+    pub(super) fn of<T: Copy + Sync + Send>(
+        self,
+        all: &[T],
+        direct: &[T],
+        less: impl Fn(T, T) -> T + Sync,
+    ) -> Vec<T> {
+        match self {
+            Self::Global => all.to_vec(),
+            Self::Direct => direct.to_vec(),
+            Self::Indirect => all
+                .par_iter()
+                .zip(direct)
+                .map(|(&all, &direct)| less(all, direct))
+                .collect(),
+        }
+    }
+}
+
+/// How triangles with a relief are drawn.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum ReliefShading {
+    /// Relief mapping, lit by the factors of the relief's response.
+    #[default]
+    Factored,
+    /// Flat, lit by the relief's response: normal mapping, with its shadows and inner light.
+    Normal,
+    /// The same, with its texture shifted by its height.
+    Parallax,
+    /// As plain triangles.
+    None,
+}
+
+impl ReliefShading {
+    pub(super) fn code(self) -> Option<u32> {
+        match self {
+            Self::Factored => Some(SHADING_RELIEF),
+            Self::Normal => Some(SHADING_NORMAL),
+            Self::Parallax => Some(SHADING_PARALLAX),
+            Self::None => None,
+        }
+    }
+}
+
+/// What a picture shows of triangles with a relief; of plain ones it shows the shaded surface.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Show {
+    #[default]
+    Shaded,
+    /// Reflectance.
+    Albedo,
+    /// Normals in the world, −1..1 as 0..1.
+    Normal,
+    /// Height from the lowest, black, to the highest, white.
+    Height,
+    /// E/π, as on a white surface.
+    Irradiance,
+}
+
+impl Show {
+    pub(super) fn code(self) -> u32 {
+        match self {
+            Self::Shaded => VIEW_SHADED,
+            Self::Albedo => VIEW_ALBEDO,
+            Self::Normal => VIEW_NORMAL,
+            Self::Height => VIEW_HEIGHT,
+            Self::Irradiance => VIEW_IRRADIANCE,
+        }
+    }
+}
+
+/// A solution as it is to be shown; values `[triangle]` in the order of the input.
+#[derive(Clone, Copy)]
+pub struct Lighting<'a> {
+    /// W·m⁻², RGB, direct and indirect.
+    pub irradiance: &'a [Vec3],
+    /// Of this what comes straight from emitters and point lights; needed for parts of the light.
+    pub irradiance_direct: Option<&'a [Vec3]>,
+    /// Light by direction; without it relief is drawn as plain triangles.
+    pub relief: Option<&'a DirectionalLight>,
+    pub part: Light,
+    pub shading: ReliefShading,
+    pub show: Show,
+    /// Folder that keeps the visibility of reliefs from run to run.
+    pub cache: Option<&'a Path>,
+}
+
+impl<'a> Lighting<'a> {
+    fn plain(irradiance: &'a [Vec3]) -> Self {
+        Self {
+            irradiance,
+            irradiance_direct: None,
+            relief: None,
+            part: Light::default(),
+            shading: ReliefShading::default(),
+            show: Show::default(),
+            cache: None,
+        }
+    }
+
+    pub(super) fn relief(&self) -> Option<(&'a DirectionalLight, u32)> {
+        self.relief.zip(self.shading.code())
+    }
+
+    /// The part of the irradiance that is shown.
+    pub(super) fn irradiance(&self) -> Vec<Vec3> {
+        match self.irradiance_direct {
+            Some(direct) => self
+                .part
+                .of(self.irradiance, direct, |all, direct| all - direct),
+            None => self.irradiance.to_vec(),
+        }
+    }
+
+    /// What elements with relief reflect by direction of the part of the light that is shown, `[meso element][slot]`, as
+    /// radiosity. A part's share of it is taken to be its share of the irradiance.
+    pub(super) fn exits(&self, scene: &Scene, light: &DirectionalLight) -> Vec<Vec3> {
+        let k = light.directions.len();
+        let shown = self.irradiance();
+        light
+            .exitant
+            .par_chunks(k)
+            .zip(&light.elements)
+            .flat_map_iter(|(sent, &e)| {
+                let e = e as usize;
+                let all = self.irradiance[e];
+                let share = Vec3::select(all.cmpgt(Vec3::ZERO), shown[e] / all, Vec3::ZERO);
+                let material = &scene.materials[scene.triangles[e].material as usize];
+                let emitted = Vec3::from(material.ke) * std::f32::consts::PI;
+                sent.iter()
+                    .map(move |s| (*s - emitted).max(Vec3::ZERO) * share)
+            })
+            .collect()
+    }
+}
+
+impl<'a> From<&'a Solution> for Lighting<'a> {
+    fn from(solution: &'a Solution) -> Self {
+        Self {
+            irradiance_direct: Some(&solution.irradiance_direct),
+            relief: solution.relief.as_ref(),
+            ..Self::plain(&solution.irradiance)
+        }
+    }
+}
+
+impl<'a> From<&'a Bake> for Lighting<'a> {
+    fn from(bake: &'a Bake) -> Self {
+        Self {
+            irradiance_direct: Some(&bake.irradiance_direct),
+            relief: bake.relief.as_ref(),
+            ..Self::plain(&bake.irradiance)
+        }
+    }
+}
+
+impl<'a> From<&'a [Vec3]> for Lighting<'a> {
+    fn from(irradiance: &'a [Vec3]) -> Self {
+        Self::plain(irradiance)
+    }
+}
+
+impl<'a> From<&'a Vec<Vec3>> for Lighting<'a> {
+    fn from(irradiance: &'a Vec<Vec3>) -> Self {
+        Self::plain(irradiance)
+    }
+}
+
+impl<'a, const N: usize> From<&'a [Vec3; N]> for Lighting<'a> {
+    fn from(irradiance: &'a [Vec3; N]) -> Self {
+        Self::plain(irradiance)
+    }
+}
