@@ -157,7 +157,8 @@ bool march(HeightTile tile, vec3 from, vec3 to, out HeightHit hit) {
         vec3 along = gone * step;
 
         // Look closer where it comes below the highest of the block.
-        if (min(at.z, at.z + along.z) < pyramid[first + block.y * blocks.x + block.x]) {
+        bool near = min(at.z, at.z + along.z) < pyramid[first + block.y * blocks.x + block.x];
+        if (near) {
             if (level > 0) {
                 level--;
                 blocks = (size + ((1 << level) - 1)) >> level;
@@ -199,12 +200,12 @@ bool march(HeightTile tile, vec3 from, vec3 to, out HeightHit hit) {
         at.xy = mix(clamp(at.xy - vec2(true_next - next), 0.0, 1.0), edge, over);
         next = true_next;
 
-        // Go on in the next period; climb where a larger block was left too.
+        // Go on in the next period; climb where nothing was near, if a larger block was left too.
         ivec2 wrap = ivec2(greaterThanEqual(next, size)) - ivec2(lessThan(next, ivec2(0)));
         bool left_larger = wrap != ivec2(0) || (next >> (level + 1)) != (cell >> (level + 1));
         period += wrap * size;
         cell = next - wrap * size;
-        if (left_larger && level < tile.top) {
+        if (!near && left_larger && level < tile.top) {
             first += blocks.x * blocks.y;
             level++;
             blocks = (size + ((1 << level) - 1)) >> level;
