@@ -482,8 +482,9 @@ fn shadows_of_a_sinusoid() {
     let device = device();
     const WIDTH: u32 = 1024;
     const RAYS: u32 = 100_000;
-    // Wavelengths. Rounded ways from the surface would shadow themselves.
-    const LIFT: f64 = 1e-6;
+    // Wavelengths. Rounded ways from the surface would shadow themselves; a lift of δ moves a shadow's edge where the slope
+    // turns away by √(2δ / |h″|), 2e-4.
+    const LIFT: f64 = 1e-7;
     let height = |u: f64| 0.1 * (std::f64::consts::TAU * u).cos();
     let map = map(WIDTH, 1, |column, _| {
         height((f64::from(column) + 0.5) / f64::from(WIDTH)) as f32
