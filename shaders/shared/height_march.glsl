@@ -122,7 +122,8 @@ bool march(HeightTile tile, vec3 from, vec3 to, out HeightHit hit) {
     vec2 t = vec2(from.z > tile.highest ? highest_at * (1.0 - WIDER) : 0.0, 0.0);
     float end = to.z > tile.highest ? min(highest_at * (1.0 + WIDER), 1.0) : 1.0;
 
-    // Find the cell of the start: `cell` in the period, `period` + cell counted on from the segment's own zero.
+    // Find the cell of the start: `cell` in the period, `period` + `cell` counted on from the segment's own zero. The
+    // quotient may be rounded over a whole number, which is put right.
     ivec2 size = ivec2(tile.width, tile.height);
     ivec2 cell = segment.whole + ivec2(floor(place_at(segment, t, segment.whole).xy));
     cell += ivec2(floor(place_at(segment, t, cell).xy));
@@ -184,7 +185,7 @@ bool march(HeightTile tile, vec3 from, vec3 to, out HeightHit hit) {
         // Move over the border. The line that is crossed is known exactly; the other coordinate only goes forward, and
         // stays in the block.
         bvec2 over = bvec2(leave.x <= leave.y, leave.x > leave.y);
-        ivec2 least = mix(low, cell, bvec2(forward.x || still.x, forward.y || still.y));
+        ivec2 least = mix(low, cell, forward);
         ivec2 greatest = mix(cell, high - 1, forward);
         ivec2 next = clamp(cell + ivec2(floor(at.xy + along.xy)), least, greatest);
         next = mix(next, mix(low - 1, high, forward), over);
