@@ -122,7 +122,8 @@ bool march(HeightTile tile, vec3 from, vec3 to, out HeightHit hit) {
     vec2 t = vec2(from.z > tile.highest ? highest_at * (1.0 - WIDER) : 0.0, 0.0);
     float end = to.z > tile.highest ? min(highest_at * (1.0 + WIDER), 1.0) : 1.0;
 
-    // Find the cell of the start: `cell` in the period, `period` + cell counted on from the segment's own zero.
+    // Find the cell of the start: `cell` in the period, `period` + `cell` counted on from the segment's own zero. The
+    // quotient may be rounded over a whole number, which is put right.
     ivec2 size = ivec2(tile.width, tile.height);
     ivec2 cell = segment.whole + ivec2(floor(place_at(segment, t, segment.whole).xy));
     cell += ivec2(floor(place_at(segment, t, cell).xy));
@@ -157,7 +158,8 @@ bool march(HeightTile tile, vec3 from, vec3 to, out HeightHit hit) {
         vec3 along = gone * step;
 
         // Look closer where it comes below the highest of the block.
-        if (min(at.z, at.z + along.z) < pyramid[first + block.y * blocks.x + block.x]) {
+        bool near = min(at.z, at.z + along.z) < pyramid[first + block.y * blocks.x + block.x];
+        if (near) {
             if (level > 0) {
                 level--;
                 blocks = (size + ((1 << level) - 1)) >> level;
@@ -183,7 +185,7 @@ bool march(HeightTile tile, vec3 from, vec3 to, out HeightHit hit) {
         // Move over the border. The line that is crossed is known exactly; the other coordinate only goes forward, and
         // stays in the block.
         bvec2 over = bvec2(leave.x <= leave.y, leave.x > leave.y);
-        ivec2 least = mix(low, cell, bvec2(forward.x || still.x, forward.y || still.y));
+        ivec2 least = mix(low, cell, forward);
         ivec2 greatest = mix(cell, high - 1, forward);
         ivec2 next = clamp(cell + ivec2(floor(at.xy + along.xy)), least, greatest);
         next = mix(next, mix(low - 1, high, forward), over);
@@ -199,12 +201,12 @@ bool march(HeightTile tile, vec3 from, vec3 to, out HeightHit hit) {
         at.xy = mix(clamp(at.xy - vec2(true_next - next), 0.0, 1.0), edge, over);
         next = true_next;
 
-        // Go on in the next period; climb where a larger block was left too.
+        // Go on in the next period; climb where nothing was near, if a larger block was left too.
         ivec2 wrap = ivec2(greaterThanEqual(next, size)) - ivec2(lessThan(next, ivec2(0)));
         bool left_larger = wrap != ivec2(0) || (next >> (level + 1)) != (cell >> (level + 1));
         period += wrap * size;
         cell = next - wrap * size;
-        if (left_larger && level < tile.top) {
+        if (!near && left_larger && level < tile.top) {
             first += blocks.x * blocks.y;
             level++;
             blocks = (size + ((1 << level) - 1)) >> level;
