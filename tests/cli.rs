@@ -189,6 +189,45 @@ fn bad_names_and_outputs() {
             "nosuch",
         ),
         (&["scene", "nosuch", "-o", "folder"], "nosuch"),
+        (
+            &[
+                "render",
+                "cornell",
+                "--reference",
+                "--paths",
+                "1",
+                "-o",
+                "p.png",
+            ],
+            "paths 1",
+        ),
+        (
+            &[
+                "render",
+                "cornell",
+                "--reference",
+                "--budget=-1",
+                "-o",
+                "p.png",
+            ],
+            "--budget -1",
+        ),
+        (
+            &[
+                "render",
+                "cornell",
+                "--reference",
+                "--size",
+                "0x8",
+                "-o",
+                "p.png",
+            ],
+            "width 0",
+        ),
+        (
+            &["render", "b.safetensors", "--reference", "-o", "p.png"],
+            "b.safetensors",
+        ),
     ] {
         let run = mesolux(args, folder.path());
         let text = String::from_utf8_lossy(&run.stderr);
@@ -297,4 +336,51 @@ fn bakes_and_renders_files_of_every_kind() {
         "{}",
         String::from_utf8_lossy(&run.stderr)
     );
+}
+
+/// Without any Vulkan driver; the interval is told.
+#[test]
+fn draws_the_reference() {
+    let folder = tempfile::tempdir().expect("a folder for the test");
+    std::fs::write(folder.path().join("room.obj"), ROOM).expect("written");
+    std::fs::write(folder.path().join("room.mtl"), MATERIALS).expect("written");
+    for light in ["global", "direct", "indirect"] {
+        let run = Command::new(env!("CARGO_BIN_EXE_mesolux"))
+            .args(["render", "room.obj", "--reference", "--paths", "8"])
+            .args(["--light", light, "--size", "32x24", "--seed", "3"])
+            .args(["-o", "p.exr"])
+            .env("VK_DRIVER_FILES", "/nonexistent.json")
+            .env("VK_ICD_FILENAMES", "/nonexistent.json")
+            .current_dir(folder.path())
+            .output()
+            .expect("the program runs");
+        let text = String::from_utf8_lossy(&run.stderr);
+        assert!(run.status.success(), "{text}");
+        assert!(text.contains("8 paths a pixel") && text.contains("(95 %)"));
+        let image = image::open(folder.path().join("p.exr")).expect("a picture");
+        assert_eq!((image.width(), image.height()), (32, 24));
+    }
+    // What belongs to the one way of drawing is refused with the other.
+    for args in [["--paths", "8"], ["--light", "direct"]] {
+        let run = mesolux(
+            &["render", "room.obj", "-o", "q.png", args[0], args[1]],
+            folder.path(),
+        );
+        assert_eq!(run.status.code(), Some(2));
+        assert!(String::from_utf8_lossy(&run.stderr).contains("--reference"));
+    }
+    let run = mesolux(
+        &[
+            "render",
+            "room.obj",
+            "-o",
+            "q.png",
+            "--reference",
+            "--hemicube",
+            "64",
+        ],
+        folder.path(),
+    );
+    assert_eq!(run.status.code(), Some(2));
+    assert!(!folder.path().join("q.png").exists());
 }

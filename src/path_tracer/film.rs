@@ -26,9 +26,10 @@ pub struct Film {
 
 #[derive(Debug, Clone, Copy)]
 struct Pixel {
-    /// Sums over the batches of their mean radiance and of its square, RGB.
-    sum: DVec3,
-    squares: DVec3,
+    /// Mean radiance of the batches, and the sum of their squared deviations from it, RGB: by Welford's update (1962), in
+    /// which equal batches have no spread at all.
+    mean: DVec3,
+    deviations: DVec3,
     /// Whether it has shown fronts alone, and none that emits.
     metered: bool,
 }
@@ -43,8 +44,8 @@ pub(super) struct Batch {
 impl Film {
     pub(super) fn new(width: u32, height: u32) -> Self {
         let empty = Pixel {
-            sum: DVec3::ZERO,
-            squares: DVec3::ZERO,
+            mean: DVec3::ZERO,
+            deviations: DVec3::ZERO,
             metered: true,
         };
         Self {
@@ -60,14 +61,16 @@ impl Film {
     /// Adds one batch of so many paths to every pixel; `batch` is given column and row.
     pub(super) fn add(&mut self, paths: u32, batch: impl Fn(u32, u32) -> Batch + Sync) {
         let width = self.width as usize;
+        let count = f64::from(self.passes + 1);
         self.pixels
             .par_chunks_mut(width)
             .enumerate()
             .for_each(|(row, pixels)| {
                 for (column, pixel) in pixels.iter_mut().enumerate() {
                     let found = batch(column as u32, row as u32);
-                    pixel.sum += found.mean;
-                    pixel.squares += found.mean * found.mean;
+                    let before = found.mean - pixel.mean;
+                    pixel.mean += before / count;
+                    pixel.deviations += before * (found.mean - pixel.mean);
                     pixel.metered &= found.metered;
                 }
             });
@@ -77,7 +80,7 @@ impl Film {
 
     /// Mean radiance of each pixel, `[row][column]` from the top left, W·m⁻²·sr⁻¹, linear RGB. Unbiased.
     pub fn radiance(&self) -> Vec<DVec3> {
-        self.pixels.iter().map(|p| self.mean_of(p)).collect()
+        self.pixels.iter().map(|p| p.mean).collect()
     }
 
     /// Standard error of each pixel's radiance, `[row][column]`, RGB: s/√n of the n batches. From so few batches it is itself
@@ -91,7 +94,7 @@ impl Film {
         let count = self.pixels.len() as f64;
         let (mut sum, mut variance) = (DVec3::ZERO, DVec3::ZERO);
         for pixel in &self.pixels {
-            sum += self.mean_of(pixel);
+            sum += pixel.mean;
             let error = self.error_of(pixel);
             variance += error * error;
         }
@@ -103,7 +106,7 @@ impl Film {
     pub fn relative_error(&self) -> f64 {
         let (mut sum, mut count) = (0.0, 0);
         for pixel in &self.pixels {
-            let mean = self.mean_of(pixel).length_squared();
+            let mean = pixel.mean.length_squared();
             if mean > 0.0 {
                 sum += self.error_of(pixel).length_squared() / mean;
                 count += 1;
@@ -121,23 +124,19 @@ impl Film {
         let radiance: Vec<_> = self
             .pixels
             .par_iter()
-            .map(|p| self.mean_of(p).as_vec3().to_array())
+            .map(|p| p.mean.as_vec3().to_array())
             .collect();
         let metered: Vec<_> = self.pixels.iter().map(|p| p.metered).collect();
         Picture::new((self.width, self.height), radiance, &metered)
     }
 
-    fn mean_of(&self, pixel: &Pixel) -> DVec3 {
-        pixel.sum / f64::from(self.passes)
-    }
-
     fn error_of(&self, pixel: &Pixel) -> DVec3 {
-        standard_error(pixel.sum, pixel.squares, f64::from(self.passes))
+        standard_error(pixel.deviations, f64::from(self.passes))
     }
 }
 
-/// Of a mean of so many independent values with this sum and this sum of squares.
-pub(super) fn standard_error(sum: DVec3, squares: DVec3, count: f64) -> DVec3 {
-    let variance = (squares - sum * sum / count).max(DVec3::ZERO) / (count - 1.0);
-    DVec3::from_array((variance / count).to_array().map(f64::sqrt))
+/// Of a mean of so many independent values with this sum of squared deviations.
+pub(super) fn standard_error(deviations: DVec3, count: f64) -> DVec3 {
+    let squared = deviations.max(DVec3::ZERO) / ((count - 1.0) * count);
+    DVec3::from_array(squared.to_array().map(f64::sqrt))
 }

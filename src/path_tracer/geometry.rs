@@ -17,8 +17,12 @@ use crate::scene::Scene;
 /// below any shape. As near behind a front, a back is its own surface's other side.
 pub const ABOVE: f64 = 1.0 / (1u64 << 30) as f64;
 
-/// What boxes are wider than their triangles: rays of length 4 in f32 miss a place by less.
-const BOX_MARGIN: f32 = 1.0 / (1u32 << 17) as f32;
+/// Boxes and their rays are so many times larger than internal units. obvhs passes over a box that a ray leaves within its
+/// own 10⁻⁴: here no box is so thin beyond its triangle, see `BOX_MARGIN`.
+const BOX_SCALE: f64 = 1024.0;
+
+/// What boxes are wider than their triangles: 2⁻¹⁷ internal units, more than rays of length 4 in f32 miss a place by.
+const BOX_MARGIN: f32 = BOX_SCALE as f32 / (1u32 << 17) as f32;
 
 /// Half side of the cube, about the scene's own of 1, at which a ray from outside begins.
 const CUBE: f64 = 1.0 + 1.0 / 16.0;
@@ -60,7 +64,7 @@ struct Bounds<'a>(&'a [DVec3; 3]);
 
 impl Boundable for Bounds<'_> {
     fn aabb(&self) -> Aabb {
-        let mut bounds = Aabb::from_points(&self.0.map(|p| p.as_vec3a()));
+        let mut bounds = Aabb::from_points(&self.0.map(|p| (p * BOX_SCALE).as_vec3a()));
         bounds.min -= Vec3A::splat(BOX_MARGIN);
         bounds.max += Vec3A::splat(BOX_MARGIN);
         bounds
@@ -86,15 +90,19 @@ impl Geometry {
                     .iter()
                     .all(|&v| (v as usize) < scene.vertices.len())
         };
-        let (origin, unit) = scene.local_frame();
-        if !scene.triangles.iter().all(held) || !origin.is_finite() || !unit.is_finite() {
+        if !scene.triangles.iter().all(held) {
             return refuse("a triangle has a corner or a material that is not there");
         }
+        let (origin, unit) = scene.local_frame();
         let corners: Vec<_> = scene
             .triangles
             .par_iter()
             .map(|t| scene.corners(t).map(|p| (p - origin) / unit))
             .collect();
+        // A corner that is no number would be lost in the bounds of a box.
+        if !corners.iter().flatten().all(|p| p.is_finite()) {
+            return refuse("a corner is not finite");
+        }
         let bounds: Vec<_> = corners.iter().map(Bounds).collect();
         let bvh = build_cwbvh(
             &bounds,
@@ -126,7 +134,7 @@ impl Geometry {
         let start = from + skipped * direction;
         let mut nearest = f64::INFINITY;
         let mut best = None;
-        let ray = Ray::new(start.as_vec3a(), direction.as_vec3a(), 0.0, f32::INFINITY);
+        let ray = box_ray(start, direction);
         self.bvh.ray_traverse(ray, &mut RayHit::none(), |_, place| {
             let triangle = self.bvh.primitive_indices[place] as usize;
             let Some(crossing) = Crossing::of(&self.corners[triangle], start, direction) else {
@@ -138,7 +146,7 @@ impl Geometry {
             }
             nearest = rank;
             best = Some((triangle, crossing));
-            rank as f32
+            (rank * BOX_SCALE) as f32
         });
         let (triangle, crossing) = best?;
         let [a, b, c] = self.corners[triangle];
@@ -161,7 +169,7 @@ impl Geometry {
             return true;
         };
         let start = from + skipped * direction;
-        let ray = Ray::new(start.as_vec3a(), direction.as_vec3a(), 0.0, f32::INFINITY);
+        let ray = box_ray(start, direction);
         self.bvh.ray_traverse_miss(ray, |_, place| {
             let triangle = self.bvh.primitive_indices[place] as usize;
             match Crossing::of(&self.corners[triangle], start, direction) {
@@ -170,6 +178,12 @@ impl Geometry {
             }
         })
     }
+}
+
+/// A ray that finds boxes.
+fn box_ray(start: DVec3, direction: DVec3) -> Ray {
+    let start = (start * BOX_SCALE).as_vec3a();
+    Ray::new(start, direction.as_vec3a(), 0.0, f32::INFINITY)
 }
 
 struct Crossing {
@@ -225,4 +239,67 @@ fn distance_to_cube(from: DVec3, direction: DVec3) -> Option<f64> {
         last = last.min(ends[0].max(ends[1]));
     }
     (first <= last).then_some(first)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::path_tracer::sampling::{Random, cosine_direction};
+    use crate::scene::{Material, Triangle};
+
+    /// Groups of triangles of every size about one place, half of them square to an axis, and rays from their surfaces: the
+    /// same as by trying every triangle.
+    #[test]
+    fn boxes_lose_nothing() {
+        let mut random = Random::new(0, 0, 0);
+        let mut scene = Scene {
+            materials: vec![Material::default()],
+            ..Scene::default()
+        };
+        let mut middle = DVec3::ZERO;
+        for i in 0..300 {
+            let mut place = || DVec3::new(random.unit(), random.unit(), random.unit());
+            let size = 10_f64.powf(-6.0 * place().x);
+            if i % 10 == 0 {
+                middle = place();
+            }
+            for _ in 0..3 {
+                let mut corner = middle + size * place();
+                if i % 2 == 0 {
+                    corner[i / 2 % 3] = middle[i / 2 % 3] + 0.5 * size;
+                }
+                scene.vertices.push(corner);
+            }
+            let first = 3 * i as u32;
+            scene.triangles.push(Triangle {
+                vertices: [first, first + 1, first + 2],
+                uv: [[0.0; 2]; 3],
+                material: 0,
+            });
+        }
+        let geometry = Geometry::new(&scene).expect("the scene is good");
+        let mut hits = 0;
+        for i in 0..20_000 {
+            let [a, b, c] = geometry.corners(i % 300);
+            let normal = (b - a).cross(c - a).normalize();
+            let from = (a + b + c) / 3.0 + ABOVE * normal;
+            let direction = cosine_direction(normal, random.square());
+            let all = geometry
+                .corners
+                .iter()
+                .enumerate()
+                .filter_map(|(t, corners)| {
+                    Some((t, Crossing::of(corners, from, direction)?.distance))
+                });
+            let nearest = all.min_by(|a, b| a.1.total_cmp(&b.1));
+            let found = geometry.hit(from, direction);
+            assert_eq!(found.map(|hit| hit.triangle), nearest.map(|n| n.0));
+            if let Some((_, distance)) = nearest {
+                hits += 1;
+                assert!(geometry.sees(from, from + direction * (distance * (1.0 - 1e-7))));
+                assert!(!geometry.sees(from, from + direction * (distance * (1.0 + 1e-7))));
+            }
+        }
+        assert!(hits > 2000, "{hits}");
+    }
 }

@@ -14,9 +14,9 @@
 mod film;
 mod geometry;
 mod lights;
+mod paths;
 mod sampling;
 
-use std::f64::consts::PI;
 use std::time::{Duration, Instant};
 
 use glam::{DVec2, DVec3, Vec3};
@@ -28,9 +28,9 @@ use crate::error::{Error, Result};
 use crate::render::{Light, Projection, View};
 use crate::scene::Scene;
 use film::Batch;
-use geometry::{ABOVE, Geometry, Hit};
+use geometry::Geometry;
 use lights::Lights;
-use sampling::{Random, cosine_direction};
+use sampling::Random;
 
 /// Most pixels of a picture: 64 Mi take 3.5 GiB of sums.
 pub const MOST_PIXELS: u64 = 1 << 26;
@@ -46,12 +46,6 @@ const MOST_STRATA: u32 = 4;
 
 /// Paths of a pass, about: some seconds, after which it can be stopped.
 const PASS_PATHS: u64 = 1 << 22;
-
-/// Bounces before roulette: most of the light has been found by then.
-const SURE_BOUNCES: u32 = 3;
-
-/// Most chance to go on after that: a closed white room would otherwise be walked for ever.
-const MOST_CHANCE: f64 = 0.98;
 
 /// Paths that are summed by one thread at a time: fixed, so that the sum does not depend on the threads.
 const CHUNK: u32 = 1024;
@@ -112,8 +106,8 @@ impl<'a> PathTracer<'a> {
     /// threads. `go_on` is asked after each pass from the second on; at its no, what there is, is the result.
     ///
     /// # Errors
-    /// Paths not in 2..=[`MOST_PATHS`]; a size of 0, above [`crate::render::MOST_PIXELS`] a side or above [`MOST_PIXELS`]; a camera that
-    /// looks nowhere.
+    /// Paths not in 2..=[`MOST_PATHS`]; a size of 0, above [`crate::render::MOST_PIXELS`] a side or above [`MOST_PIXELS`]; a
+    /// camera that looks nowhere.
     pub fn render(
         &self,
         view: &View<'_>,
@@ -183,8 +177,8 @@ impl<'a> PathTracer<'a> {
         Ok(film)
     }
 
-    /// Irradiance at a place of the scene (scene units) about a unit normal, and its standard error, W·m⁻², RGB. At least two
-    /// paths are traced.
+    /// Irradiance at a place of the scene (scene units) about a unit normal, and its standard error, W·m⁻², RGB; zero about no
+    /// direction. At least two paths are traced.
     ///
     /// An independent check of the radiosity solver: at a place on an element, with its normal, it is what `irradiance` of
     /// the solution tells of the element there.
@@ -198,6 +192,9 @@ impl<'a> PathTracer<'a> {
     ) -> (Vec3, Vec3) {
         let paths = paths.max(2);
         let (place, normal) = (self.geometry.inside(point), normal.normalize_or_zero());
+        if normal == DVec3::ZERO || !place.is_finite() {
+            return (Vec3::ZERO, Vec3::ZERO);
+        }
         let sums: Vec<[DVec3; 2]> = (0..paths.div_ceil(CHUNK))
             .into_par_iter()
             .map(|chunk| {
@@ -215,90 +212,7 @@ impl<'a> PathTracer<'a> {
             .iter()
             .fold([DVec3::ZERO; 2], |[a, b], [c, d]| [a + c, b + d]);
         let count = f64::from(paths);
-        let error = film::standard_error(sum, squares, count);
+        let error = film::standard_error(squares - sum * sum / count, count);
         ((sum / count).as_vec3(), error.as_vec3())
-    }
-
-    /// One sample of the radiance that leaves a hit towards the eye.
-    fn radiance(&self, hit: &Hit, light: Light, random: &mut Random) -> DVec3 {
-        if !hit.front {
-            return DVec3::ZERO;
-        }
-        let emitted = match light {
-            Light::Global | Light::Direct => self.lights.emitted(hit.triangle),
-            Light::Indirect => DVec3::ZERO,
-        };
-        let reflectance = self.reflectance(hit);
-        if reflectance == DVec3::ZERO {
-            return emitted;
-        }
-        emitted + reflectance / PI * self.gathered(hit.place, hit.normal, light, random)
-    }
-
-    /// One sample of the irradiance at a place, internal units.
-    fn gathered(&self, place: DVec3, normal: DVec3, light: Light, random: &mut Random) -> DVec3 {
-        let (mut place, mut normal) = (place, normal);
-        let mut sum = DVec3::ZERO;
-        // What irradiance here counts for where the path began.
-        let mut carried = DVec3::ONE;
-        for bounce in 0_u32.. {
-            let counts = match light {
-                Light::Global => true,
-                Light::Direct => bounce == 0,
-                Light::Indirect => bounce > 0,
-            };
-            // Sample the lights
-            if counts {
-                let choices = (random.unit(), random.unit());
-                let at = random.square();
-                sum += carried
-                    * self
-                        .lights
-                        .sample(&self.geometry, place, normal, choices, at);
-            }
-            // Go on in a direction of density cos θ / π
-            let direction = cosine_direction(normal, random.square());
-            let Some(hit) = self.geometry.hit(place + ABOVE * normal, direction) else {
-                break;
-            };
-            if !hit.front {
-                break;
-            }
-            if counts {
-                let cosine = normal.dot(direction);
-                let weight = self.lights.weight_when_met(&hit, direction, cosine);
-                sum += carried * self.lights.emitted(hit.triangle) * (PI * weight);
-            }
-            carried *= self.reflectance(&hit);
-            if light == Light::Direct || carried == DVec3::ZERO {
-                break;
-            }
-            // End the path by roulette
-            if bounce >= SURE_BOUNCES {
-                let chance = carried.max_element().min(MOST_CHANCE);
-                if random.unit() >= chance {
-                    break;
-                }
-                carried /= chance;
-            }
-            (place, normal) = (hit.place, hit.normal);
-        }
-        sum
-    }
-
-    /// ρ at a hit, textures looked up bilinearly.
-    fn reflectance(&self, hit: &Hit) -> DVec3 {
-        let triangle = &self.scene.triangles[hit.triangle];
-        let material = &self.scene.materials[triangle.material as usize];
-        let plain = Vec3::from_array(material.kd).as_dvec3();
-        let Some(texture) = &material.map_kd else {
-            return plain;
-        };
-        let uv = hit.interpolate(
-            triangle
-                .uv
-                .map(|[u, v]| DVec2::new(f64::from(u), f64::from(v))),
-        );
-        plain * Vec3::from_array(texture.bilinear(uv.x, uv.y)).as_dvec3()
     }
 }
