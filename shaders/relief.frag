@@ -44,6 +44,8 @@ layout(push_constant, scalar) uniform Parameters {
 const float PI = 3.14159265358979;
 // Samples wider than so many texels show the mean of the relief.
 const float WIDEST_SAMPLE = 2.0;
+// Share of a prism's height that counts as its bottom; MARGIN of src/render/relief.rs lies below the relief.
+const float BOTTOM = 5e-4;
 
 // A place on the relief.
 struct Place {
@@ -160,8 +162,9 @@ bool meet(Prism p, ReliefSurface surface, vec3 along, bool plane, out Place plac
             if (!march(tiles[p.surface], from, to, hit)) {
                 continue;
             }
-            // A ray that is on its way up through the surface shows its underside, where it comes in.
-            place.under = hit.t == 0.0 && to.z >= from.z;
+            // A ray that comes in through the bottom shows the underside; one that comes in below the surface through a side,
+            // at a seam of heights, shows the step.
+            place.under = hit.t == 0.0 && from.z < surface.lowest + BOTTOM * rise;
             t = hit.t;
             place.gradient = hit.gradient;
             place.height = hit.height;

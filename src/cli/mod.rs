@@ -2,6 +2,8 @@
 
 mod bake;
 mod bench;
+mod camera;
+mod compare;
 mod info;
 mod progress;
 mod reference;
@@ -31,6 +33,7 @@ struct Cli {
 enum Command {
     Bake(bake::Options),
     Render(render::Options),
+    Compare(compare::Options),
     Scene(scene::Options),
     Info(info::Options),
     Bench(bench::Options),
@@ -111,6 +114,7 @@ pub fn main() -> ExitCode {
     let done = match &cli.command {
         Command::Bake(options) => bake::run(options),
         Command::Render(options) => render::run(options),
+        Command::Compare(options) => compare::run(options),
         Command::Scene(options) => scene::run(options),
         Command::Info(options) => info::run(options),
         Command::Bench(options) => bench::run(options),

@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::bake::{SolveOptions, writable};
+use super::camera::CameraOptions;
 use super::reference::{self, ReferenceOptions};
 use super::show::ShowOptions;
 use super::{Builtin, DeviceOptions};
 use mesolux::error::{Error, Result};
 use mesolux::render::{FileKind, Lighting, Picture, View, render};
-use mesolux::scene::{Camera, Scene};
+use mesolux::scene::Camera;
 use mesolux::solution::Bake;
 
 /// Draw a scene or a bake to a picture
@@ -28,9 +29,8 @@ pub struct Options {
     /// Pixels across and down
     #[arg(long, value_name = "WxH", default_value = "800x800", value_parser = size)]
     size: (u32, u32),
-    /// A camera of the scene, by name; the first one if not given
-    #[arg(long, value_name = "NAME")]
-    camera: Option<String>,
+    #[command(flatten)]
+    camera: CameraOptions,
     /// Multiplies the light by 2^EV; found from the picture if not given
     #[arg(long, value_name = "EV", allow_hyphen_values = true)]
     exposure: Option<f32>,
@@ -100,7 +100,8 @@ pub fn run(options: &Options) -> Result<()> {
                 ),
             ));
         }
-        let view = options.view(&scene)?;
+        let camera = options.camera.of(&scene)?;
+        let view = options.view(&camera);
         let device = options.device.open()?;
         let picture = render(&device, &scene, show((&bake).into()), &view)?;
         options.device.check()?;
@@ -108,7 +109,8 @@ pub fn run(options: &Options) -> Result<()> {
     }
     let settings = solve.settings()?;
     let scene = options.builtin.load(&options.input)?;
-    let view = options.view(&scene)?;
+    let camera = options.camera.of(&scene)?;
+    let view = options.view(&camera);
     let device = options.device.open()?;
     let solution = mesolux::bake::bake(&device, &scene, &settings, |_| true)?;
     let picture = render(&device, &scene, show((&solution).into()), &view)?;
@@ -124,20 +126,20 @@ fn run_reference(options: &Options) -> Result<()> {
         .reference
         .settings(solve.budget()?, solve.seed, light);
     let scene = options.builtin.load(&options.input)?;
-    options.view(&scene)?;
+    let camera = options.camera.of(&scene)?;
     let scene = reference::tessellated(scene);
-    let view = options.view(&scene)?;
+    let view = options.view(&camera);
     let film = reference::draw(&scene, &view, &settings)?;
     options.write(&film.picture(), &view)
 }
 
 impl Options {
-    fn view<'a>(&self, scene: &'a Scene) -> Result<View<'a>> {
-        Ok(View {
-            camera: camera(scene, self.camera.as_deref())?,
+    fn view<'a>(&self, camera: &'a Camera) -> View<'a> {
+        View {
+            camera,
             width: self.size.0,
             height: self.size.1,
-        })
+        }
     }
 
     fn write(&self, picture: &Picture, view: &View<'_>) -> Result<()> {
@@ -151,20 +153,4 @@ impl Options {
         );
         Ok(())
     }
-}
-
-fn camera<'a>(scene: &'a Scene, name: Option<&str>) -> Result<&'a Camera> {
-    let found = match name {
-        None => scene.cameras.first(),
-        Some(name) => scene.cameras.iter().find(|c| c.name == name),
-    };
-    found.ok_or_else(|| {
-        let names: Vec<_> = scene.cameras.iter().map(|c| c.name.as_str()).collect();
-        Error::Usage(format!(
-            "scene {} has no camera \"{}\"; it has {}",
-            scene.name,
-            name.unwrap_or("default"),
-            names.join(", ")
-        ))
-    })
 }

@@ -8,6 +8,7 @@
 //! light by direction ───┴─► passes::relief ─┘
 //! ```
 
+mod compare;
 mod lighting;
 mod picture;
 mod projection;
@@ -21,6 +22,7 @@ use std::sync::Arc;
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
+pub use compare::{Comparison, side_by_side};
 pub use lighting::{Light, Lighting, ReliefShading, Show};
 pub use picture::{FileKind, Picture, SAMPLES};
 pub(crate) use projection::Projection;

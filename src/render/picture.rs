@@ -98,6 +98,27 @@ impl Picture {
         }
     }
 
+    /// Reads linear radiance from an OpenEXR file, to be exposed as if all of it were lit.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or that holds no finite RGB.
+    pub fn read(path: &Path) -> Result<Self> {
+        if FileKind::of(path)? != FileKind::Exr {
+            return Err(Error::file(path, "a PNG holds no radiance: give an .exr"));
+        }
+        let bytes = std::fs::read(path).map_err(|e| Error::read(path, e))?;
+        let decoded = image::load_from_memory_with_format(&bytes, image::ImageFormat::OpenExr)
+            .map_err(|e| Error::file(path, e.to_string()))?
+            .into_rgb32f();
+        let size = decoded.dimensions();
+        let radiance: Vec<[f32; 3]> = decoded.pixels().map(|p| p.0).collect();
+        if radiance.as_flattened().iter().any(|v| !v.is_finite()) {
+            return Err(Error::file(path, "not all numbers are finite"));
+        }
+        let metered = vec![true; radiance.len()];
+        Ok(Self::new(size, radiance, &metered))
+    }
+
     /// Writes the picture, by the ending of `path`: `.png` as 8-bit sRGB, exposed by 2^`exposure` and tone-mapped, or
     /// `.exr` as linear 32-bit float radiance, W·m⁻²·sr⁻¹, neither exposed nor tone-mapped.
     ///
