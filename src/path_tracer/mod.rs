@@ -44,8 +44,8 @@ const LEAST_PASSES: u32 = 8;
 /// Most strata along a side of a pixel: beyond 4, what is left is noise of the paths and not of the pixel's edges.
 const MOST_STRATA: u32 = 4;
 
-/// Paths of a pass, about: some seconds, after which it can be stopped.
-const PASS_PATHS: u64 = 1 << 22;
+/// Paths of a pass, about, unless it has more pixels: a few seconds, after which it can be stopped.
+const PASS_PATHS: u64 = 1 << 20;
 
 /// Paths that are summed by one thread at a time: fixed, so that the sum does not depend on the threads.
 const CHUNK: u32 = 1024;
