@@ -2,6 +2,7 @@
 
 mod difference;
 pub mod hemicube;
+pub mod irradiance;
 pub mod table1;
 
 pub use difference::{Difference, plain_pairs};

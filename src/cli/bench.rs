@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::{Builtin, DeviceOptions};
-use mesolux::bench::{hemicube, table1};
-use mesolux::error::Result;
+use mesolux::bench::{hemicube, irradiance, table1};
+use mesolux::error::{Error, Result};
+use mesolux::solution::Bake;
 
 /// Measure speeds on this machine; use a release build
 #[derive(Args)]
@@ -19,6 +20,8 @@ pub struct Options {
 enum What {
     /// Hemicubes a second in the Cornell box, with and without culling, side by side
     Hemicube(HemicubeOptions),
+    /// Irradiance of bakes of one scene, on what has no relief, against path traced irradiance with the relief as geometry
+    Irradiance(IrradianceOptions),
     /// The paper's Table 1: three scenes in 16, 32 and 64 directions, without directions, and with the relief as geometry
     Table1(Table1Options),
 }
@@ -45,6 +48,22 @@ struct Table1Options {
 }
 
 #[derive(Args)]
+struct IrradianceOptions {
+    /// Bakes of one scene
+    #[arg(value_name = "BAKE.safetensors", required = true)]
+    bakes: Vec<PathBuf>,
+    /// Places that are compared, at random by area
+    #[arg(long, value_name = "N", default_value_t = 400)]
+    samples: usize,
+    /// Paths of each place
+    #[arg(long, value_name = "N", default_value_t = 2000)]
+    paths: u32,
+    /// Other places
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+}
+
+#[derive(Args)]
 struct HemicubeOptions {
     /// Pixels a side of a hemicube face
     #[arg(long, value_name = "N", default_value_t = 128)]
@@ -61,8 +80,47 @@ struct HemicubeOptions {
 pub fn run(options: &Options) -> Result<()> {
     match &options.what {
         What::Hemicube(options) => run_hemicube(options),
+        What::Irradiance(options) => run_irradiance(options),
         What::Table1(options) => run_table1(options),
     }
+}
+
+fn run_irradiance(options: &IrradianceOptions) -> Result<()> {
+    let wanted = irradiance::Options {
+        samples: options.samples.max(2),
+        paths: options.paths,
+        seed: options.seed,
+    };
+    let mut known: Option<(String, Vec<irradiance::Sample>)> = None;
+    for path in &options.bakes {
+        let bake = Bake::load(path)?;
+        let hash = &bake.origin.hash;
+        let samples = match &known {
+            Some((of, samples)) if of == hash => samples,
+            Some(_) => {
+                return Err(Error::file(
+                    path,
+                    "a bake of another scene than the first one's",
+                ));
+            }
+            None => {
+                let scene = Builtin::scene_of(path, &bake)?;
+                let samples = irradiance::samples(&scene, &wanted)?;
+                &known.insert((hash.clone(), samples)).1
+            }
+        };
+        let found = irradiance::compare(&bake.irradiance, samples);
+        println!(
+            "{}: {} places without relief: bias {:+.2} % ± {:.2} (95 %), rms {:.2} % (path tracer's noise of {:.2} % taken off)",
+            path.display(),
+            found.samples,
+            100.0 * found.bias,
+            100.0 * found.bias_interval,
+            100.0 * found.rms,
+            100.0 * found.noise
+        );
+    }
+    Ok(())
 }
 
 fn run_table1(options: &Table1Options) -> Result<()> {

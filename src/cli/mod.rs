@@ -11,12 +11,13 @@ mod render;
 mod scene;
 mod show;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
 use mesolux::error::{Error, Result};
 use mesolux::scene::{BuiltinOptions, Scene};
+use mesolux::solution::Bake;
 
 /// Bake and draw global illumination with Vulkan: progressive radiosity through hemicube item buffers.
 ///
@@ -51,6 +52,25 @@ struct Builtin {
 }
 
 impl Builtin {
+    /// The scene of a bake that was read from a file.
+    fn scene_of(path: &Path, bake: &Bake) -> Result<Scene> {
+        let builtin = Self {
+            patches: bake.origin.patches,
+            statue: bake.origin.statue.clone(),
+        };
+        let scene = builtin.load(&bake.origin.scene)?;
+        if scene.hash() != bake.origin.hash || scene.triangles.len() != bake.irradiance.len() {
+            return Err(Error::file(
+                path,
+                format!(
+                    "its scene {} has changed since; bake it again",
+                    bake.origin.scene
+                ),
+            ));
+        }
+        Ok(scene)
+    }
+
     fn load(&self, scene: &str) -> Result<Scene> {
         let scene = mesolux::scene::load(
             scene,

@@ -86,20 +86,7 @@ pub fn run(options: &Options) -> Result<()> {
     };
     if is_bake {
         let bake = Bake::load(path)?;
-        let builtin = Builtin {
-            patches: bake.origin.patches,
-            statue: bake.origin.statue.clone(),
-        };
-        let scene = builtin.load(&bake.origin.scene)?;
-        if scene.hash() != bake.origin.hash || scene.triangles.len() != bake.irradiance.len() {
-            return Err(Error::file(
-                path,
-                format!(
-                    "its scene {} has changed since; bake it again",
-                    bake.origin.scene
-                ),
-            ));
-        }
+        let scene = Builtin::scene_of(path, &bake)?;
         let camera = options.camera.of(&scene)?;
         let view = options.view(&camera);
         let device = options.device.open()?;
