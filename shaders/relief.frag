@@ -7,6 +7,11 @@
 #include "shared/types.glsl"
 #include "shared/directions.glsl"
 
+struct Coefficient {
+    vec3 inside;
+    vec3 arriving;
+};
+
 layout(location = 0) in vec3 corner_position;
 layout(location = 1) flat in uint corner_prism;
 
@@ -18,12 +23,16 @@ layout(scalar, binding = 2) readonly buffer Surfaces { ReliefSurface surfaces[];
 // [surface]
 layout(scalar, binding = 3) readonly buffer Tiles { HeightTile tiles[]; };
 layout(scalar, binding = 4) readonly buffer Pyramids { float pyramid[]; };
-// Irradiance for a unit of β, [surface][cell][corner][rank].
-layout(scalar, binding = 5) readonly buffer Factors { vec3 factors[]; };
-// β of the light, [light vertex][MOST_RANK].
-layout(scalar, binding = 6) readonly buffer Coefficients { vec3 coefficients[]; };
+// Irradiance for a unit of β, [surface][cell][corner][rank]: rgb by light from elsewhere in the relief, w from outside.
+layout(scalar, binding = 5) readonly buffer Factors { vec4 factors[]; };
+// β of the light, [light vertex][MOST_RANK]: of that which goes on inside the relief, and of that which arrives.
+layout(scalar, binding = 6) readonly buffer Coefficients { Coefficient coefficients[]; };
 // Sent light by direction of the vertex's frame, as radiosity πL, [light vertex][direction].
 layout(scalar, binding = 7) readonly buffer Exits { vec3 exits[]; };
+
+layout(scalar, binding = 8) readonly buffer LightPoints { LightPoint light_points[]; };
+// Share of the light of light_points that reaches the vertex, [light vertex].
+layout(scalar, binding = 9) readonly buffer Shares { vec3 light_shares[]; };
 
 layout(push_constant, scalar) uniform Parameters {
     vec3 x;
@@ -37,6 +46,8 @@ layout(push_constant, scalar) uniform Parameters {
     uint view;
     float pixel;         // angle of a sample
     uvec2 cells;         // of the directions
+    uint light_count;    // of light_points; those of emitters come first
+    uint emitter_points;
 };
 
 #include "shared/height_march.glsl"
@@ -44,6 +55,8 @@ layout(push_constant, scalar) uniform Parameters {
 const float PI = 3.14159265358979;
 // Samples wider than so many texels show the mean of the relief.
 const float WIDEST_SAMPLE = 2.0;
+// Rays to lights begin so much of the relief's range above it.
+const float LIFT = 1e-4;
 // Share of a prism's height that counts as its bottom; MARGIN of src/render/relief.rs lies below the relief.
 const float BOTTOM = 5e-4;
 
@@ -54,11 +67,13 @@ struct Place {
     float along;         // on the ray, from corner_position
     vec2 gradient;       // dh/du, dh/dv
     float height;
+    mat3 slopes;         // of u, v and height in space, an internal unit
     bool under;          // seen from below
 };
 
 // Barycentric coordinates along the ray: at + s step.
 struct Tetrahedron {
+    mat3 turn;           // from space to the shares of the last three corners
     vec4 at;
     vec4 step;
     float enter;
@@ -68,13 +83,14 @@ struct Tetrahedron {
 Tetrahedron cut(vec3 a, vec3 b, vec3 c, vec3 d, vec3 from, vec3 along) {
     mat3 edges = mat3(b - a, c - a, d - a);
     float volume = determinant(edges);
-    Tetrahedron result = Tetrahedron(vec4(0.0), vec4(0.0), 1.0, 0.0);
+    Tetrahedron result = Tetrahedron(mat3(0.0), vec4(0.0), vec4(0.0), 1.0, 0.0);
     if (volume == 0.0) {
         return result;
     }
     mat3 turn = inverse(edges);
     vec3 at = turn * (from - a);
     vec3 step = turn * along;
+    result.turn = turn;
     result.at = vec4(1.0 - at.x - at.y - at.z, at);
     result.step = vec4(-step.x - step.y - step.z, step);
     // The ray begins at the eye, at s = -1.
@@ -169,12 +185,55 @@ bool meet(Prism p, ReliefSurface surface, vec3 along, bool plane, out Place plac
             place.gradient = hit.gradient;
             place.height = hit.height;
         }
+        // Corner by corner, u, v and height less those of the first.
+        mat4x3 texture_at = mat3x3(vec3(p.uv_a, 0.0), vec3(p.uv_b, 0.0), vec3(p.uv_c, 0.0)) * mat4x3(shares)
+                          + mat4x3(vec3(0.0, 0.0, rise * shares[0].w), vec3(0.0, 0.0, rise * shares[1].w),
+                                   vec3(0.0, 0.0, rise * shares[2].w), vec3(0.0, 0.0, rise * shares[3].w));
+        mat3 edges = mat3(texture_at[1] - texture_at[0], texture_at[2] - texture_at[0], texture_at[3] - texture_at[0]);
+        place.slopes = transpose(edges * part.turn);
         place.uv = mix(from.xy, to.xy, t);
         place.share = mix(first.xyz, last.xyz, t);
         place.along = mix(part.enter, part.leave, t);
         return true;
     }
     return false;
+}
+
+// Of the surface, outward.
+vec3 facet_normal(Place place) {
+    return normalize(place.slopes * vec3(-place.gradient, 1.0));
+}
+
+// Light straight from emitters and point lights on the surface at a place, by its own normal and shadowed by the relief.
+vec3 sharp(Prism p, ReliefSurface surface, Place place, vec3 at) {
+    vec3 facet = facet_normal(place);
+    float rise = surface.top - surface.lowest;
+    float height = place.height + LIFT * rise;
+    uvec2 pixel_at = uvec2(gl_FragCoord.xy) % 4;
+    uint turn = pixel_at.y * 4 + pixel_at.x;
+    vec3 sum = vec3(0.0);
+    uint emitters = emitter_points / LIGHT_TURNS;
+    for (uint i = 0; i < emitters + light_count - emitter_points; i++) {
+        bool emitter = i < emitters;
+        LightPoint light = light_points[emitter ? i * LIGHT_TURNS + turn : emitter_points + i - emitters];
+        vec3 way = light.position - at;
+        float square = dot(way, way);
+        vec3 towards = way * inversesqrt(square);
+        vec3 local = towards * place.slopes;
+        float cosine = dot(facet, towards);
+        float sent = emitter ? float(LIGHT_TURNS) * max(-dot(light.normal, towards), 0.0) : 1.0;
+        if (local.z <= 0.0 || cosine <= 0.0 || sent == 0.0) {
+            continue;
+        }
+        vec3 from = vec3(place.uv, height);
+        vec3 to = vec3(place.uv + local.xy / local.z * (surface.top - height), surface.top);
+        HeightHit hit;
+        if (!march(tiles[p.surface], from, to, hit)) {
+            sum += light.strength * (sent * cosine / square);
+        }
+    }
+    return sum * (place.share.x * light_shares[p.light_a] + place.share.y * light_shares[p.light_b]
+                + place.share.z * light_shares[p.light_c]);
 }
 
 // E by the factors of the cell at a place, for the light of the three vertices.
@@ -188,12 +247,14 @@ vec3 factored(Prism p, ReliefSurface surface, Place place) {
     vec4 weight = vec4((1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y);
     vec3 sum = vec3(0.0);
     for (uint r = 0; r < surface.rank; r++) {
-        vec3 light = place.share.x * coefficients[p.light_a * MOST_RANK + r]
-                   + place.share.y * coefficients[p.light_b * MOST_RANK + r]
-                   + place.share.z * coefficients[p.light_c * MOST_RANK + r];
-        vec3 factor = weight.x * factors[row + r] + weight.y * factors[row + surface.rank + r]
+        Coefficient a = coefficients[p.light_a * MOST_RANK + r];
+        Coefficient b = coefficients[p.light_b * MOST_RANK + r];
+        Coefficient c = coefficients[p.light_c * MOST_RANK + r];
+        mat3 inside = mat3(a.inside, b.inside, c.inside);
+        mat3 arriving = mat3(a.arriving, b.arriving, c.arriving);
+        vec4 factor = weight.x * factors[row + r] + weight.y * factors[row + surface.rank + r]
                     + weight.z * factors[row + 2 * surface.rank + r] + weight.w * factors[row + 3 * surface.rank + r];
-        sum += factor * light;
+        sum += factor.rgb * (inside * place.share) + factor.w * (arriving * place.share);
     }
     return max(sum, vec3(0.0));
 }
@@ -250,18 +311,22 @@ void main() {
         shown = rho;
         break;
     case VIEW_NORMAL: {
-        vec3 n = normalize(vec3(-place.gradient * surface.slope, 1.0));
-        shown = 0.5 + 0.5 * (n.x * p.tangent + n.y * p.bitangent + n.z * p.normal);
+        shown = 0.5 + 0.5 * facet_normal(place);
         break;
     }
     case VIEW_HEIGHT:
         shown = vec3((place.height - surface.lowest) / (surface.top - surface.lowest));
         break;
     case VIEW_IRRADIANCE:
-        shown = factored(p, surface, place) / PI;
+        shown = (factored(p, surface, place) + sharp(p, surface, place, at)) / PI;
         break;
     default:
-        shown = emitted + (wide ? mean_sent(p, place.share, -normalize(along)) : rho * factored(p, surface, place)) / PI;
+        shown = emitted;
+        if (wide) {
+            shown += mean_sent(p, place.share, -normalize(along)) / PI;
+        } else {
+            shown += rho * (factored(p, surface, place) + sharp(p, surface, place, at)) / PI;
+        }
     }
     radiance = vec4(shown, metered);
 }

@@ -33,6 +33,10 @@ shared! {
     RAY_STRATA = 8;
     /// Most factors of the light on a relief.
     MOST_RANK = 24;
+    /// Points that emitters are taken for where their light on relief is drawn sharply, and how many of them one sample looks
+    /// at: the samples of 4 × 4 pixels take turns.
+    LIGHT_POINTS = 64;
+    LIGHT_TURNS = 16;
     /// How relief is drawn: displaced; only lit, at its mean height; so too, and shifted by its height.
     SHADING_RELIEF = 0;
     SHADING_NORMAL = 1;

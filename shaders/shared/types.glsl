@@ -135,6 +135,14 @@ struct Prism {
     vec3 normal;
 };
 
+// A place that shines on relief: a part of an emitter, or a point light.
+struct LightPoint {
+    vec3 position;      // from the eye, internal units
+    uint kind;          // KIND_SURFACE or KIND_POINT
+    vec3 normal;
+    vec3 strength;      // Le times its area, or radiant intensity
+};
+
 // A relief as it is drawn.
 struct ReliefSurface {
     float lowest;       // of the prisms, in the map's heights

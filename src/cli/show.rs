@@ -2,7 +2,7 @@
 
 use clap::{Args, ValueEnum};
 
-use mesolux::render::{Light, Lighting, ReliefShading, Show};
+use mesolux::render::{Direct, Light, Lighting, ReliefShading, Show};
 
 #[derive(Args)]
 pub struct ShowOptions {
@@ -17,6 +17,14 @@ pub struct ShowOptions {
         conflicts_with = "reference"
     )]
     shading: ShadingName,
+    /// How light straight from emitters falls on relief
+    #[arg(
+        long,
+        value_enum,
+        default_value = "sharp",
+        conflicts_with = "reference"
+    )]
+    direct: DirectName,
     /// What is drawn of surfaces with relief
     #[arg(
         long,
@@ -47,6 +55,14 @@ enum ShadingName {
     Parallax,
     /// As plain triangles
     None,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum DirectName {
+    /// Shadowed by the relief at each pixel
+    Sharp,
+    /// By the slots, as in the paper
+    Slots,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -81,6 +97,10 @@ impl ShowOptions {
                 ShadingName::Normal => ReliefShading::Normal,
                 ShadingName::Parallax => ReliefShading::Parallax,
                 ShadingName::None => ReliefShading::None,
+            },
+            direct: match self.direct {
+                DirectName::Sharp => Direct::Sharp,
+                DirectName::Slots => Direct::Slots,
             },
             show: match self.view {
                 ViewName::Shaded => Show::Shaded,

@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use glam::{DMat3, DVec2, DVec3, Vec3};
+use glam::{DMat3, DVec2, DVec3, Vec3, Vec4};
 use nalgebra::{DMatrix, SymmetricEigen};
 use rayon::prelude::*;
 
@@ -23,9 +23,9 @@ pub struct Factors {
     pub rank: usize,
     /// β_r = Σ_k basis_rk · m_k for the vector moments of each colour, `[rank][slot]`.
     pub basis: Vec<Vec3>,
-    /// Irradiance of each corner of each cell for a unit of β, light that bounces inside the relief included, RGB,
-    /// `[cell][corner][rank]`, corners (0, 0), (1, 0), (0, 1), (1, 1) in u and v.
-    pub corners: Vec<Vec3>,
+    /// Irradiance of each corner of each cell for a unit of β, `[cell][corner][rank]`, corners (0, 0), (1, 0), (0, 1), (1, 1) in
+    /// u and v: RGB by light from elsewhere in the relief, and w by light from outside.
+    pub corners: Vec<Vec4>,
     /// Root mean square, over facets and directions, of what the sum leaves out of the light that arrives directly, over
     /// that of the light.
     pub error: f64,
@@ -92,7 +92,7 @@ impl Factors {
                         .map(|(a, b)| a * b)
                         .sum();
                     let bounced: Vec3 = corner.facets.clone().map(|q| inside[q * rank + r]).sum();
-                    Vec3::splat(own as f32) + bounced * share
+                    (bounced * share).extend(own as f32)
                 })
             })
             .collect();
@@ -130,7 +130,11 @@ impl Factors {
         (0..CORNERS)
             .map(|corner| {
                 let row = &self.corners[(cell * CORNERS + corner) * self.rank..][..self.rank];
-                let sum: Vec3 = row.iter().zip(coefficients).map(|(a, b)| *a * *b).sum();
+                let sum: Vec3 = row
+                    .iter()
+                    .zip(coefficients)
+                    .map(|(a, b)| (a.truncate() + a.w) * *b)
+                    .sum();
                 sum * weights[corner]
             })
             .sum()

@@ -4,12 +4,13 @@
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 use super::buffers::upload;
 use super::shade::Shade;
 use super::shaders;
-use super::types::{HeightTile, Prism, ReliefSurface};
+use super::types::{HeightTile, LightPoint, Prism, ReliefSurface};
+use crate::constants::KIND_SURFACE;
 use crate::error::Result;
 use crate::vk::{
     Bind, Binding, Buffer, BufferUse, Commands, DescriptorSet, Device, Format, GraphicsPipeline,
@@ -38,6 +39,9 @@ pub struct Parameters {
     pub pixel: f32,
     /// Columns and rows of the directions.
     pub cells: [u32; 2],
+    /// Of the light points; those of emitters come first.
+    pub light_count: u32,
+    pub emitter_points: u32,
 }
 
 /// What a picture's relief is made of, `[prism]` and `[surface]`.
@@ -47,16 +51,22 @@ pub struct Parts<'a> {
     pub tiles: &'a [HeightTile],
     pub pyramids: &'a [f32],
     /// `[surface][cell][corner][rank]`
-    pub factors: &'a [Vec3],
-    /// `[light vertex][MOST_RANK]`
-    pub coefficients: &'a [Vec3],
+    pub factors: &'a [Vec4],
+    /// β of the light that goes on inside the relief and of that which arrives by slots, `[light vertex][MOST_RANK]`.
+    pub coefficients: &'a [[Vec3; 2]],
     /// `[light vertex][direction]`
     pub exits: &'a [Vec3],
+    /// Those of emitters first, LIGHT_POINTS or none.
+    pub light_points: &'a [LightPoint],
+    /// Share of their light that arrives, `[light vertex]`.
+    pub light_shares: &'a [Vec3],
 }
 
 /// [`Parts`] on the device.
 pub struct Buffers {
-    parts: [Buffer; 7],
+    parts: [Buffer; 9],
+    light_count: u32,
+    emitter_points: u32,
     vertices: Buffer,
     indices: Buffer,
 }
@@ -90,7 +100,7 @@ impl Relief {
             format,
             offset: offset as u32,
         };
-        let mut bindings = [Binding::Storage; 8];
+        let mut bindings = [Binding::Storage; 10];
         bindings[0] = Binding::Sampled;
         Ok(Self {
             pipeline: GraphicsPipeline::new(
@@ -121,7 +131,7 @@ impl Relief {
         sampler: &Sampler,
         buffers: &Buffers,
     ) -> Result<DescriptorSet> {
-        let [a, b, c, d, e, f, g] = &buffers.parts;
+        let [a, b, c, d, e, f, g, h, i] = &buffers.parts;
         let buffer = Bind::Buffer;
         self.pipeline.bind(
             "relief",
@@ -134,6 +144,8 @@ impl Relief {
                 buffer(e),
                 buffer(f),
                 buffer(g),
+                buffer(h),
+                buffer(i),
             ],
         )
     }
@@ -156,6 +168,11 @@ impl Relief {
 }
 
 impl Buffers {
+    /// All light points, and those of emitters.
+    pub fn light_counts(&self) -> [u32; 2] {
+        [self.light_count, self.emitter_points]
+    }
+
     /// `mirrored` tells of each prism whether its a, b, c turn to the right seen from above.
     pub fn new(device: &Arc<Device>, parts: &Parts<'_>, mirrored: &[bool]) -> Result<Self> {
         let vertices: Vec<Vertex> = (0..)
@@ -185,7 +202,15 @@ impl Buffers {
                 upload(device, "relief factors", parts.factors, storage)?,
                 upload(device, "relief coefficients", parts.coefficients, storage)?,
                 upload(device, "relief exits", parts.exits, storage)?,
+                upload(device, "relief light points", parts.light_points, storage)?,
+                upload(device, "relief light shares", parts.light_shares, storage)?,
             ],
+            light_count: parts.light_points.len() as u32,
+            emitter_points: parts
+                .light_points
+                .iter()
+                .filter(|p| p.kind == KIND_SURFACE)
+                .count() as u32,
             vertices: upload(device, "relief vertices", &vertices, BufferUse::Geometry)?,
             indices: upload(device, "relief indices", &indices, BufferUse::Geometry)?,
         })

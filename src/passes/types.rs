@@ -233,6 +233,18 @@ pub struct Prism {
     pub normal: Vec3,
 }
 
+/// A place that shines on relief: a part of an emitter, or a point light.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct LightPoint {
+    /// From the eye, internal units.
+    pub position: Vec3,
+    pub kind: u32,
+    pub normal: Vec3,
+    /// Le times its area, or radiant intensity, in internal units.
+    pub strength: Vec3,
+}
+
 /// A relief as it is drawn.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]

@@ -68,6 +68,16 @@ impl ReliefShading {
     }
 }
 
+/// How light straight from emitters and point lights falls on relief.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Direct {
+    /// From points on them, shadowed by the relief at each pixel; by the rest of the scene at each vertex.
+    #[default]
+    Sharp,
+    /// By the slots, as in the paper.
+    Slots,
+}
+
 /// What a picture shows of triangles with a relief; of plain ones it shows the shaded surface.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Show {
@@ -106,6 +116,7 @@ pub struct Lighting<'a> {
     pub relief: Option<&'a DirectionalLight>,
     pub part: Light,
     pub shading: ReliefShading,
+    pub direct: Direct,
     pub show: Show,
     /// Folder that keeps the visibility of reliefs from run to run.
     pub cache: Option<&'a Path>,
@@ -119,6 +130,7 @@ impl<'a> Lighting<'a> {
             relief: None,
             part: Light::default(),
             shading: ReliefShading::default(),
+            direct: Direct::default(),
             show: Show::default(),
             cache: None,
         }

@@ -10,6 +10,7 @@
 
 mod compare;
 mod lighting;
+mod lights;
 mod picture;
 mod projection;
 mod relief;
@@ -23,7 +24,7 @@ use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 pub use compare::{Comparison, side_by_side};
-pub use lighting::{Light, Lighting, ReliefShading, Show};
+pub use lighting::{Direct, Light, Lighting, ReliefShading, Show};
 pub use picture::{FileKind, Picture, SAMPLES};
 pub(crate) use projection::Projection;
 pub use smooth::corner_irradiance;
@@ -286,6 +287,7 @@ impl Relief {
     ) {
         let rows = projection.rows(tile);
         let directions = self.mesh.directions;
+        let [light_count, emitter_points] = self.mesh.buffers.light_counts();
         let draws = self.mesh.ranges.iter().zip(&self.sets);
         let draws = draws.map(|(&(material, first, count), set)| {
             let material = &scene.materials[material as usize];
@@ -299,6 +301,8 @@ impl Relief {
                     view: lighting.show.code(),
                     pixel: projection.sample_angle(),
                     cells: [directions.columns, directions.rows],
+                    light_count,
+                    emitter_points,
                 },
             }
         });

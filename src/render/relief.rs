@@ -4,10 +4,11 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use glam::{DVec2, Vec3};
+use glam::{DVec2, Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::{Lighting, Projection};
+use super::lights::{share, shining, spread};
+use super::{Direct, Light, Lighting, Projection};
 use crate::constants::MOST_RANK;
 use crate::directions::Directions;
 use crate::elements::Elements;
@@ -33,9 +34,11 @@ pub struct ReliefMesh {
 }
 
 /// Vertices with light, each as a surface sees it.
+#[derive(Default)]
 struct LightVertices {
-    coefficients: Vec<Vec3>,
+    coefficients: Vec<[Vec3; 2]>,
     exits: Vec<Vec3>,
+    shares: Vec<Option<Vec3>>,
     /// By vertex and surface.
     known: HashMap<(u32, u32), u32>,
 }
@@ -75,18 +78,26 @@ impl ReliefMesh {
         let surfaces = Surfaces::new(scene, &tiles, &factors);
 
         let vertices = MesoVertices::new(scene, light);
-        let moments = lighting.part.of(
-            &light.incident_moment,
-            &light.incident_moment_direct,
-            |all, direct| [0, 1, 2].map(|c| all[c] - direct[c]),
-        );
-        let moments = vertices.gather(&directions, light, &moments);
-        let exits = vertices.mean(&lighting.exits(scene, light), directions.count());
-        let mut lit = LightVertices {
-            coefficients: Vec::new(),
-            exits: Vec::new(),
-            known: HashMap::new(),
+        let gather = |moments| vertices.gather(&directions, light, moments);
+        let all = gather(&light.incident_moment);
+        let direct = gather(&light.incident_moment_direct);
+        let indirect: Vec<[Vec3; 3]> = all
+            .iter()
+            .zip(&direct)
+            .map(|(all, direct)| [0, 1, 2].map(|c| all[c] - direct[c]))
+            .collect();
+        // Light that has bounced inside the relief is indirect, wherever it came from.
+        let sharp = lighting.direct == Direct::Sharp && lighting.part != Light::Indirect;
+        let inside = (lighting.part != Light::Direct).then_some(&all);
+        let arriving = match (lighting.part, sharp) {
+            (Light::Global, false) => Some(&all),
+            (Light::Global, true) | (Light::Indirect, _) => Some(&indirect),
+            (Light::Direct, false) => Some(&direct),
+            (Light::Direct, true) => None,
         };
+        let points = if sharp { shining(scene) } else { Vec::new() };
+        let exits = vertices.mean(&lighting.exits(scene, light), directions.count());
+        let mut lit = LightVertices::default();
         let normals = relief_normals(scene);
         let mut order: Vec<usize> = (0..light.elements.len())
             .filter(|&m| surface_of[light.elements[m] as usize] != u32::MAX)
@@ -115,12 +126,21 @@ impl ReliefMesh {
             let [a, b, c] = corners.map(|k| {
                 let vertex = vertices.corners[m][k];
                 lit.vertex(vertex, surface, |lit| {
-                    let k = directions.count();
-                    let moments = &moments[vertex as usize * k..][..k];
-                    lit.push(
-                        factors[surface as usize].coefficients(moments),
-                        &exits[vertex as usize * k..][..k],
-                    );
+                    let slots = vertex as usize * directions.count();
+                    let slots = slots..slots + directions.count();
+                    let factors = &factors[surface as usize];
+                    let coefficients = |moments: Option<&Vec<[Vec3; 3]>>| {
+                        let found = moments.map(|m| factors.coefficients(&m[slots.clone()]));
+                        found.into_iter().flatten().collect::<Vec<_>>()
+                    };
+                    lit.push(&coefficients(inside), &coefficients(arriving));
+                    lit.exits.extend_from_slice(&exits[slots.clone()]);
+                    lit.shares.push(share(
+                        &points,
+                        scene.vertices[triangle.vertices[k] as usize],
+                        vertices.frames[vertex as usize].map(|axis| axis.as_dvec3()),
+                        &direct[slots],
+                    ));
                 })
             });
             let [tangent, bitangent, normal] = light.frames[m];
@@ -163,6 +183,11 @@ impl ReliefMesh {
             factors: &surfaces.factors,
             coefficients: &lit.coefficients,
             exits: &lit.exits,
+            light_points: &points
+                .iter()
+                .map(|p| p.seen_from(projection))
+                .collect::<Vec<_>>(),
+            light_shares: &spread(lit.shares, &corners_of(&prisms)),
         };
         Ok(Self {
             buffers: Buffers::new(device, &parts, &mirrored)?,
@@ -170,6 +195,12 @@ impl ReliefMesh {
             ranges,
         })
     }
+}
+
+/// The light vertices of the prisms.
+fn corners_of(prisms: &[Prism]) -> Vec<[u32; 3]> {
+    let corners = |p: &Prism| [p.light_a, p.light_b, p.light_c];
+    prisms.iter().map(corners).collect()
 }
 
 impl LightVertices {
@@ -184,12 +215,11 @@ impl LightVertices {
         next
     }
 
-    fn push(&mut self, coefficients: impl Iterator<Item = Vec3>, exits: &[Vec3]) {
-        let most = MOST_RANK as usize;
-        let end = self.coefficients.len() + most;
-        self.coefficients.extend(coefficients.take(most));
-        self.coefficients.resize(end, Vec3::ZERO);
-        self.exits.extend_from_slice(exits);
+    /// Coefficients `[rank]`; none for no light.
+    fn push(&mut self, inside: &[Vec3], arriving: &[Vec3]) {
+        let of = |values: &[Vec3], r: usize| values.get(r).copied().unwrap_or_default();
+        let both = (0..MOST_RANK as usize).map(|r| [of(inside, r), of(arriving, r)]);
+        self.coefficients.extend(both);
     }
 }
 
@@ -216,7 +246,7 @@ struct Surfaces {
     tiles: Vec<HeightTile>,
     ranges: Vec<Range>,
     pyramids: Vec<f32>,
-    factors: Vec<Vec3>,
+    factors: Vec<Vec4>,
 }
 
 impl Surfaces {
