@@ -1,6 +1,7 @@
 //! Benchmarks: release builds, median and spread, alternatives side by side.
 
 mod difference;
+pub mod frame;
 pub mod hemicube;
 pub mod irradiance;
 pub mod table1;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::{Builtin, DeviceOptions};
-use mesolux::bench::{hemicube, irradiance, table1};
+use mesolux::bench::{frame, hemicube, irradiance, table1};
 use mesolux::error::{Error, Result};
 use mesolux::solution::Bake;
 
@@ -18,6 +18,8 @@ pub struct Options {
 
 #[derive(Subcommand)]
 enum What {
+    /// Milliseconds a frame of the three scenes, by shading of the relief and number of directions
+    Frame(FrameOptions),
     /// Hemicubes a second in the Cornell box, with and without culling, side by side
     Hemicube(HemicubeOptions),
     /// Irradiance of bakes of one scene, on what has no relief, against path traced irradiance with the relief as geometry
@@ -43,6 +45,26 @@ struct Table1Options {
     /// Leave out the bake of the relief as geometry, which takes longest
     #[arg(long)]
     no_high_poly: bool,
+    #[command(flatten)]
+    device: DeviceOptions,
+}
+
+#[derive(Args)]
+struct FrameOptions {
+    /// Folder for frame.csv, frame.json and frame.svg
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Only these scenes; the three of Table 1 if not given
+    #[arg(long, value_name = "SCENE")]
+    scene: Vec<String>,
+    /// Pixels across and down, one sample each
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = super::render::size)]
+    size: (u32, u32),
+    /// Rounds; each draws every kind of frame once
+    #[arg(long, value_name = "N", default_value_t = 15)]
+    rounds: usize,
+    #[command(flatten)]
+    builtin: Builtin,
     #[command(flatten)]
     device: DeviceOptions,
 }
@@ -80,9 +102,35 @@ struct HemicubeOptions {
 pub fn run(options: &Options) -> Result<()> {
     match &options.what {
         What::Hemicube(options) => run_hemicube(options),
+        What::Frame(options) => run_frame(options),
         What::Irradiance(options) => run_irradiance(options),
         What::Table1(options) => run_table1(options),
     }
+}
+
+fn run_frame(options: &FrameOptions) -> Result<()> {
+    let all = || table1::SCENES.iter().map(|s| s.0.to_owned()).collect();
+    let scenes: Vec<String> = match options.scene.is_empty() {
+        true => all(),
+        false => options.scene.clone(),
+    };
+    let device = options.device.open()?;
+    let cache = super::bake::cache_folder();
+    let wanted = frame::Options {
+        size: options.size,
+        rounds: options.rounds.max(1),
+        shots: 256,
+        cache: cache.as_deref(),
+    };
+    println!("{}; {}x{}", device.name(), options.size.0, options.size.1);
+    println!("{}", frame::HEADER);
+    let mut rows = Vec::new();
+    for name in &scenes {
+        let scene = options.builtin.load(name)?;
+        frame::run(&device, &scene, &wanted, &mut rows)?;
+        frame::write(&rows, &options.output)?;
+    }
+    options.device.check()
 }
 
 fn run_irradiance(options: &IrradianceOptions) -> Result<()> {

@@ -46,7 +46,7 @@ pub struct Options {
     device: DeviceOptions,
 }
 
-fn size(text: &str) -> std::result::Result<(u32, u32), String> {
+pub fn size(text: &str) -> std::result::Result<(u32, u32), String> {
     let wrong = || "must be like 1280x720".to_owned();
     let (w, h) = text.split_once(['x', 'X', '×']).ok_or_else(wrong)?;
     Ok((

@@ -64,10 +64,10 @@ impl Projection {
         (w + x * (across / x.length_squared()) + y * (down / y.length_squared())).normalize()
     }
 
-    /// Angle of a sample in the picture's middle, radians.
-    pub fn sample_angle(&self) -> f32 {
+    /// Angle of one of so many samples along a pixel's side in the picture's middle, radians.
+    pub fn sample_angle(&self, samples: u32) -> f32 {
         // Half of the picture's height is 1 / |y| at a distance of 1.
-        (2.0 / (self.rows[1].length() * self.size[1] * f64::from(super::SAMPLES))) as f32
+        (2.0 / (self.rows[1].length() * self.size[1] * f64::from(samples))) as f32
     }
 
     /// Rows x, y and w over a tile alone.

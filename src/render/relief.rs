@@ -1,313 +1,87 @@
-//! What the relief pass draws: prisms over the triangles with relief, their height maps, factors and light.
+//! The relief of a picture, ready to be drawn.
 
-use std::collections::HashMap;
-use std::path::Path;
 use std::sync::Arc;
 
-use glam::{DVec2, Vec3, Vec4};
-use rayon::prelude::*;
-
-use super::lights::{share, shining, spread};
-use super::{Direct, Light, Lighting, Projection};
-use crate::constants::MOST_RANK;
-use crate::directions::Directions;
-use crate::elements::Elements;
+use super::Lighting;
+use super::mesh::parameters;
+use super::projection::{Projection, Tile};
+use super::relief_mesh::ReliefMesh;
+use super::textures::Textures;
 use crate::error::Result;
-use crate::meso::{Factors, HeightPyramid, MesoVertices, Tile, tiles, visibility};
-use crate::passes::relief::{Buffers, Parts};
-use crate::passes::types::{HeightTile, Prism, ReliefSurface};
-use crate::scene::{HeightMap, Material, Scene, relief_normals};
-use crate::solution::DirectionalLight;
-use crate::vk::Device;
+use crate::passes;
+use crate::passes::shade::Shade;
+use crate::scene::Scene;
+use crate::vk::{Commands, DescriptorSet, Device, Sampler};
 
-/// What the factors may leave out of the light, see [`Factors::error`].
-const FACTOR_ERROR: f64 = 0.01;
-/// Prisms reach this share of the relief's range beyond it, so that a ray begins above it for certain.
-const MARGIN: f64 = 1e-3;
-
-/// The relief of a scene on the device.
-pub struct ReliefMesh {
-    pub buffers: Buffers,
-    pub directions: Directions,
-    /// Material, first prism, count.
-    pub ranges: Vec<(u32, u32, u32)>,
+/// The relief of a picture, ready to be drawn.
+pub struct Relief {
+    pass: passes::relief::Relief,
+    mesh: ReliefMesh,
+    /// One for each range of the mesh.
+    sets: Vec<DescriptorSet>,
+    shading: u32,
+    _sampler: Sampler,
 }
 
-/// Vertices with light, each as a surface sees it.
-#[derive(Default)]
-struct LightVertices {
-    coefficients: Vec<[Vec3; 2]>,
-    exits: Vec<Vec3>,
-    shares: Vec<Option<Vec3>>,
-    /// By vertex and surface.
-    known: HashMap<(u32, u32), u32>,
-}
-
-impl ReliefMesh {
-    /// `cache` keeps the visibility of reliefs from run to run.
+impl Relief {
+    /// None where nothing with relief is drawn as such.
     pub fn new(
         device: &Arc<Device>,
+        shade: &Shade,
         scene: &Scene,
         lighting: &Lighting<'_>,
-        light: &DirectionalLight,
+        textures: &Textures,
         projection: &Projection,
-        cache: Option<&Path>,
-    ) -> Result<Self> {
-        let directions = Directions::new(light.directions.len() as u32)?;
-        let elements = Elements::new(scene);
-        let (tiles, _) = tiles(scene, &elements)?;
-        let mut surface_of = vec![u32::MAX; scene.triangles.len()];
-        for (surface, tile) in (0..).zip(&tiles) {
-            for &e in &tile.members {
-                surface_of[elements.input_index[e] as usize] = surface;
-            }
-        }
-        let mut marcher = None;
-        let mut factors = Vec::with_capacity(tiles.len());
-        for tile in &tiles {
-            let (visibility, _) = visibility(device, &tile.field, cache, &mut marcher)?;
-            let error = FACTOR_ERROR;
-            factors.push(Factors::new(
-                &directions,
-                &tile.field,
-                &visibility,
-                &tile.shading,
-                error,
-            ));
-        }
-        let surfaces = Surfaces::new(scene, &tiles, &factors);
-
-        let vertices = MesoVertices::new(scene, light);
-        let gather = |moments| vertices.gather(&directions, light, moments);
-        let all = gather(&light.incident_moment);
-        let direct = gather(&light.incident_moment_direct);
-        let indirect: Vec<[Vec3; 3]> = all
+    ) -> Result<Option<Self>> {
+        let Some((light, shading)) = lighting.relief() else {
+            return Ok(None);
+        };
+        let pass = passes::relief::Relief::new(device, shade)?;
+        let mesh = ReliefMesh::new(device, scene, lighting, light, projection, lighting.cache)?;
+        let sampler = Sampler::new(device, "relief albedo", true)?;
+        let sets = mesh
+            .ranges
             .iter()
-            .zip(&direct)
-            .map(|(all, direct)| [0, 1, 2].map(|c| all[c] - direct[c]))
-            .collect();
-        // Light that has bounced inside the relief is indirect, wherever it came from.
-        let sharp = lighting.direct == Direct::Sharp && lighting.part != Light::Indirect;
-        let inside = (lighting.part != Light::Direct).then_some(&all);
-        let arriving = match (lighting.part, sharp) {
-            (Light::Global, false) => Some(&all),
-            (Light::Global, true) | (Light::Indirect, _) => Some(&indirect),
-            (Light::Direct, false) => Some(&direct),
-            (Light::Direct, true) => None,
-        };
-        let points = if sharp { shining(scene) } else { Vec::new() };
-        let exits = vertices.mean(&lighting.exits(scene, light), directions.count());
-        let mut lit = LightVertices::default();
-        let normals = relief_normals(scene);
-        let mut order: Vec<usize> = (0..light.elements.len())
-            .filter(|&m| surface_of[light.elements[m] as usize] != u32::MAX)
-            .collect();
-        order.sort_by_key(|&m| scene.triangles[light.elements[m] as usize].material);
-        let mut prisms = Vec::with_capacity(order.len());
-        let mut mirrored = Vec::with_capacity(order.len());
-        for &m in &order {
-            let e = light.elements[m] as usize;
-            let triangle = &scene.triangles[e];
-            let surface = surface_of[e];
-            let tile = &tiles[surface as usize];
-            let (material, range) = (
-                &scene.materials[triangle.material as usize],
-                &surfaces.ranges[surface as usize],
-            );
-            let mut corners = [0, 1, 2];
-            corners.sort_by_key(|&k| triangle.vertices[k]);
-            let place = |k: usize, height: f64| {
-                let vertex = triangle.vertices[corners[k]] as usize;
-                let at = scene.vertices[vertex] + normals[vertex] * range.above(height);
-                ((at - projection.eye) / projection.unit).as_vec3()
-            };
-            let uv = corners.map(|k| DVec2::from(triangle.uv[k].map(f64::from)));
-            let whole = uv[0].floor();
-            let [a, b, c] = corners.map(|k| {
-                let vertex = vertices.corners[m][k];
-                lit.vertex(vertex, surface, |lit| {
-                    let slots = vertex as usize * directions.count();
-                    let slots = slots..slots + directions.count();
-                    let factors = &factors[surface as usize];
-                    let coefficients = |moments: Option<&Vec<[Vec3; 3]>>| {
-                        let found = moments.map(|m| factors.coefficients(&m[slots.clone()]));
-                        found.into_iter().flatten().collect::<Vec<_>>()
-                    };
-                    lit.push(&coefficients(inside), &coefficients(arriving));
-                    lit.exits.extend_from_slice(&exits[slots.clone()]);
-                    lit.shares.push(share(
-                        &points,
-                        scene.vertices[triangle.vertices[k] as usize],
-                        vertices.frames[vertex as usize].map(|axis| axis.as_dvec3()),
-                        &direct[slots],
-                    ));
-                })
-            });
-            let [tangent, bitangent, normal] = light.frames[m];
-            let texel = tile.size / surfaces.size(surface);
-            prisms.push(Prism {
-                low_a: place(0, range.lowest),
-                low_b: place(1, range.lowest),
-                low_c: place(2, range.lowest),
-                high_a: place(0, range.highest),
-                high_b: place(1, range.highest),
-                high_c: place(2, range.highest),
-                uv_a: (uv[0] - whole).as_vec2(),
-                uv_b: (uv[1] - whole).as_vec2(),
-                uv_c: (uv[2] - whole).as_vec2(),
-                light_a: a,
-                light_b: b,
-                light_c: c,
-                surface,
-                tangent,
-                texel: (texel.min_element() / projection.unit) as f32,
-                bitangent,
-                normal,
-            });
-            debug_assert!(material.has_relief());
-            mirrored.push(matches!(corners, [0, 2, 1] | [1, 0, 2] | [2, 1, 0]));
-        }
-        let mut ranges: Vec<(u32, u32, u32)> = Vec::new();
-        for (at, &m) in (0..).zip(&order) {
-            let material = scene.triangles[light.elements[m] as usize].material;
-            match ranges.last_mut() {
-                Some((last, _, count)) if *last == material => *count += 1,
-                _ => ranges.push((material, at, 1)),
+            .map(|&(material, ..)| pass.bind(textures.image(material), &sampler, &mesh.buffers))
+            .collect::<Result<_>>()?;
+        Ok(Some(Self {
+            pass,
+            mesh,
+            sets,
+            shading,
+            _sampler: sampler,
+        }))
+    }
+
+    pub fn record(
+        &self,
+        cmd: &Commands,
+        scene: &Scene,
+        lighting: &Lighting<'_>,
+        projection: &Projection,
+        (tile, samples): (Tile, u32),
+    ) {
+        let rows = projection.rows(tile);
+        let directions = self.mesh.directions;
+        let [light_count, emitter_points] = self.mesh.buffers.light_counts();
+        let draws = self.mesh.ranges.iter().zip(&self.sets);
+        let draws = draws.map(|(&(material, first, count), set)| {
+            let material = &scene.materials[material as usize];
+            passes::relief::Draw {
+                first_prism: first,
+                prism_count: count,
+                set,
+                parameters: passes::relief::Parameters {
+                    shade: parameters(rows, Some(material), lighting.part),
+                    shading: self.shading,
+                    view: lighting.show.code(),
+                    pixel: projection.sample_angle(samples),
+                    cells: [directions.columns, directions.rows],
+                    light_count,
+                    emitter_points,
+                },
             }
-        }
-        let parts = Parts {
-            prisms: &prisms,
-            surfaces: &surfaces.list,
-            tiles: &surfaces.tiles,
-            pyramids: &surfaces.pyramids,
-            factors: &surfaces.factors,
-            coefficients: &lit.coefficients,
-            exits: &lit.exits,
-            light_points: &points
-                .iter()
-                .map(|p| p.seen_from(projection))
-                .collect::<Vec<_>>(),
-            light_shares: &spread(lit.shares, &corners_of(&prisms)),
-        };
-        Ok(Self {
-            buffers: Buffers::new(device, &parts, &mirrored)?,
-            directions,
-            ranges,
-        })
+        });
+        self.pass.record(cmd, &self.mesh.buffers, draws);
     }
-}
-
-/// The light vertices of the prisms.
-fn corners_of(prisms: &[Prism]) -> Vec<[u32; 3]> {
-    let corners = |p: &Prism| [p.light_a, p.light_b, p.light_c];
-    prisms.iter().map(corners).collect()
-}
-
-impl LightVertices {
-    fn vertex(&mut self, vertex: u32, surface: u32, make: impl FnOnce(&mut Self)) -> u32 {
-        let next = self.known.len() as u32;
-        let key = (vertex, surface);
-        if let Some(&known) = self.known.get(&key) {
-            return known;
-        }
-        self.known.insert(key, next);
-        make(self);
-        next
-    }
-
-    /// Coefficients `[rank]`; none for no light.
-    fn push(&mut self, inside: &[Vec3], arriving: &[Vec3]) {
-        let of = |values: &[Vec3], r: usize| values.get(r).copied().unwrap_or_default();
-        let both = (0..MOST_RANK as usize).map(|r| [of(inside, r), of(arriving, r)]);
-        self.coefficients.extend(both);
-    }
-}
-
-/// Heights of a relief's prisms, in the map's values with the sign of their scale.
-struct Range {
-    lowest: f64,
-    highest: f64,
-    mean: f64,
-    /// Scene units for a unit of height, positive.
-    scale: f64,
-}
-
-impl Range {
-    /// Scene units above the mesh.
-    fn above(&self, height: f64) -> f64 {
-        self.scale * (height - self.mean)
-    }
-}
-
-/// What the surfaces share buffers for, `[surface]`.
-#[derive(Default)]
-struct Surfaces {
-    list: Vec<ReliefSurface>,
-    tiles: Vec<HeightTile>,
-    ranges: Vec<Range>,
-    pyramids: Vec<f32>,
-    factors: Vec<Vec4>,
-}
-
-impl Surfaces {
-    fn new(scene: &Scene, tiles: &[Tile], factors: &[Factors]) -> Self {
-        let mut all = Self::default();
-        let mut pyramids: HashMap<u32, HeightTile> = HashMap::new();
-        for (tile, factors) in tiles.iter().zip(factors) {
-            let material = &scene.materials[tile.material as usize];
-            let Some(map) = upward(material) else {
-                continue;
-            };
-            let values = &mut all.pyramids;
-            let height_tile = *pyramids.entry(tile.material).or_insert_with(|| {
-                let pyramid = HeightPyramid::new(&map);
-                let tile = HeightTile::new(&pyramid, values.len() as u32);
-                values.extend(&pyramid.values);
-                tile
-            });
-            let (low, high) = map
-                .values
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| {
-                    (low.min(f64::from(v)), high.max(f64::from(v)))
-                });
-            let margin = MARGIN * (high - low);
-            let range = Range {
-                lowest: low - margin,
-                highest: high + margin,
-                mean: map.mean(),
-                scale: f64::from(material.height_scale.abs()),
-            };
-            all.list.push(ReliefSurface {
-                lowest: range.lowest as f32,
-                top: range.highest as f32,
-                mean: range.mean as f32,
-                columns: tile.field.columns,
-                rows: tile.field.rows,
-                rank: factors.rank as u32,
-                first_factor: all.factors.len() as u32,
-                slope: (range.scale / tile.size).as_vec2(),
-            });
-            all.tiles.push(height_tile);
-            all.ranges.push(range);
-            all.factors.extend(&factors.corners);
-        }
-        all
-    }
-
-    /// Texels of a surface's height map.
-    fn size(&self, surface: u32) -> DVec2 {
-        let tile = &self.tiles[surface as usize];
-        DVec2::new(f64::from(tile.width), f64::from(tile.height))
-    }
-}
-
-/// The height map with the sign of its scale, so that higher is further out.
-fn upward(material: &Material) -> Option<HeightMap> {
-    let map = material.map_height.as_deref()?;
-    let sign = material.height_scale.signum();
-    Some(HeightMap {
-        values: map.values.par_iter().map(|v| sign * v).collect(),
-        ..map.clone()
-    })
 }

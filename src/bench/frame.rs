@@ -1,0 +1,312 @@
+//! `mesolux bench frame`: how long a frame takes, by scene, number of directions and shading.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::DVec3;
+use plotters::prelude::*;
+use serde::Serialize;
+
+use super::spread;
+use crate::atomic_file::write_atomically;
+use crate::bake;
+use crate::directions::Directions;
+use crate::error::{Error, Result};
+use crate::meso::Options as ReliefOptions;
+use crate::render::{Direct, Lighting, ReliefShading, Renderer, View};
+use crate::scene::{Camera, Scene};
+use crate::solution::Solution;
+use crate::solver::Settings;
+use crate::vk::Device;
+
+/// What is to be measured.
+pub struct Options<'a> {
+    pub size: (u32, u32),
+    /// Rounds; in each, every kind of frame is drawn once.
+    pub rounds: usize,
+    /// Shots of the bakes: a frame takes as long whatever the light is.
+    pub shots: u32,
+    pub cache: Option<&'a Path>,
+}
+
+/// One kind of frame.
+#[derive(Debug, Clone, Serialize)]
+pub struct Row {
+    pub scene: String,
+    /// The scene's own camera, or `relief`, all of whose frame shows relief.
+    pub camera: String,
+    pub shading: String,
+    /// None for plain triangles.
+    pub directions: Option<u32>,
+    pub width: u32,
+    pub height: u32,
+    /// Share of the pixels that show relief.
+    pub relief: f64,
+    /// Milliseconds: median, and the 10 % and 90 % points.
+    pub median: f64,
+    pub low: f64,
+    pub high: f64,
+}
+
+/// How frames are drawn, by name.
+const SHADINGS: [(&str, ReliefShading, Direct); 5] = [
+    ("none", ReliefShading::None, Direct::Slots),
+    ("normal", ReliefShading::Normal, Direct::Slots),
+    ("parallax", ReliefShading::Parallax, Direct::Slots),
+    ("factored, slots", ReliefShading::Factored, Direct::Slots),
+    ("factored, sharp", ReliefShading::Factored, Direct::Sharp),
+];
+const DIRECTIONS: [u32; 3] = [16, 32, 64];
+
+/// Measures frames of one scene, prints them, and appends them to `rows`.
+pub fn run(
+    device: &Arc<Device>,
+    scene: &Scene,
+    options: &Options<'_>,
+    rows: &mut Vec<Row>,
+) -> Result<()> {
+    let solutions = DIRECTIONS
+        .iter()
+        .map(|&k| {
+            let settings = Settings {
+                shots: Some(options.shots),
+                relief: ReliefOptions {
+                    directions: Directions::new(k)?,
+                    cache: options.cache.map(Path::to_owned),
+                    ..ReliefOptions::default()
+                },
+                ..Settings::default()
+            };
+            bake::bake(device, scene, &settings, |_| true)
+        })
+        .collect::<Result<Vec<Solution>>>()?;
+    let own = scene.cameras.first().cloned().ok_or_else(|| {
+        Error::Usage(format!(
+            "scene {} has no camera to draw frames from",
+            scene.name
+        ))
+    })?;
+    for camera in [Some(own.clone()), close(scene, &solutions[0], &own)]
+        .into_iter()
+        .flatten()
+    {
+        let view = View {
+            camera: &camera,
+            width: options.size.0,
+            height: options.size.1,
+        };
+        let mut under = Vec::new();
+        for (name, shading, direct) in SHADINGS {
+            for (&k, solution) in DIRECTIONS.iter().zip(&solutions) {
+                if shading == ReliefShading::None && k != DIRECTIONS[0] {
+                    continue;
+                }
+                let lighting = Lighting {
+                    shading,
+                    direct,
+                    cache: options.cache,
+                    ..Lighting::from(solution)
+                };
+                let renderer = Renderer::new(device, scene, lighting, &view)?;
+                let row = Row {
+                    scene: scene.name.clone(),
+                    camera: camera.name.clone(),
+                    shading: name.into(),
+                    directions: (shading != ReliefShading::None).then_some(k),
+                    width: view.width,
+                    height: view.height,
+                    relief: renderer.relief_coverage()?,
+                    median: 0.0,
+                    low: 0.0,
+                    high: 0.0,
+                };
+                under.push((row, renderer, Vec::new()));
+            }
+        }
+        // In turns, so that what slows the machine slows all of them; the first round warms up.
+        for round in 0..=options.rounds {
+            for (_, renderer, times) in &mut under {
+                let taken = renderer.frames(1)?;
+                if round > 0 {
+                    times.extend(taken.iter().map(|s| 1e3 * s));
+                }
+            }
+        }
+        let first = rows.len();
+        for (mut row, _, mut times) in under {
+            (row.median, row.low, row.high) = spread(&mut times);
+            rows.push(row);
+        }
+        for row in &rows[first..] {
+            println!("{}", line(row, &rows[first..]));
+        }
+    }
+    Ok(())
+}
+
+pub const HEADER: &str = "scene             camera   shading           K  relief   ms a frame (10 % to 90 %)    over K = 16  over none";
+
+fn line(row: &Row, others: &[Row]) -> String {
+    let over =
+        |other: Option<&Row>| other.map_or("-".into(), |o| format!("{:.3}", row.median / o.median));
+    let sixteen = others
+        .iter()
+        .find(|o| o.shading == row.shading && o.directions == Some(16));
+    format!(
+        "{:<17} {:<8} {:<16} {:>2} {:>6.1}% {:>9.1} ({:.1} to {:.1}) {:>13} {:>10}",
+        row.scene,
+        row.camera,
+        row.shading,
+        row.directions.map_or("-".into(), |k| k.to_string()),
+        100.0 * row.relief,
+        row.median,
+        row.low,
+        row.high,
+        over(sixteen.filter(|_| row.directions.is_some())),
+        over(others.iter().find(|o| o.shading == "none"))
+    )
+}
+
+/// A camera that sees the relief alone: from the scene's camera towards an element near the middle of the relief, narrowed
+/// until a sphere about it of a tenth of the relief's extent fills the frame.
+fn close(scene: &Scene, solution: &Solution, own: &Camera) -> Option<Camera> {
+    let relief = solution.relief.as_ref()?;
+    let centroid = |e: u32| {
+        let corners = scene.corners(&scene.triangles[e as usize]);
+        corners.iter().sum::<DVec3>() / 3.0
+    };
+    let facing = |e: u32| {
+        let [a, b, c] = scene.corners(&scene.triangles[e as usize]);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        normal.dot((own.position - a).normalize_or_zero())
+    };
+    let count = relief.elements.len() as f64;
+    let middle = relief.elements.iter().map(|&e| centroid(e)).sum::<DVec3>() / count;
+    let extent = relief
+        .elements
+        .iter()
+        .map(|&e| centroid(e).distance(middle))
+        .sum::<f64>()
+        / count;
+    let nearest = relief
+        .elements
+        .iter()
+        .filter(|&&e| facing(e) > 0.5)
+        .min_by(|&&a, &&b| {
+            let far = |e| centroid(e).distance(middle) - facing(e) * extent;
+            far(a).total_cmp(&far(b))
+        })?;
+    let at = centroid(*nearest);
+    Some(Camera {
+        name: "relief".into(),
+        look_at: at,
+        fov_y: 2.0
+            * (0.1 * extent / own.position.distance(at))
+                .atan()
+                .to_degrees(),
+        ..own.clone()
+    })
+}
+
+/// Writes `frame.csv`, `frame.json` and `frame.svg` into `folder`.
+pub fn write(rows: &[Row], folder: &Path) -> Result<()> {
+    std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, e))?;
+    let json = folder.join("frame.json");
+    let text = serde_json::to_string_pretty(rows).map_err(|e| Error::file(&json, e.to_string()))?;
+    write_atomically(&json, |out| out.write_all(text.as_bytes()))?;
+    write_atomically(&folder.join("frame.csv"), |out| {
+        writeln!(
+            out,
+            "scene,camera,shading,directions,width,height,relief,median_ms,low_ms,high_ms"
+        )?;
+        for r in rows {
+            writeln!(
+                out,
+                "{},{},\"{}\",{},{},{},{},{},{},{}",
+                r.scene,
+                r.camera,
+                r.shading,
+                r.directions.map_or(String::new(), |k| k.to_string()),
+                r.width,
+                r.height,
+                r.relief,
+                r.median,
+                r.low,
+                r.high
+            )?;
+        }
+        Ok(())
+    })?;
+    let path = folder.join("frame.svg");
+    let mut svg = String::new();
+    plot(rows, &mut svg).map_err(|e| Error::file(&path, format!("cannot be drawn: {e}")))?;
+    write_atomically(&path, |out| out.write_all(svg.as_bytes()))
+}
+
+/// Bars of milliseconds with their spread, one group for a scene and camera, K = 64 of each shading.
+fn plot(rows: &[Row], svg: &mut String) -> std::result::Result<(), Box<dyn std::error::Error>> {
+    let mut groups: Vec<(&str, &str)> = Vec::new();
+    for row in rows {
+        let group = (row.scene.as_str(), row.camera.as_str());
+        if !groups.contains(&group) {
+            groups.push(group);
+        }
+    }
+    let highest = rows.iter().map(|r| r.high).fold(1.0, f64::max);
+    let root = SVGBackend::with_string(svg, (1100, 480)).into_drawing_area();
+    root.fill(&WHITE)?;
+    let mut chart = ChartBuilder::on(&root)
+        .caption("Time of a frame, K = 64", ("sans-serif", 22))
+        .margin(12)
+        .x_label_area_size(34)
+        .y_label_area_size(60)
+        .build_cartesian_2d(0.0..groups.len() as f64, 0.0..1.1 * highest)?;
+    let name = |x: &f64| {
+        let middle = (x.fract() - 0.5).abs() < 1e-6;
+        let group = groups.get(*x as usize).filter(|_| middle);
+        group.map_or(String::new(), |(scene, camera)| {
+            format!("{scene}, {camera}")
+        })
+    };
+    chart
+        .configure_mesh()
+        .disable_x_mesh()
+        .x_labels(2 * groups.len() + 1)
+        .x_label_formatter(&name)
+        .y_desc("milliseconds")
+        .draw()?;
+    for (k, (shading, ..)) in SHADINGS.iter().enumerate() {
+        let colour = Palette99::pick(k).to_rgba();
+        let of = |r: &&Row| r.shading == *shading && r.directions.is_none_or(|k| k == 64);
+        let bars: Vec<_> = rows
+            .iter()
+            .filter(of)
+            .map(|r| {
+                let group = groups
+                    .iter()
+                    .position(|g| *g == (r.scene.as_str(), r.camera.as_str()));
+                (group.unwrap_or(0) as f64 + 0.1 + 0.16 * k as f64, r)
+            })
+            .collect();
+        chart
+            .draw_series(
+                bars.iter().map(|&(x, r)| {
+                    Rectangle::new([(x, 0.0), (x + 0.14, r.median)], colour.filled())
+                }),
+            )?
+            .label(*shading)
+            .legend(move |(x, y)| Rectangle::new([(x, y - 5), (x + 12, y + 5)], colour.filled()));
+        chart.draw_series(
+            bars.iter()
+                .map(|&(x, r)| PathElement::new([(x + 0.07, r.low), (x + 0.07, r.high)], BLACK)),
+        )?;
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::UpperLeft)
+        .background_style(WHITE.mix(0.8))
+        .border_style(BLACK.mix(0.3))
+        .draw()?;
+    root.present()?;
+    Ok(())
+}

@@ -1,0 +1,87 @@
+//! Samples gathered into pixels, tile by tile.
+
+use rayon::prelude::*;
+
+use super::picture::{self, Picture, SAMPLES, Samples};
+use super::projection::Tile;
+use super::{View, tone};
+
+/// A pixel keeps its samples where a channel's lowest is below this share of its highest: nearer together, the tone curve is
+/// straight enough that the mean alone gives the same code.
+const CONTRAST: f32 = 0.8;
+
+/// What has been drawn so far.
+pub struct Gathered {
+    width: u32,
+    radiance: Vec<[f32; 3]>,
+    contrasts: Vec<(u32, Samples)>,
+    /// Luminance of the pixels that an exposure meter looks at.
+    metered: Vec<f32>,
+}
+
+impl Gathered {
+    pub fn new(view: &View<'_>) -> Self {
+        Self {
+            width: view.width,
+            radiance: vec![[0.0; 3]; view.width as usize * view.height as usize],
+            contrasts: Vec::new(),
+            metered: Vec::new(),
+        }
+    }
+
+    /// Takes a tile's samples, rows of `stride`.
+    pub fn add(&mut self, tile: Tile, samples: &[[f32; 4]], stride: usize) {
+        let side = SAMPLES as usize;
+        let rows: Vec<Vec<(Samples, bool)>> = (0..tile.height as usize)
+            .into_par_iter()
+            .map(|row| {
+                (0..tile.width as usize)
+                    .map(|column| {
+                        let sample = |i: usize| {
+                            samples[(row * side + i / side) * stride + column * side + i % side]
+                        };
+                        let colours = std::array::from_fn(|i| {
+                            let [r, g, b, _] = sample(i);
+                            [r, g, b]
+                        });
+                        (colours, (0..side * side).all(|i| sample(i)[3] > 0.5))
+                    })
+                    .collect()
+            })
+            .collect();
+        for (row, pixels) in rows.into_iter().enumerate() {
+            let start = (tile.row + row as u32) * self.width + tile.column;
+            for (place, (samples, metered)) in (start..).zip(pixels) {
+                let mean = picture::mean(&samples);
+                self.radiance[place as usize] = mean;
+                if metered {
+                    self.metered.push(tone::luminance(mean));
+                }
+                if contrasts(&samples) {
+                    self.contrasts.push((place, samples));
+                }
+            }
+        }
+    }
+
+    pub fn into_picture(mut self, view: &View<'_>) -> Picture {
+        self.contrasts.par_sort_unstable_by_key(|c| c.0);
+        Picture {
+            width: view.width,
+            height: view.height,
+            radiance: self.radiance,
+            automatic_exposure: picture::automatic_exposure(&mut self.metered),
+            contrasts: self.contrasts,
+        }
+    }
+}
+
+fn contrasts(samples: &Samples) -> bool {
+    (0..3).any(|c| {
+        let values = samples.iter().map(|s| s[c]);
+        let (low, high) = values.fold((f32::INFINITY, 0.0_f32), |(low, high), v| {
+            (low.min(v), high.max(v))
+        });
+        low < CONTRAST * high
+    })
+}

@@ -1,0 +1,130 @@
+//! What the shade pass draws: fronts by material, and backs.
+
+use std::sync::Arc;
+
+use glam::{DVec3, Vec2, Vec3};
+use rayon::prelude::*;
+
+use super::projection::{self, Projection, Tile};
+use super::textures::Textures;
+use super::{Light, Lighting, corner_irradiance};
+use crate::error::Result;
+use crate::passes::buffers::upload;
+use crate::passes::shade::{Draw, Parameters, Vertex};
+use crate::scene::{Material, Scene, Triangle};
+use crate::vk::{Buffer, BufferUse, Device};
+
+/// The scene's fronts by material, then its backs.
+pub struct Mesh {
+    pub vertices: Buffer,
+    pub indices: Buffer,
+    /// Material (none for backs), first vertex, count.
+    ranges: Vec<(Option<u32>, u32, u32)>,
+}
+
+impl Mesh {
+    pub fn new(
+        device: &Arc<Device>,
+        scene: &Scene,
+        lighting: &Lighting<'_>,
+        projection: &Projection,
+    ) -> Result<Self> {
+        let smooth = corner_irradiance(scene, &lighting.irradiance());
+        let mut elsewhere = vec![false; scene.triangles.len()];
+        for &e in lighting
+            .relief()
+            .iter()
+            .flat_map(|(light, _)| &light.elements)
+        {
+            elsewhere[e as usize] = true;
+        }
+        // Which side is seen is found here in f64: a rasteriser finds it from rounded corners, wrongly for slivers.
+        let mut order: Vec<_> = scene
+            .triangles
+            .par_iter()
+            .enumerate()
+            .filter(|(e, _)| !elsewhere[*e])
+            .map(|(e, t)| {
+                let [a, b, c] = scene.corners(t);
+                let front = (b - a).cross(c - a).dot(projection.eye - a) > 0.0;
+                (if front { t.material } else { u32::MAX }, e)
+            })
+            .collect();
+        order.par_sort_unstable();
+        let vertices: Vec<_> = order
+            .par_iter()
+            .flat_map_iter(|&(_, e)| corners(scene, &scene.triangles[e], smooth[e], projection))
+            .collect();
+        let mut ranges = Vec::new();
+        let mut first = 0;
+        for same in order.chunk_by(|a, b| a.0 == b.0) {
+            let count = 3 * same.len() as u32;
+            let material = (same[0].0 != u32::MAX).then_some(same[0].0);
+            ranges.push((material, first, count));
+            first += count;
+        }
+        let indices: Vec<u32> = (0..vertices.len() as u32).collect();
+        Ok(Self {
+            vertices: upload(device, "shade vertices", &vertices, BufferUse::Geometry)?,
+            indices: upload(device, "shade indices", &indices, BufferUse::Geometry)?,
+            ranges,
+        })
+    }
+
+    pub fn draws<'a>(
+        &'a self,
+        scene: &'a Scene,
+        textures: &'a Textures,
+        projection: &Projection,
+        tile: Tile,
+        part: Light,
+    ) -> impl Iterator<Item = Draw<'a>> {
+        let rows = projection.rows(tile);
+        self.ranges
+            .iter()
+            .map(move |&(material, first, count)| Draw {
+                first_vertex: first,
+                vertex_count: count,
+                texture: match material {
+                    Some(m) => textures.of_material(m),
+                    None => textures.white(),
+                },
+                parameters: parameters(rows, material.map(|m| &scene.materials[m as usize]), part),
+            })
+    }
+}
+
+/// Of a material's fronts, or of backs.
+pub fn parameters([x, y, w]: [Vec3; 3], material: Option<&Material>, part: Light) -> Parameters {
+    let (reflectance, emitted, metered) = match material {
+        Some(m) => (m.kd, m.ke, if m.emits() { 0.0 } else { 1.0 }),
+        None => ([0.0; 3], [0.0; 3], 0.0),
+    };
+    let shines = if part == Light::Indirect { 0.0 } else { 1.0 };
+    Parameters {
+        x,
+        y,
+        w,
+        near: projection::NEAR,
+        reflectance: reflectance.into(),
+        emitted: Vec3::from(emitted) * shines,
+        metered,
+    }
+}
+
+fn corners(
+    scene: &Scene,
+    triangle: &Triangle,
+    irradiance: [Vec3; 3],
+    projection: &Projection,
+) -> [Vertex; 3] {
+    let positions: [DVec3; 3] = scene.corners(triangle);
+    let images = triangle.uv.map(|[u, v]| Vec2::new(u, 1.0 - v));
+    // A texture repeats: near 0, its coordinates have more digits left for the place within it.
+    let whole = images[0].floor();
+    std::array::from_fn(|k| Vertex {
+        position: ((positions[k] - projection.eye) / projection.unit).as_vec3(),
+        irradiance: irradiance[k],
+        uv: images[k] - whole,
+    })
+}

@@ -1,0 +1,191 @@
+//! A scene on the device, ready to be drawn from one camera.
+
+use std::sync::Arc;
+
+use super::gathered::Gathered;
+use super::mesh::Mesh;
+use super::picture::{Picture, SAMPLES};
+use super::projection::{Projection, Tile};
+use super::relief::Relief;
+use super::textures::Textures;
+use super::{Light, Lighting, View};
+use crate::error::Result;
+use crate::passes::shade::{Shade, Target};
+use crate::scene::Scene;
+use crate::vk::{Commands, Device, Timestamps};
+
+/// Pixels along a side of a tile: 2048² samples take 64 MiB of colour, as much again to read them, and 16 MiB of depth.
+const TILE: u32 = 2048 / SAMPLES;
+
+/// Marks a pixel of a plain triangle where relief is counted.
+const NOT_RELIEF: f32 = 2.0;
+
+/// Draws one view of a scene, as a picture or again and again.
+pub struct Renderer<'a> {
+    device: Arc<Device>,
+    scene: &'a Scene,
+    lighting: Lighting<'a>,
+    view: View<'a>,
+    projection: Projection,
+    shade: Shade,
+    textures: Textures,
+    mesh: Mesh,
+    relief: Option<Relief>,
+}
+
+impl<'a> Renderer<'a> {
+    /// # Errors
+    /// As [`super::render`].
+    pub fn new(
+        device: &Arc<Device>,
+        scene: &'a Scene,
+        lighting: Lighting<'a>,
+        view: &View<'a>,
+    ) -> Result<Self> {
+        assert_eq!(
+            lighting.irradiance.len(),
+            scene.triangles.len(),
+            "one irradiance a triangle"
+        );
+        view.check()?;
+        let projection = Projection::new(scene, view)?;
+        let shade = Shade::new(device)?;
+        let textures = Textures::new(device, &shade, scene)?;
+        Ok(Self {
+            mesh: Mesh::new(device, scene, &lighting, &projection)?,
+            relief: Relief::new(device, &shade, scene, &lighting, &textures, &projection)?,
+            device: Arc::clone(device),
+            scene,
+            lighting,
+            view: *view,
+            projection,
+            shade,
+            textures,
+        })
+    }
+
+    /// SAMPLES × SAMPLES samples a pixel, tile by tile.
+    pub fn picture(&self) -> Result<Picture> {
+        let view = &self.view;
+        let (width, height) = (view.width.min(TILE), view.height.min(TILE));
+        let target = Target::new(
+            &self.device,
+            &self.shade,
+            (width * SAMPLES, height * SAMPLES),
+        )?;
+        let mut gathered = Gathered::new(view);
+        for row in (0..view.height).step_by(TILE as usize) {
+            for column in (0..view.width).step_by(TILE as usize) {
+                let tile = Tile {
+                    column,
+                    row,
+                    width: TILE.min(view.width - column),
+                    height: TILE.min(view.height - row),
+                };
+                Commands::run(&self.device, "shade", |cmd| {
+                    self.record(cmd, &target, (tile, SAMPLES), || ());
+                    Ok(())
+                })?;
+                gathered.add(
+                    tile,
+                    &target.rows(tile.height * SAMPLES),
+                    target.width as usize,
+                );
+            }
+        }
+        Ok(gathered.into_picture(view))
+    }
+
+    /// Draws the whole view `count` times with one sample a pixel, as a window would; seconds of each by GPU timestamps.
+    pub fn frames(&self, count: usize) -> Result<Vec<f64>> {
+        let (width, height) = (self.view.width, self.view.height);
+        let target = Target::new(&self.device, &self.shade, (width, height))?;
+        let stamps = Timestamps::new(&self.device, "frame", 2)?;
+        let tile = Tile {
+            column: 0,
+            row: 0,
+            width,
+            height,
+        };
+        (0..count)
+            .map(|_| {
+                Commands::run(&self.device, "frame", |cmd| {
+                    cmd.reset_timestamps(&stamps);
+                    cmd.timestamp(&stamps, 0);
+                    self.record(cmd, &target, (tile, 1), || cmd.timestamp(&stamps, 1));
+                    Ok(())
+                })?;
+                Ok(stamps.intervals()?[0])
+            })
+            .collect()
+    }
+
+    /// `drawn` is recorded after all draws, before anything is copied.
+    /// The share of the pixels that show relief.
+    pub fn relief_coverage(&self) -> Result<f64> {
+        let (width, height) = (self.view.width, self.view.height);
+        let target = Target::new(&self.device, &self.shade, (width, height))?;
+        let tile = Tile {
+            column: 0,
+            row: 0,
+            width,
+            height,
+        };
+        Commands::run(&self.device, "coverage", |cmd| {
+            self.shade.record(
+                cmd,
+                &target,
+                (width, height),
+                (&self.mesh.vertices, &self.mesh.indices),
+                self.mesh
+                    .draws(
+                        self.scene,
+                        &self.textures,
+                        &self.projection,
+                        tile,
+                        Light::Global,
+                    )
+                    .map(|mut draw| {
+                        draw.parameters.metered = NOT_RELIEF;
+                        draw
+                    }),
+                || {
+                    if let Some(relief) = &self.relief {
+                        let place = (tile, 1);
+                        relief.record(cmd, self.scene, &self.lighting, &self.projection, place);
+                    }
+                },
+            );
+            Ok(())
+        })?;
+        let rows = target.rows(height);
+        let empty = |p: &&[f32; 4]| p[3] == NOT_RELIEF || **p == [0.0; 4];
+        let elsewhere = rows.iter().filter(empty).count();
+        Ok(1.0 - elsewhere as f64 / rows.len() as f64)
+    }
+
+    fn record(
+        &self,
+        cmd: &Commands,
+        target: &Target,
+        (tile, samples): (Tile, u32),
+        drawn: impl FnOnce(),
+    ) {
+        let part = self.lighting.part;
+        self.shade.record(
+            cmd,
+            target,
+            (tile.width * samples, tile.height * samples),
+            (&self.mesh.vertices, &self.mesh.indices),
+            self.mesh
+                .draws(self.scene, &self.textures, &self.projection, tile, part),
+            || {
+                if let Some(relief) = &self.relief {
+                    let place = (tile, samples);
+                    relief.record(cmd, self.scene, &self.lighting, &self.projection, place);
+                }
+                drawn();
+            },
+        );
+    }
+}
