@@ -71,132 +71,143 @@ struct Place {
     bool under;          // seen from below
 };
 
-// Barycentric coordinates along the ray: at + s step.
-struct Tetrahedron {
-    mat3 turn;           // from space to the shares of the last three corners
-    vec4 at;
-    vec4 step;
+// The part of the ray in a tetrahedron: places on the ray, texture coordinates with height and the shares of the triangle's
+// corners at both ends.
+struct Part {
     float enter;
     float leave;
+    vec3 from;
+    vec3 to;
+    vec3 first;
+    vec3 last;
 };
 
-Tetrahedron cut(vec3 a, vec3 b, vec3 c, vec3 d, vec3 from, vec3 along) {
-    mat3 edges = mat3(b - a, c - a, d - a);
+// A corner of a tetrahedron.
+struct Corner {
+    vec3 position;
+    vec3 uvh;
+    vec3 share;
+};
+
+struct Tetrahedron {
+    Corner a;
+    Corner b;
+    Corner c;
+    Corner d;
+};
+
+// From space to the shares of the corners b, c and d.
+mat3 turn_of(Tetrahedron t) {
+    mat3 edges = mat3(t.b.position - t.a.position, t.c.position - t.a.position, t.d.position - t.a.position);
     float volume = determinant(edges);
-    Tetrahedron result = Tetrahedron(mat3(0.0), vec4(0.0), vec4(0.0), 1.0, 0.0);
-    if (volume == 0.0) {
-        return result;
-    }
-    mat3 turn = inverse(edges);
-    vec3 at = turn * (from - a);
-    vec3 step = turn * along;
-    result.turn = turn;
-    result.at = vec4(1.0 - at.x - at.y - at.z, at);
-    result.step = vec4(-step.x - step.y - step.z, step);
-    // The ray begins at the eye, at s = -1.
-    float enter = -1.0;
-    float leave = NEVER;
-    for (int i = 0; i < 4; i++) {
-        float rate = result.step[i];
-        float zero = -result.at[i] / rate;
-        if (rate > 0.0) {
-            enter = max(enter, zero);
-        } else if (rate < 0.0) {
-            leave = min(leave, zero);
-        } else if (result.at[i] < 0.0) {
-            leave = -NEVER;
-        }
-    }
-    result.enter = enter;
-    result.leave = leave;
-    return result;
+    return volume == 0.0 ? mat3(0.0) : inverse(edges);
 }
 
-// What a tetrahedron's corners are: share of a, b, c and whether it is one of the high ones.
-mat4 corners_of(uint which) {
-    const vec4 LOW_A = vec4(1, 0, 0, 0);
-    const vec4 LOW_B = vec4(0, 1, 0, 0);
-    const vec4 LOW_C = vec4(0, 0, 1, 0);
-    const vec4 UP = vec4(0, 0, 0, 1);
-    switch (which) {
-    case 0: return mat4(LOW_A, LOW_B, LOW_C, LOW_C + UP);
-    case 1: return mat4(LOW_A, LOW_B, LOW_B + UP, LOW_C + UP);
-    default: return mat4(LOW_A, LOW_A + UP, LOW_B + UP, LOW_C + UP);
-    }
+Part cut(Tetrahedron t, vec3 from, vec3 along) {
+    mat3 turn = turn_of(t);
+    vec3 start = turn * (from - t.a.position);
+    vec3 each = turn * along;
+    vec4 at = vec4(1.0 - start.x - start.y - start.z, start);
+    vec4 rate = vec4(-each.x - each.y - each.z, each);
+    // Each share is positive behind its zero or before it. The ray begins at the eye, at s = -1.
+    bvec4 grows = greaterThan(rate, vec4(0.0));
+    bvec4 falls = lessThan(rate, vec4(0.0));
+    vec4 zero = -at / mix(vec4(1.0), rate, notEqual(rate, vec4(0.0)));
+    vec4 behind = mix(vec4(-1.0), zero, grows);
+    vec4 before = mix(mix(vec4(NEVER), vec4(-NEVER), lessThan(at, vec4(0.0))), mix(vec4(NEVER), zero, falls),
+                      notEqual(rate, vec4(0.0)));
+    Part part;
+    part.enter = max(max(max(behind.x, behind.y), max(behind.z, behind.w)), -1.0);
+    part.leave = min(min(before.x, before.y), min(before.z, before.w));
+    vec4 first = at + part.enter * rate;
+    vec4 last = at + part.leave * rate;
+    part.from = first.x * t.a.uvh + first.y * t.b.uvh + first.z * t.c.uvh + first.w * t.d.uvh;
+    part.to = last.x * t.a.uvh + last.y * t.b.uvh + last.z * t.c.uvh + last.w * t.d.uvh;
+    part.first = first.x * t.a.share + first.y * t.b.share + first.z * t.c.share + first.w * t.d.share;
+    part.last = last.x * t.a.share + last.y * t.b.share + last.z * t.c.share + last.w * t.d.share;
+    return part;
 }
 
-vec3 position_of(Prism p, vec4 corner) {
-    mat3 low = mat3(p.low_a, p.low_b, p.low_c);
-    mat3 high = mat3(p.high_a, p.high_b, p.high_c);
-    return (corner.w > 0.0 ? high : low) * corner.xyz;
-}
-
-// Where the ray first meets the relief (or, for `plane`, the mean height) within the prism.
-bool meet(Prism p, ReliefSurface surface, vec3 along, bool plane, out Place place) {
-    Tetrahedron parts[3];
-    mat4 corners[3];
-    for (uint i = 0; i < 3; i++) {
-        corners[i] = corners_of(i);
-        parts[i] = cut(position_of(p, corners[i][0]), position_of(p, corners[i][1]), position_of(p, corners[i][2]),
-                       position_of(p, corners[i][3]), corner_position, along);
+// Where the ray first meets the relief (or, for `plane`, the mean height) within a part of it.
+bool meet_part(Part part, Prism p, ReliefSurface surface, bool plane, out Place place) {
+    if (part.leave <= part.enter) {
+        return false;
     }
-    place.under = false;
-    for (uint round = 0; round < 3; round++) {
-        // The nearest of those not yet passed.
-        uint nearest = 3;
-        float enter = NEVER;
-        for (uint i = 0; i < 3; i++) {
-            if (parts[i].leave > parts[i].enter && parts[i].enter < enter) {
-                nearest = i;
-                enter = parts[i].enter;
-            }
-        }
-        if (nearest == 3) {
+    vec3 from = part.from;
+    vec3 to = part.to;
+    float t;
+    if (plane) {
+        float above = from.z - surface.mean;
+        float below = to.z - surface.mean;
+        if (!(above >= 0.0 && below < 0.0)) {
             return false;
         }
-        Tetrahedron part = parts[nearest];
-        mat4 shares = corners[nearest];
-        parts[nearest].leave = -NEVER;
-        vec4 first = shares * (part.at + part.enter * part.step);
-        vec4 last = shares * (part.at + part.leave * part.step);
-        mat3x2 uv = mat3x2(p.uv_a, p.uv_b, p.uv_c);
-        float rise = surface.top - surface.lowest;
-        vec3 from = vec3(uv * first.xyz, surface.lowest + first.w * rise);
-        vec3 to = vec3(uv * last.xyz, surface.lowest + last.w * rise);
-        float t;
-        if (plane) {
-            float above = from.z - surface.mean;
-            float below = to.z - surface.mean;
-            if (!(above >= 0.0 && below < 0.0)) {
-                continue;
-            }
-            t = above / (above - below);
-            place.gradient = vec2(0.0);
-            place.height = surface.mean;
-        } else {
-            HeightHit hit;
-            if (!march(tiles[p.surface], from, to, hit)) {
-                continue;
-            }
-            // A ray that comes in through the bottom shows the underside; one that comes in below the surface through a side,
-            // at a seam of heights, shows the step.
-            place.under = hit.t == 0.0 && from.z < surface.lowest + BOTTOM * rise;
-            t = hit.t;
-            place.gradient = hit.gradient;
-            place.height = hit.height;
+        t = above / (above - below);
+        place.gradient = vec2(0.0);
+        place.height = surface.mean;
+        place.under = false;
+    } else {
+        HeightHit hit;
+        if (!march(tiles[p.surface], from, to, hit)) {
+            return false;
         }
-        // Corner by corner, u, v and height less those of the first.
-        mat4x3 texture_at = mat3x3(vec3(p.uv_a, 0.0), vec3(p.uv_b, 0.0), vec3(p.uv_c, 0.0)) * mat4x3(shares)
-                          + mat4x3(vec3(0.0, 0.0, rise * shares[0].w), vec3(0.0, 0.0, rise * shares[1].w),
-                                   vec3(0.0, 0.0, rise * shares[2].w), vec3(0.0, 0.0, rise * shares[3].w));
-        mat3 edges = mat3(texture_at[1] - texture_at[0], texture_at[2] - texture_at[0], texture_at[3] - texture_at[0]);
-        place.slopes = transpose(edges * part.turn);
-        place.uv = mix(from.xy, to.xy, t);
-        place.share = mix(first.xyz, last.xyz, t);
-        place.along = mix(part.enter, part.leave, t);
-        return true;
+        // A ray that comes in through the bottom shows the underside; one that comes in below the surface through a side,
+        // at a seam of heights, shows the step.
+        place.under = hit.t == 0.0 && from.z < surface.lowest + BOTTOM * (surface.top - surface.lowest);
+        t = hit.t;
+        place.gradient = hit.gradient;
+        place.height = hit.height;
     }
-    return false;
+    place.uv = mix(from.xy, to.xy, t);
+    place.share = mix(part.first, part.last, t);
+    place.along = mix(part.enter, part.leave, t);
+    return true;
+}
+
+// The same within the prism.
+bool meet(Prism p, ReliefSurface surface, vec3 along, bool plane, out Place place) {
+    const vec3 A = vec3(1.0, 0.0, 0.0);
+    const vec3 B = vec3(0.0, 1.0, 0.0);
+    const vec3 C = vec3(0.0, 0.0, 1.0);
+    Corner low_a = Corner(p.low_a, vec3(p.uv_a, surface.lowest), A);
+    Corner low_b = Corner(p.low_b, vec3(p.uv_b, surface.lowest), B);
+    Corner low_c = Corner(p.low_c, vec3(p.uv_c, surface.lowest), C);
+    Corner high_a = Corner(p.high_a, vec3(p.uv_a, surface.top), A);
+    Corner high_b = Corner(p.high_b, vec3(p.uv_b, surface.top), B);
+    Corner high_c = Corner(p.high_c, vec3(p.uv_c, surface.top), C);
+    Tetrahedron low = Tetrahedron(low_a, low_b, low_c, high_c);
+    Tetrahedron middle = Tetrahedron(low_a, low_b, high_b, high_c);
+    Tetrahedron high = Tetrahedron(low_a, high_a, high_b, high_c);
+    Part parts_low = cut(low, corner_position, along);
+    Part parts_middle = cut(middle, corner_position, along);
+    Part parts_high = cut(high, corner_position, along);
+
+    // Nearest first: the middle one lies between the others, so that the ray meets the low or the high one first.
+    bool from_high = parts_high.enter < parts_low.enter && parts_high.leave > parts_high.enter
+                   || parts_low.leave <= parts_low.enter;
+    bool in_middle_first = parts_middle.leave > parts_middle.enter
+        && parts_middle.enter < min(parts_low.leave > parts_low.enter ? parts_low.enter : NEVER,
+                                    parts_high.leave > parts_high.enter ? parts_high.enter : NEVER);
+    uint found = 3;
+    for (uint round = 0; round < 3 && found == 3; round++) {
+        uint which;
+        if (in_middle_first) {
+            which = round == 0 ? 1 : (round == 1) == from_high ? 2 : 0;
+        } else {
+            which = round == 1 ? 1 : (round == 0) == from_high ? 2 : 0;
+        }
+        Part part = which == 0 ? parts_low : which == 1 ? parts_middle : parts_high;
+        if (meet_part(part, p, surface, plane, place)) {
+            found = which;
+        }
+    }
+    if (found == 3) {
+        return false;
+    }
+    Tetrahedron t = found == 0 ? low : found == 1 ? middle : high;
+    mat3 edges = mat3(t.b.uvh - t.a.uvh, t.c.uvh - t.a.uvh, t.d.uvh - t.a.uvh);
+    place.slopes = transpose(edges * turn_of(t));
+    return true;
 }
 
 // Of the surface, outward.
