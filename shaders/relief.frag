@@ -53,8 +53,6 @@ layout(push_constant, scalar) uniform Parameters {
 #include "shared/height_march.glsl"
 
 const float PI = 3.14159265358979;
-// Samples wider than so many texels show the mean of the relief.
-const float WIDEST_SAMPLE = 2.0;
 // Rays to lights begin so much of the relief's range above it.
 const float LIFT = 1e-4;
 // Share of a prism's height that counts as its bottom; MARGIN of src/render/relief.rs lies below the relief.
@@ -295,7 +293,7 @@ void main() {
     ReliefSurface surface = surfaces[p.surface];
     vec3 along = corner_position;
     float footprint = length(corner_position) * pixel / p.texel;
-    bool wide = shading == SHADING_RELIEF && footprint > WIDEST_SAMPLE;
+    bool wide = shading == SHADING_RELIEF && footprint > float(WIDEST_SAMPLE);
     Place place;
     if (!meet(p, surface, along, shading != SHADING_RELIEF || wide, place)) {
         return;

@@ -32,11 +32,13 @@ shared! {
     /// A side of the grid of rays from each facet of a relief to the facets that it sees; RAY_STRATA² rays.
     RAY_STRATA = 8;
     /// Most factors of the light on a relief.
-    MOST_RANK = 24;
+    MOST_RANK = 16;
     /// Points that emitters are taken for where their light on relief is drawn sharply, and how many of them one sample looks
     /// at: the samples of 4 × 4 pixels take turns.
     LIGHT_POINTS = 64;
     LIGHT_TURNS = 16;
+    /// A sample of so many texels shows the mean of the relief.
+    WIDEST_SAMPLE = 2;
     /// How relief is drawn: displaced; only lit, at its mean height; so too, and shifted by its height.
     SHADING_RELIEF = 0;
     SHADING_NORMAL = 1;

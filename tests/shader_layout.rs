@@ -52,6 +52,7 @@ fn spirv() -> BTreeSet<Vec<u32>> {
         shaders::BIN_RECEIVERS_COMP,
         shaders::BIN_TO_RELIEF_COMP,
         shaders::ITEM_BUFFER_VERT,
+        shaders::RELIEF_FRAG,
         shaders::RELIEF_RAYS_COMP,
     ] {
         let mut offsets: BTreeMap<u32, BTreeMap<u32, u32>> = BTreeMap::new();
@@ -104,6 +105,10 @@ fn rust_and_glsl_agree() {
     check!(true, Draw: index_count instance_count first_index vertex_offset first_instance);
     check!(true, MesoElement: tangent response bitangent scale);
     check!(true, Reflected: sum error);
+    check!(true, Prism: low_a low_b low_c high_a high_b high_c uv_a uv_b uv_c light_a light_b light_c surface
+        tangent texel bitangent normal);
+    check!(true, LightPoint: position kind normal strength);
+    check!(true, ReliefSurface: lowest top mean columns rows rank first_factor slope);
     check!(true, HeightTile: first width height top highest);
     check!(true, HeightRay: from tile to);
     check!(true, HeightHit: t cell local height gradient steps);

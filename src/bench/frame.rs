@@ -107,7 +107,7 @@ pub fn run(
                     cache: options.cache,
                     ..Lighting::from(solution)
                 };
-                let renderer = Renderer::new(device, scene, lighting, &view)?;
+                let renderer = Renderer::new(device, scene, lighting, &view, 1)?;
                 let row = Row {
                     scene: scene.name.clone(),
                     camera: camera.name.clone(),

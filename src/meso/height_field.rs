@@ -114,6 +114,14 @@ impl HeightField {
             .fold(f64::NEG_INFINITY, f64::max)
     }
 
+    /// Sine of the angle of the steepest facet.
+    pub fn steepest(&self) -> f64 {
+        (0..self.facet_count())
+            .map(|q| self.facet(q).normal)
+            .map(|n| (1.0 - n.z * n.z).max(0.0).sqrt())
+            .fold(0.0, f64::max)
+    }
+
     /// Root mean square of the slope over the tile.
     pub fn rms_slope(&self) -> f64 {
         let sum: f64 = (0..self.facet_count())

@@ -1,5 +1,6 @@
 //! Draws triangles with relief by following each pixel's ray through the prism over the triangle. Shaders: `relief.vert`,
-//! `relief.frag`, `shared/height_march.glsl`; twin: [`crate::reference::relief`].
+//! `relief.frag`, `shared/height_march.glsl`, whose twin is [`crate::reference::relief_rays`]; what is shaded is
+//! compared with [`crate::path_tracer`].
 
 use std::sync::Arc;
 

@@ -6,6 +6,7 @@ use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::projection::{self, Projection, Tile};
+use super::relief_mesh::FlatRelief;
 use super::textures::Textures;
 use super::{Light, Lighting, corner_irradiance};
 use crate::error::Result;
@@ -18,8 +19,17 @@ use crate::vk::{Buffer, BufferUse, Device};
 pub struct Mesh {
     pub vertices: Buffer,
     pub indices: Buffer,
-    /// Material (none for backs), first vertex, count.
-    ranges: Vec<(Option<u32>, u32, u32)>,
+    /// First vertex, count.
+    ranges: Vec<(Kind, u32, u32)>,
+}
+
+/// What triangles are drawn alike, with their material.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Kind {
+    Front(u32),
+    /// With a relief that is too far to be told: what it sends stands at the corners.
+    Far(u32),
+    Back,
 }
 
 impl Mesh {
@@ -28,39 +38,40 @@ impl Mesh {
         scene: &Scene,
         lighting: &Lighting<'_>,
         projection: &Projection,
+        rest: Option<&FlatRelief>,
     ) -> Result<Self> {
+        let far = |e: usize| rest.and_then(|rest| rest.far.get(&e));
         let smooth = corner_irradiance(scene, &lighting.irradiance());
-        let mut elsewhere = vec![false; scene.triangles.len()];
-        for &e in lighting
-            .relief()
-            .iter()
-            .flat_map(|(light, _)| &light.elements)
-        {
-            elsewhere[e as usize] = true;
-        }
         // Which side is seen is found here in f64: a rasteriser finds it from rounded corners, wrongly for slivers.
         let mut order: Vec<_> = scene
             .triangles
             .par_iter()
             .enumerate()
-            .filter(|(e, _)| !elsewhere[*e])
+            .filter(|(e, _)| rest.is_none_or(|rest| !rest.prism[*e]))
             .map(|(e, t)| {
                 let [a, b, c] = scene.corners(t);
                 let front = (b - a).cross(c - a).dot(projection.eye - a) > 0.0;
-                (if front { t.material } else { u32::MAX }, e)
+                let kind = match front {
+                    true if far(e).is_some() => Kind::Far(t.material),
+                    true => Kind::Front(t.material),
+                    false => Kind::Back,
+                };
+                (kind, e)
             })
             .collect();
         order.par_sort_unstable();
         let vertices: Vec<_> = order
             .par_iter()
-            .flat_map_iter(|&(_, e)| corners(scene, &scene.triangles[e], smooth[e], projection))
+            .flat_map_iter(|&(_, e)| {
+                let light = far(e).copied().unwrap_or(smooth[e]);
+                corners(scene, &scene.triangles[e], light, projection)
+            })
             .collect();
         let mut ranges = Vec::new();
         let mut first = 0;
         for same in order.chunk_by(|a, b| a.0 == b.0) {
             let count = 3 * same.len() as u32;
-            let material = (same[0].0 != u32::MAX).then_some(same[0].0);
-            ranges.push((material, first, count));
+            ranges.push((same[0].0, first, count));
             first += count;
         }
         let indices: Vec<u32> = (0..vertices.len() as u32).collect();
@@ -80,17 +91,22 @@ impl Mesh {
         part: Light,
     ) -> impl Iterator<Item = Draw<'a>> {
         let rows = projection.rows(tile);
-        self.ranges
-            .iter()
-            .map(move |&(material, first, count)| Draw {
-                first_vertex: first,
-                vertex_count: count,
-                texture: match material {
-                    Some(m) => textures.of_material(m),
-                    None => textures.white(),
+        self.ranges.iter().map(move |&(kind, first, count)| Draw {
+            first_vertex: first,
+            vertex_count: count,
+            texture: match kind {
+                Kind::Front(m) => textures.of_material(m),
+                Kind::Far(_) | Kind::Back => textures.white(),
+            },
+            parameters: match kind {
+                Kind::Front(m) => parameters(rows, Some(&scene.materials[m as usize]), part),
+                Kind::Far(m) => Parameters {
+                    reflectance: Vec3::ONE,
+                    ..parameters(rows, Some(&scene.materials[m as usize]), part)
                 },
-                parameters: parameters(rows, material.map(|m| &scene.materials[m as usize]), part),
-            })
+                Kind::Back => parameters(rows, None, part),
+            },
+        })
     }
 }
 

@@ -73,5 +73,5 @@ pub fn render<'a>(
     lighting: impl Into<Lighting<'a>>,
     view: &View<'a>,
 ) -> Result<Picture> {
-    Renderer::new(device, scene, lighting.into(), view)?.picture()
+    Renderer::new(device, scene, lighting.into(), view, SAMPLES)?.picture()
 }

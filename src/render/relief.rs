@@ -16,7 +16,7 @@ use crate::vk::{Commands, DescriptorSet, Device, Sampler};
 /// The relief of a picture, ready to be drawn.
 pub struct Relief {
     pass: passes::relief::Relief,
-    mesh: ReliefMesh,
+    pub mesh: ReliefMesh,
     /// One for each range of the mesh.
     sets: Vec<DescriptorSet>,
     shading: u32,
@@ -31,13 +31,13 @@ impl Relief {
         scene: &Scene,
         lighting: &Lighting<'_>,
         textures: &Textures,
-        projection: &Projection,
+        (projection, samples): (&Projection, u32),
     ) -> Result<Option<Self>> {
         let Some((light, shading)) = lighting.relief() else {
             return Ok(None);
         };
         let pass = passes::relief::Relief::new(device, shade)?;
-        let mesh = ReliefMesh::new(device, scene, lighting, light, projection, lighting.cache)?;
+        let mesh = ReliefMesh::new(device, scene, lighting, light, (projection, samples))?;
         let sampler = Sampler::new(device, "relief albedo", true)?;
         let sets = mesh
             .ranges

@@ -1,15 +1,14 @@
 //! What the relief pass draws: prisms over the triangles with relief, their height maps, factors and light.
 
 use std::collections::HashMap;
-use std::path::Path;
 use std::sync::Arc;
 
-use glam::{DVec2, Vec3, Vec4};
+use glam::{DVec2, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::lights::{share, shining, spread};
-use super::{Direct, Light, Lighting, Projection};
-use crate::constants::MOST_RANK;
+use super::{Direct, Light, Lighting, Projection, ReliefShading, Show};
+use crate::constants::{MOST_RANK, WIDEST_SAMPLE};
 use crate::directions::Directions;
 use crate::elements::Elements;
 use crate::error::Result;
@@ -31,6 +30,15 @@ pub struct ReliefMesh {
     pub directions: Directions,
     /// Material, first prism, count.
     pub ranges: Vec<(u32, u32, u32)>,
+    pub rest: FlatRelief,
+}
+
+/// Triangles with relief that need no rays, `[triangle]`.
+pub struct FlatRelief {
+    /// Those that are drawn as prisms.
+    pub prism: Vec<bool>,
+    /// Of those so far away that a sample is wider than their texels: what they send to the eye, as radiosity, by corner.
+    pub far: HashMap<usize, [Vec3; 3]>,
 }
 
 /// Vertices with light, each as a surface sees it.
@@ -44,14 +52,13 @@ struct LightVertices {
 }
 
 impl ReliefMesh {
-    /// `cache` keeps the visibility of reliefs from run to run.
+    /// For so many samples along a pixel's side.
     pub fn new(
         device: &Arc<Device>,
         scene: &Scene,
         lighting: &Lighting<'_>,
         light: &DirectionalLight,
-        projection: &Projection,
-        cache: Option<&Path>,
+        (projection, samples): (&Projection, u32),
     ) -> Result<Self> {
         let directions = Directions::new(light.directions.len() as u32)?;
         let elements = Elements::new(scene);
@@ -65,7 +72,7 @@ impl ReliefMesh {
         let mut marcher = None;
         let mut factors = Vec::with_capacity(tiles.len());
         for tile in &tiles {
-            let (visibility, _) = visibility(device, &tile.field, cache, &mut marcher)?;
+            let (visibility, _) = visibility(device, &tile.field, lighting.cache, &mut marcher)?;
             let error = FACTOR_ERROR;
             factors.push(Factors::new(
                 &directions,
@@ -99,9 +106,51 @@ impl ReliefMesh {
         let exits = vertices.mean(&lighting.exits(scene, light), directions.count());
         let mut lit = LightVertices::default();
         let normals = relief_normals(scene);
-        let mut order: Vec<usize> = (0..light.elements.len())
-            .filter(|&m| surface_of[light.elements[m] as usize] != u32::MAX)
-            .collect();
+        let widest = f64::from(WIDEST_SAMPLE) / f64::from(projection.sample_angle(samples));
+        let averaged = lighting.shading == ReliefShading::Factored && lighting.show == Show::Shaded;
+        let mut rest = FlatRelief {
+            prism: vec![false; scene.triangles.len()],
+            far: HashMap::new(),
+        };
+        let mut order: Vec<usize> = Vec::new();
+        for (m, &e) in light.elements.iter().enumerate() {
+            let e = e as usize;
+            let Some(tile) = tiles.get(surface_of[e] as usize) else {
+                continue;
+            };
+            let triangle = &scene.triangles[e];
+            let steepest = surfaces.steepest[surface_of[e] as usize];
+            let away = |&v: &u32| {
+                let way = (scene.vertices[v as usize] - projection.eye).normalize_or_zero();
+                way.dot(normals[v as usize]) > steepest
+            };
+            if triangle.vertices.iter().all(away) {
+                continue;
+            }
+            let texel = tile.size / surfaces.size(surface_of[e]);
+            let near = scene
+                .corners(triangle)
+                .map(|p| p.distance(projection.eye))
+                .into_iter()
+                .fold(f64::INFINITY, f64::min);
+            if averaged && near > widest * texel.min_element() {
+                let corners = [0, 1, 2].map(|k| {
+                    let way = projection.eye - scene.corners(triangle)[k];
+                    let way = way.normalize_or_zero();
+                    let frame = light.frames[m].map(|axis| axis.as_dvec3().dot(way));
+                    let slots = vertices.corners[m][k] as usize * directions.count();
+                    let looks = directions.bilinear(DVec3::from(frame));
+                    looks
+                        .map(|(slot, weight)| exits[slots + slot] * weight as f32)
+                        .into_iter()
+                        .sum()
+                });
+                rest.far.insert(e, corners);
+                continue;
+            }
+            rest.prism[e] = true;
+            order.push(m);
+        }
         order.sort_by_key(|&m| scene.triangles[light.elements[m] as usize].material);
         let mut prisms = Vec::with_capacity(order.len());
         let mut mirrored = Vec::with_capacity(order.len());
@@ -193,6 +242,7 @@ impl ReliefMesh {
             buffers: Buffers::new(device, &parts, &mirrored)?,
             directions,
             ranges,
+            rest,
         })
     }
 }
@@ -245,6 +295,8 @@ struct Surfaces {
     list: Vec<ReliefSurface>,
     tiles: Vec<HeightTile>,
     ranges: Vec<Range>,
+    /// Sine of the steepest slope's angle: a ray that rises more steeply meets the relief from below alone.
+    steepest: Vec<f64>,
     pyramids: Vec<f32>,
     factors: Vec<Vec4>,
 }
@@ -288,6 +340,7 @@ impl Surfaces {
                 first_factor: all.factors.len() as u32,
                 slope: (range.scale / tile.size).as_vec2(),
             });
+            all.steepest.push(tile.field.steepest());
             all.tiles.push(height_tile);
             all.ranges.push(range);
             all.factors.extend(&factors.corners);

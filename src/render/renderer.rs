@@ -34,6 +34,8 @@ pub struct Renderer<'a> {
 }
 
 impl<'a> Renderer<'a> {
+    /// For so many samples along a pixel's side: SAMPLES for [`Self::picture`], 1 for [`Self::frames`].
+    ///
     /// # Errors
     /// As [`super::render`].
     pub fn new(
@@ -41,6 +43,7 @@ impl<'a> Renderer<'a> {
         scene: &'a Scene,
         lighting: Lighting<'a>,
         view: &View<'a>,
+        samples: u32,
     ) -> Result<Self> {
         assert_eq!(
             lighting.irradiance.len(),
@@ -51,9 +54,12 @@ impl<'a> Renderer<'a> {
         let projection = Projection::new(scene, view)?;
         let shade = Shade::new(device)?;
         let textures = Textures::new(device, &shade, scene)?;
+        let seen = (&projection, samples);
+        let relief = Relief::new(device, &shade, scene, &lighting, &textures, seen)?;
+        let rest = relief.as_ref().map(|r| &r.mesh.rest);
         Ok(Self {
-            mesh: Mesh::new(device, scene, &lighting, &projection)?,
-            relief: Relief::new(device, &shade, scene, &lighting, &textures, &projection)?,
+            mesh: Mesh::new(device, scene, &lighting, &projection, rest)?,
+            relief,
             device: Arc::clone(device),
             scene,
             lighting,
