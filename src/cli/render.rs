@@ -1,6 +1,7 @@
 //! `mesolux render`.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use clap::Args;
 
@@ -11,8 +12,9 @@ use super::show::ShowOptions;
 use super::{Builtin, DeviceOptions};
 use mesolux::error::{Error, Result};
 use mesolux::render::{FileKind, Lighting, Picture, View, render};
-use mesolux::scene::Camera;
+use mesolux::scene::{Camera, Scene};
 use mesolux::solution::Bake;
+use mesolux::vk::Device;
 
 /// Draw a scene or a bake to a picture
 ///
@@ -80,9 +82,17 @@ pub fn run(options: &Options) -> Result<()> {
     }
     let solve = &options.solve;
     let cache = solve.settings()?.relief.cache;
-    let show = |lighting| Lighting {
-        cache: cache.as_deref(),
-        ..options.show.apply(lighting)
+    let draw = |device: &Arc<Device>, scene: &Scene, lighting: Lighting<'_>, view: &View<'_>| {
+        let lighting = Lighting {
+            cache: cache.as_deref(),
+            ..lighting
+        };
+        let parts = options.show.parts().iter();
+        let pictures = parts
+            .map(|&part| render(device, scene, options.show.apply(lighting, part), view))
+            .collect::<Result<Vec<_>>>()?;
+        options.device.check()?;
+        options.write(&Picture::side_by_side(&pictures)?, view)
     };
     if is_bake {
         let bake = Bake::load(path)?;
@@ -90,9 +100,7 @@ pub fn run(options: &Options) -> Result<()> {
         let camera = options.camera.of(&scene)?;
         let view = options.view(&camera);
         let device = options.device.open()?;
-        let picture = render(&device, &scene, show((&bake).into()), &view)?;
-        options.device.check()?;
-        return options.write(&picture, &view);
+        return draw(&device, &scene, (&bake).into(), &view);
     }
     let settings = solve.settings()?;
     let scene = options.builtin.load(&options.input)?;
@@ -100,24 +108,25 @@ pub fn run(options: &Options) -> Result<()> {
     let view = options.view(&camera);
     let device = options.device.open()?;
     let solution = mesolux::bake::bake(&device, &scene, &settings, |_| true)?;
-    let picture = render(&device, &scene, show((&solution).into()), &view)?;
-    options.device.check()?;
-    options.write(&picture, &view)
+    draw(&device, &scene, (&solution).into(), &view)
 }
 
 /// The same by the path tracer.
 fn run_reference(options: &Options) -> Result<()> {
     let solve = &options.solve;
-    let light = options.show.light();
-    let settings = options
-        .reference
-        .settings(solve.budget()?, solve.seed, light);
+    let budget = solve.budget()?;
     let scene = options.builtin.load(&options.input)?;
     let camera = options.camera.of(&scene)?;
     let scene = reference::tessellated(scene);
     let view = options.view(&camera);
-    let film = reference::draw(&scene, &view, &settings)?;
-    options.write(&film.picture(), &view)
+    let parts = options.show.parts().iter();
+    let pictures = parts
+        .map(|&part| {
+            let settings = options.reference.settings(budget, solve.seed, part);
+            Ok(reference::draw(&scene, &view, &settings)?.picture())
+        })
+        .collect::<Result<Vec<_>>>()?;
+    options.write(&Picture::side_by_side(&pictures)?, &view)
 }
 
 impl Options {
@@ -134,8 +143,8 @@ impl Options {
         tracing::info!(
             "{}: {}x{}, camera {}",
             self.output.display(),
-            view.width,
-            view.height,
+            picture.width,
+            picture.height,
             view.camera.name
         );
         Ok(())

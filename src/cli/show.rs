@@ -43,6 +43,8 @@ enum LightName {
     Direct,
     /// What has been reflected more than once
     Indirect,
+    /// Direct, indirect and global side by side, as in the paper's Figure 3
+    All,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -80,18 +82,20 @@ enum ViewName {
 }
 
 impl ShowOptions {
-    pub fn light(&self) -> Light {
+    /// The parts of the light, one picture each.
+    pub fn parts(&self) -> &'static [Light] {
         match self.light {
-            LightName::Global => Light::Global,
-            LightName::Direct => Light::Direct,
-            LightName::Indirect => Light::Indirect,
+            LightName::Global => &[Light::Global],
+            LightName::Direct => &[Light::Direct],
+            LightName::Indirect => &[Light::Indirect],
+            LightName::All => &[Light::Direct, Light::Indirect, Light::Global],
         }
     }
 
-    /// The same light, shown as asked for.
-    pub fn apply<'a>(&self, lighting: Lighting<'a>) -> Lighting<'a> {
+    /// A part of the light, shown as asked for.
+    pub fn apply<'a>(&self, lighting: Lighting<'a>, part: Light) -> Lighting<'a> {
         Lighting {
-            part: self.light(),
+            part,
             shading: match self.shading {
                 ShadingName::Factored => ReliefShading::Factored,
                 ShadingName::Normal => ReliefShading::Normal,

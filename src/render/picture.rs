@@ -98,6 +98,45 @@ impl Picture {
         }
     }
 
+    /// Pictures of one height side by side, exposed as the last one.
+    pub fn side_by_side(pictures: &[Self]) -> Result<Self> {
+        let last = pictures
+            .last()
+            .ok_or_else(|| Error::Usage("no pictures to put side by side".into()))?;
+        if pictures.iter().any(|p| p.height != last.height) {
+            return Err(Error::Usage(
+                "pictures of different heights do not stand side by side".into(),
+            ));
+        }
+        let width: u32 = pictures.iter().map(|p| p.width).sum();
+        let mut radiance = Vec::with_capacity(width as usize * last.height as usize);
+        for row in 0..last.height as usize {
+            for p in pictures {
+                let of_row = row * p.width as usize..(row + 1) * p.width as usize;
+                radiance.extend_from_slice(&p.radiance[of_row]);
+            }
+        }
+        let mut contrasts = Vec::new();
+        let mut left = 0;
+        for p in pictures {
+            let moved = |place: u32| place / p.width * width + left + place % p.width;
+            contrasts.extend(
+                p.contrasts
+                    .iter()
+                    .map(|&(place, samples)| (moved(place), samples)),
+            );
+            left += p.width;
+        }
+        contrasts.sort_unstable_by_key(|c| c.0);
+        Ok(Self {
+            width,
+            height: last.height,
+            radiance,
+            automatic_exposure: last.automatic_exposure,
+            contrasts,
+        })
+    }
+
     /// Reads linear radiance from an OpenEXR file, to be exposed as if all of it were lit.
     ///
     /// # Errors
