@@ -361,26 +361,85 @@ fn draws_the_reference() {
         assert_eq!((image.width(), image.height()), (32, 24));
     }
     // What belongs to the one way of drawing is refused with the other.
-    for args in [["--paths", "8"], ["--light", "direct"]] {
+    let refused = |args: &[&str]| {
         let run = mesolux(
-            &["render", "room.obj", "-o", "q.png", args[0], args[1]],
+            &[&["render", "room.obj", "-o", "q.png"], args].concat(),
             folder.path(),
         );
-        assert_eq!(run.status.code(), Some(2));
-        assert!(String::from_utf8_lossy(&run.stderr).contains("--reference"));
-    }
-    let run = mesolux(
-        &[
-            "render",
-            "room.obj",
-            "-o",
-            "q.png",
-            "--reference",
-            "--hemicube",
-            "64",
-        ],
-        folder.path(),
-    );
-    assert_eq!(run.status.code(), Some(2));
+        assert_eq!(run.status.code(), Some(2), "{args:?}");
+        assert!(
+            String::from_utf8_lossy(&run.stderr).contains("--reference"),
+            "{args:?}"
+        );
+    };
+    refused(&["--paths", "8"]);
+    refused(&["--reference", "--hemicube", "64"]);
+    refused(&["--reference", "--shading", "normal"]);
+    refused(&["--reference", "--direct", "slots"]);
     assert!(!folder.path().join("q.png").exists());
+}
+
+/// The three parts of the light stand side by side; a camera may be described; compare tells that a picture is itself.
+#[test]
+fn draws_parts_of_the_light_and_compares() {
+    let folder = tempfile::tempdir().expect("a folder for the test");
+    std::fs::write(folder.path().join("room.obj"), ROOM).expect("written");
+    std::fs::write(folder.path().join("room.mtl"), MATERIALS).expect("written");
+    let run = |args: &[&str]| mesolux(args, folder.path());
+    let look = [
+        "--look-from",
+        "0.5,0.5,-2",
+        "--look-at",
+        "0.5,0.5,0",
+        "--fov",
+        "50",
+    ];
+    let base = [
+        "render",
+        "room.obj",
+        "--size",
+        "24x20",
+        "--residual",
+        "0.05",
+        "-o",
+        "all.exr",
+    ];
+    let done = run(&[&base[..], &look, &["--light", "all"]].concat());
+    assert!(
+        done.status.success(),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
+    let image = image::open(folder.path().join("all.exr"))
+        .expect("a picture")
+        .into_rgb32f();
+    assert_eq!(image.dimensions(), (72, 20));
+    for row in 0..20 {
+        for column in 0..24 {
+            let at = |part: u32| image.get_pixel(24 * part + column, row).0;
+            for c in 0..3 {
+                let (sum, whole) = (at(0)[c] + at(1)[c], at(2)[c]);
+                assert!(
+                    (sum - whole).abs() <= 1e-5 * whole.max(1.0),
+                    "{sum} for {whole}"
+                );
+            }
+        }
+    }
+    let done = run(&["compare", "all.exr", "all.exr", "-o", "beside.png"]);
+    let text = String::from_utf8_lossy(&done.stdout);
+    assert!(
+        done.status.success() && text.starts_with("relMSE 0.000e0"),
+        "{text}"
+    );
+    let beside = image::open(folder.path().join("beside.png")).expect("a picture");
+    assert_eq!((beside.width(), beside.height()), (216, 20));
+    for wrong in [
+        ["--look-at", "1,2"],
+        ["--fov", "180"],
+        ["--look-from", "nan,0,0"],
+    ] {
+        let done = run(&[&["render", "room.obj", "-o", "q.png"], &wrong[..]].concat());
+        assert_eq!(done.status.code(), Some(2), "{wrong:?}");
+    }
 }
