@@ -55,6 +55,8 @@ layout(push_constant, scalar) uniform Parameters {
 const float PI = 3.14159265358979;
 // Rays to lights begin so much of the relief's range above it.
 const float LIFT = 1e-4;
+// Shares of its size that a tetrahedron is padded by.
+const float PADDING = 2e-5;
 // Share of a prism's height that counts as its bottom; MARGIN of src/render/relief.rs lies below the relief.
 const float BOTTOM = 5e-4;
 
@@ -110,9 +112,11 @@ Part cut(Tetrahedron t, vec3 from, vec3 along) {
     // Each share is positive behind its zero or before it. The ray begins at the eye, at s = -1.
     bvec4 grows = greaterThan(rate, vec4(0.0));
     bvec4 falls = lessThan(rate, vec4(0.0));
-    vec4 zero = -at / mix(vec4(1.0), rate, notEqual(rate, vec4(0.0)));
+    // A little wider than it is, so that a ray along a side that two of them share lies in one for certain.
+    vec4 padded = at + PADDING;
+    vec4 zero = -padded / mix(vec4(1.0), rate, notEqual(rate, vec4(0.0)));
     vec4 behind = mix(vec4(-1.0), zero, grows);
-    vec4 before = mix(mix(vec4(NEVER), vec4(-NEVER), lessThan(at, vec4(0.0))), mix(vec4(NEVER), zero, falls),
+    vec4 before = mix(mix(vec4(NEVER), vec4(-NEVER), lessThan(padded, vec4(0.0))), mix(vec4(NEVER), zero, falls),
                       notEqual(rate, vec4(0.0)));
     Part part;
     part.enter = max(max(max(behind.x, behind.y), max(behind.z, behind.w)), -1.0);

@@ -64,7 +64,10 @@ impl Mesh {
             .par_iter()
             .flat_map_iter(|&(_, e)| {
                 let light = far(e).copied().unwrap_or(smooth[e]);
-                corners(scene, &scene.triangles[e], light, projection)
+                let triangle = &scene.triangles[e];
+                let away = rest.and_then(|rest| rest.away.get(&e));
+                let places = away.copied().unwrap_or(scene.corners(triangle));
+                corners(triangle, places, light, projection)
             })
             .collect();
         let mut ranges = Vec::new();
@@ -129,12 +132,11 @@ pub fn parameters([x, y, w]: [Vec3; 3], material: Option<&Material>, part: Light
 }
 
 fn corners(
-    scene: &Scene,
     triangle: &Triangle,
+    positions: [DVec3; 3],
     irradiance: [Vec3; 3],
     projection: &Projection,
 ) -> [Vertex; 3] {
-    let positions: [DVec3; 3] = scene.corners(triangle);
     let images = triangle.uv.map(|[u, v]| Vec2::new(u, 1.0 - v));
     // A texture repeats: near 0, its coordinates have more digits left for the place within it.
     let whole = images[0].floor();

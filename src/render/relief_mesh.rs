@@ -37,6 +37,8 @@ pub struct ReliefMesh {
 pub struct FlatRelief {
     /// Those that are drawn as prisms.
     pub prism: Vec<bool>,
+    /// Of those that turn away, at the relief's lowest, so that no ray slips between them and a prism beside them.
+    pub away: HashMap<usize, [DVec3; 3]>,
     /// Of those so far away that a sample is wider than their texels: what they send to the eye, as radiosity, by corner.
     pub far: HashMap<usize, [Vec3; 3]>,
 }
@@ -94,7 +96,9 @@ impl ReliefMesh {
             .map(|(all, direct)| [0, 1, 2].map(|c| all[c] - direct[c]))
             .collect();
         // Light that has bounced inside the relief is indirect, wherever it came from.
-        let sharp = lighting.direct == Direct::Sharp && lighting.part != Light::Indirect;
+        let sharp = lighting.direct == Direct::Sharp
+            && lighting.shading == ReliefShading::Factored
+            && lighting.part != Light::Indirect;
         let inside = (lighting.part != Light::Direct).then_some(&all);
         let arriving = match (lighting.part, sharp) {
             (Light::Global, false) => Some(&all),
@@ -110,6 +114,7 @@ impl ReliefMesh {
         let averaged = lighting.shading == ReliefShading::Factored && lighting.show == Show::Shaded;
         let mut rest = FlatRelief {
             prism: vec![false; scene.triangles.len()],
+            away: HashMap::new(),
             far: HashMap::new(),
         };
         let mut order: Vec<usize> = Vec::new();
@@ -125,6 +130,11 @@ impl ReliefMesh {
                 way.dot(normals[v as usize]) > steepest
             };
             if triangle.vertices.iter().all(away) {
+                let range = &surfaces.ranges[surface_of[e] as usize];
+                let down = triangle.vertices.map(|v| {
+                    scene.vertices[v as usize] + normals[v as usize] * range.above(range.lowest)
+                });
+                rest.away.insert(e, down);
                 continue;
             }
             let texel = tile.size / surfaces.size(surface_of[e]);
