@@ -260,7 +260,7 @@ fn plot(rows: &[Row], svg: &mut String) -> std::result::Result<(), Box<dyn std::
         .margin(12)
         .x_label_area_size(34)
         .y_label_area_size(60)
-        .build_cartesian_2d(0.0..groups.len() as f64, 0.0..1.1 * highest)?;
+        .build_cartesian_2d(0.0..groups.len() as f64, 0.0..1.4 * highest)?;
     let name = |x: &f64| {
         let middle = (x.fract() - 0.5).abs() < 1e-6;
         let group = groups.get(*x as usize).filter(|_| middle);

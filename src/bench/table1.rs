@@ -323,7 +323,7 @@ fn plot(rows: &[Row], svg: &mut String) -> std::result::Result<(), Box<dyn std::
         .margin(12)
         .x_label_area_size(34)
         .y_label_area_size(60)
-        .build_cartesian_2d(0.0..scenes.len() as f64, 0.0..1.12 * highest)?;
+        .build_cartesian_2d(0.0..scenes.len() as f64, 0.0..1.4 * highest)?;
     let name = |x: &f64| {
         let middle = (x.fract() - 0.5).abs() < 1e-6;
         let scene = scenes.get(*x as usize).filter(|_| middle);
