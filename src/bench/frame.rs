@@ -4,9 +4,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::DVec3;
-use plotters::prelude::*;
+use plotters::style::RGBColor;
 use serde::Serialize;
 
+use super::bars::{Bar, Bars};
 use super::spread;
 use crate::atomic_file::write_atomically;
 use crate::bake;
@@ -237,76 +238,43 @@ pub fn write(rows: &[Row], folder: &Path) -> Result<()> {
         }
         Ok(())
     })?;
-    let path = folder.join("frame.svg");
-    let mut svg = String::new();
-    plot(rows, &mut svg).map_err(|e| Error::file(&path, format!("cannot be drawn: {e}")))?;
-    write_atomically(&path, |out| out.write_all(svg.as_bytes()))
+    chart(rows).write(&folder.join("frame.svg"))
 }
 
-/// Bars of milliseconds with their spread, one group for a scene and camera, K = 64 of each shading.
-fn plot(rows: &[Row], svg: &mut String) -> std::result::Result<(), Box<dyn std::error::Error>> {
-    let mut groups: Vec<(&str, &str)> = Vec::new();
+/// Milliseconds with their spread for K = 64, one group for a scene and camera.
+fn chart(rows: &[Row]) -> Bars<'static> {
+    let colours = [
+        RGBColor(120, 120, 120),
+        RGBColor(158, 202, 225),
+        RGBColor(66, 146, 198),
+        RGBColor(8, 69, 148),
+        RGBColor(217, 95, 14),
+    ];
+    let group = |row: &Row| format!("{}, {}", row.scene, row.camera);
+    let mut groups: Vec<String> = Vec::new();
     for row in rows {
-        let group = (row.scene.as_str(), row.camera.as_str());
-        if !groups.contains(&group) {
-            groups.push(group);
+        if !groups.contains(&group(row)) {
+            groups.push(group(row));
         }
     }
-    let highest = rows.iter().map(|r| r.high).fold(1.0, f64::max);
-    let root = SVGBackend::with_string(svg, (1100, 480)).into_drawing_area();
-    root.fill(&WHITE)?;
-    let mut chart = ChartBuilder::on(&root)
-        .caption("Time of a frame, K = 64", ("sans-serif", 22))
-        .margin(12)
-        .x_label_area_size(34)
-        .y_label_area_size(60)
-        .build_cartesian_2d(0.0..groups.len() as f64, 0.0..1.4 * highest)?;
-    let name = |x: &f64| {
-        let middle = (x.fract() - 0.5).abs() < 1e-6;
-        let group = groups.get(*x as usize).filter(|_| middle);
-        group.map_or(String::new(), |(scene, camera)| {
-            format!("{scene}, {camera}")
+    let shown = rows.iter().filter(|r| r.directions.is_none_or(|k| k == 64));
+    let bars = shown.filter_map(|row| {
+        Some(Bar {
+            group: groups.iter().position(|g| *g == group(row))?,
+            kind: SHADINGS.iter().position(|s| s.0 == row.shading)?,
+            value: row.median,
+            spread: Some((row.low, row.high)),
         })
-    };
-    chart
-        .configure_mesh()
-        .disable_x_mesh()
-        .x_labels(2 * groups.len() + 1)
-        .x_label_formatter(&name)
-        .y_desc("milliseconds")
-        .draw()?;
-    for (k, (shading, ..)) in SHADINGS.iter().enumerate() {
-        let colour = Palette99::pick(k).to_rgba();
-        let of = |r: &&Row| r.shading == *shading && r.directions.is_none_or(|k| k == 64);
-        let bars: Vec<_> = rows
+    });
+    Bars {
+        caption: "Time of a frame, K = 64",
+        unit: "milliseconds",
+        bars: bars.collect(),
+        kinds: SHADINGS
             .iter()
-            .filter(of)
-            .map(|r| {
-                let group = groups
-                    .iter()
-                    .position(|g| *g == (r.scene.as_str(), r.camera.as_str()));
-                (group.unwrap_or(0) as f64 + 0.1 + 0.16 * k as f64, r)
-            })
-            .collect();
-        chart
-            .draw_series(
-                bars.iter().map(|&(x, r)| {
-                    Rectangle::new([(x, 0.0), (x + 0.14, r.median)], colour.filled())
-                }),
-            )?
-            .label(*shading)
-            .legend(move |(x, y)| Rectangle::new([(x, y - 5), (x + 12, y + 5)], colour.filled()));
-        chart.draw_series(
-            bars.iter()
-                .map(|&(x, r)| PathElement::new([(x + 0.07, r.low), (x + 0.07, r.high)], BLACK)),
-        )?;
+            .zip(colours)
+            .map(|(shading, colour)| (shading.0.to_owned(), colour))
+            .collect(),
+        groups,
     }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperLeft)
-        .background_style(WHITE.mix(0.8))
-        .border_style(BLACK.mix(0.3))
-        .draw()?;
-    root.present()?;
-    Ok(())
 }

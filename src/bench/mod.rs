@@ -1,5 +1,6 @@
 //! Benchmarks: release builds, median and spread, alternatives side by side.
 
+mod bars;
 mod difference;
 pub mod frame;
 pub mod hemicube;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use glam::Vec3;
-use plotters::prelude::*;
+use plotters::style::RGBColor;
 use serde::Serialize;
 
 use crate::atomic_file::write_atomically;
@@ -19,6 +19,7 @@ use crate::scene::{BuiltinOptions, Scene, displace, load};
 use crate::solver::{Settings, Solver, StopReason};
 use crate::vk::Device;
 
+use super::bars::{Bar, Bars};
 use super::{Difference, plain_pairs};
 
 /// A scene of the paper with its minutes for K = 16, 32, 64 (on hardware of 2013 that it does not name).
@@ -61,10 +62,7 @@ pub struct Row {
 
 impl Row {
     fn name(&self) -> String {
-        match self.kind.parse::<u32>() {
-            Ok(k) => format!("K = {k}"),
-            Err(_) => self.kind.clone(),
-        }
+        bake_name(&self.kind)
     }
 }
 
@@ -294,14 +292,11 @@ fn write(rows: &[Row], folder: &Path) -> Result<()> {
         }
         Ok(())
     })?;
-    let path = folder.join("table1.svg");
-    let mut svg = String::new();
-    plot(rows, &mut svg).map_err(|e| bad(&path, format!("cannot be drawn: {e}")))?;
-    write_atomically(&path, |out| out.write_all(svg.as_bytes()))
+    chart(rows).write(&folder.join("table1.svg"))
 }
 
-/// Bars of seconds, one group a scene.
-fn plot(rows: &[Row], svg: &mut String) -> std::result::Result<(), Box<dyn std::error::Error>> {
+/// Seconds, one group a scene.
+fn chart(rows: &[Row]) -> Bars<'static> {
     const KINDS: [(&str, RGBColor); 5] = [
         ("lambert", RGBColor(120, 120, 120)),
         ("16", RGBColor(158, 202, 225)),
@@ -309,64 +304,36 @@ fn plot(rows: &[Row], svg: &mut String) -> std::result::Result<(), Box<dyn std::
         ("64", RGBColor(8, 69, 148)),
         ("high-poly", RGBColor(217, 95, 14)),
     ];
-    let mut scenes: Vec<&str> = Vec::new();
+    let mut groups: Vec<String> = Vec::new();
     for row in rows {
-        if !scenes.contains(&row.scene.as_str()) {
-            scenes.push(&row.scene);
+        if !groups.contains(&row.scene) {
+            groups.push(row.scene.clone());
         }
     }
-    let highest = rows.iter().map(|r| r.seconds).fold(1.0, f64::max);
-    let root = SVGBackend::with_string(svg, (900, 480)).into_drawing_area();
-    root.fill(&WHITE)?;
-    let mut chart = ChartBuilder::on(&root)
-        .caption("Time of a bake", ("sans-serif", 22))
-        .margin(12)
-        .x_label_area_size(34)
-        .y_label_area_size(60)
-        .build_cartesian_2d(0.0..scenes.len() as f64, 0.0..1.4 * highest)?;
-    let name = |x: &f64| {
-        let middle = (x.fract() - 0.5).abs() < 1e-6;
-        let scene = scenes.get(*x as usize).filter(|_| middle);
-        scene.map_or(String::new(), |s| (*s).to_owned())
-    };
-    chart
-        .configure_mesh()
-        .disable_x_mesh()
-        .x_labels(2 * scenes.len() + 1)
-        .x_label_formatter(&name)
-        .y_desc("seconds")
-        .draw()?;
-    for (k, (kind, colour)) in KINDS.iter().enumerate() {
-        let bars = rows.iter().filter(|r| r.kind == *kind).map(|r| {
-            let scene = scenes.iter().position(|s| *s == r.scene).unwrap_or(0) as f64;
-            let x = scene + 0.1 + 0.16 * k as f64;
-            (x, r.seconds)
-        });
-        let bars: Vec<_> = bars.collect();
-        let label = kind
-            .parse::<u32>()
-            .map_or((*kind).to_owned(), |k| format!("K = {k}"));
-        chart
-            .draw_series(
-                bars.iter()
-                    .map(|&(x, s)| Rectangle::new([(x, 0.0), (x + 0.14, s)], colour.filled())),
-            )?
-            .label(label)
-            .legend(|(x, y)| Rectangle::new([(x, y - 5), (x + 12, y + 5)], colour.filled()));
-        chart.draw_series(bars.iter().map(|&(x, s)| {
-            Text::new(
-                format!("{s:.0}"),
-                (x, s + 0.035 * highest),
-                ("sans-serif", 13),
-            )
-        }))?;
+    let bars = rows.iter().filter_map(|row| {
+        Some(Bar {
+            group: groups.iter().position(|g| *g == row.scene)?,
+            kind: KINDS.iter().position(|k| k.0 == row.kind)?,
+            value: row.seconds,
+            spread: None,
+        })
+    });
+    Bars {
+        caption: "Time of a bake",
+        unit: "seconds",
+        bars: bars.collect(),
+        kinds: KINDS
+            .iter()
+            .map(|(kind, colour)| (bake_name(kind), *colour))
+            .collect(),
+        groups,
     }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperLeft)
-        .background_style(WHITE.mix(0.8))
-        .border_style(BLACK.mix(0.3))
-        .draw()?;
-    root.present()?;
-    Ok(())
+}
+
+/// A kind of bake as it is shown.
+fn bake_name(kind: &str) -> String {
+    match kind.parse::<u32>() {
+        Ok(k) => format!("K = {k}"),
+        Err(_) => kind.to_owned(),
+    }
 }

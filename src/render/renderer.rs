@@ -89,7 +89,7 @@ impl<'a> Renderer<'a> {
                     height: TILE.min(view.height - row),
                 };
                 Commands::run(&self.device, "shade", |cmd| {
-                    self.record(cmd, &target, (tile, SAMPLES), || ());
+                    self.record(cmd, &target, (tile, SAMPLES), None, || ());
                     Ok(())
                 })?;
                 gathered.add(
@@ -118,7 +118,7 @@ impl<'a> Renderer<'a> {
                 Commands::run(&self.device, "frame", |cmd| {
                     cmd.reset_timestamps(&stamps);
                     cmd.timestamp(&stamps, 0);
-                    self.record(cmd, &target, (tile, 1), || cmd.timestamp(&stamps, 1));
+                    self.record(cmd, &target, (tile, 1), None, || cmd.timestamp(&stamps, 1));
                     Ok(())
                 })?;
                 Ok(stamps.intervals()?[0])
@@ -126,7 +126,8 @@ impl<'a> Renderer<'a> {
             .collect()
     }
 
-    /// `drawn` is recorded after all draws, before anything is copied.
+    /// `mark` stands in place of the meter's flag on plain triangles; `drawn` is recorded after all draws, before anything
+    /// is copied.
     /// The share of the pixels that show relief.
     pub fn relief_coverage(&self) -> Result<f64> {
         let (width, height) = (self.view.width, self.view.height);
@@ -138,30 +139,7 @@ impl<'a> Renderer<'a> {
             height,
         };
         Commands::run(&self.device, "coverage", |cmd| {
-            self.shade.record(
-                cmd,
-                &target,
-                (width, height),
-                (&self.mesh.vertices, &self.mesh.indices),
-                self.mesh
-                    .draws(
-                        self.scene,
-                        &self.textures,
-                        &self.projection,
-                        tile,
-                        Light::Global,
-                    )
-                    .map(|mut draw| {
-                        draw.parameters.metered = NOT_RELIEF;
-                        draw
-                    }),
-                || {
-                    if let Some(relief) = &self.relief {
-                        let place = (tile, 1);
-                        relief.record(cmd, self.scene, &self.lighting, &self.projection, place);
-                    }
-                },
-            );
+            self.record(cmd, &target, (tile, 1), Some(NOT_RELIEF), || ());
             Ok(())
         })?;
         let rows = target.rows(height);
@@ -175,16 +153,22 @@ impl<'a> Renderer<'a> {
         cmd: &Commands,
         target: &Target,
         (tile, samples): (Tile, u32),
+        mark: Option<f32>,
         drawn: impl FnOnce(),
     ) {
         let part = self.lighting.part;
+        let plain = self
+            .mesh
+            .draws(self.scene, &self.textures, &self.projection, tile, part);
         self.shade.record(
             cmd,
             target,
             (tile.width * samples, tile.height * samples),
             (&self.mesh.vertices, &self.mesh.indices),
-            self.mesh
-                .draws(self.scene, &self.textures, &self.projection, tile, part),
+            plain.map(|mut draw| {
+                draw.parameters.metered = mark.unwrap_or(draw.parameters.metered);
+                draw
+            }),
             || {
                 if let Some(relief) = &self.relief {
                     let place = (tile, samples);
