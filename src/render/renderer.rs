@@ -8,7 +8,7 @@ use super::picture::{Picture, SAMPLES};
 use super::projection::{Projection, Tile};
 use super::relief::Relief;
 use super::textures::Textures;
-use super::{Light, Lighting, View};
+use super::{Lighting, View};
 use crate::error::Result;
 use crate::passes::shade::{Shade, Target};
 use crate::scene::Scene;
@@ -104,15 +104,8 @@ impl<'a> Renderer<'a> {
 
     /// Draws the whole view `count` times with one sample a pixel, as a window would; seconds of each by GPU timestamps.
     pub fn frames(&self, count: usize) -> Result<Vec<f64>> {
-        let (width, height) = (self.view.width, self.view.height);
-        let target = Target::new(&self.device, &self.shade, (width, height))?;
+        let (target, tile) = self.whole()?;
         let stamps = Timestamps::new(&self.device, "frame", 2)?;
-        let tile = Tile {
-            column: 0,
-            row: 0,
-            width,
-            height,
-        };
         (0..count)
             .map(|_| {
                 Commands::run(&self.device, "frame", |cmd| {
@@ -126,28 +119,36 @@ impl<'a> Renderer<'a> {
             .collect()
     }
 
-    /// `mark` stands in place of the meter's flag on plain triangles; `drawn` is recorded after all draws, before anything
-    /// is copied.
-    /// The share of the pixels that show relief.
+    /// The share of the pixels of such a frame that show relief by rays.
     pub fn relief_coverage(&self) -> Result<f64> {
+        let (target, tile) = self.whole()?;
+        Commands::run(&self.device, "coverage", |cmd| {
+            self.record(cmd, &target, (tile, 1), Some(NOT_RELIEF), || ());
+            Ok(())
+        })?;
+        let rows = target.rows(tile.height);
+        let empty = |p: &&[f32; 4]| p[3] == NOT_RELIEF || **p == [0.0; 4];
+        let elsewhere = rows.iter().filter(empty).count();
+        Ok(1.0 - elsewhere as f64 / rows.len() as f64)
+    }
+
+    /// A target for one sample of each pixel, and the tile that is the whole view.
+    fn whole(&self) -> Result<(Target, Tile)> {
         let (width, height) = (self.view.width, self.view.height);
-        let target = Target::new(&self.device, &self.shade, (width, height))?;
         let tile = Tile {
             column: 0,
             row: 0,
             width,
             height,
         };
-        Commands::run(&self.device, "coverage", |cmd| {
-            self.record(cmd, &target, (tile, 1), Some(NOT_RELIEF), || ());
-            Ok(())
-        })?;
-        let rows = target.rows(height);
-        let empty = |p: &&[f32; 4]| p[3] == NOT_RELIEF || **p == [0.0; 4];
-        let elsewhere = rows.iter().filter(empty).count();
-        Ok(1.0 - elsewhere as f64 / rows.len() as f64)
+        Ok((
+            Target::new(&self.device, &self.shade, (width, height))?,
+            tile,
+        ))
     }
 
+    /// `mark` stands in place of the meter's flag on plain triangles; `drawn` is recorded after all draws, before anything
+    /// is copied.
     fn record(
         &self,
         cmd: &Commands,
