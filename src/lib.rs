@@ -8,6 +8,8 @@
 //!           └───────────────────────────────────────────────────────────┘
 //!                                         ▼
 //!                        light ─► solution (file) ─► render (picture)
+//!
+//! scene ─► displaced ─► path_tracer (the truth, to compare with)
 //! ```
 //!
 //! | of the paper | where |
@@ -17,6 +19,8 @@
 //! | the same by reciprocity and Lambert's formula | `shaders/bin_receivers.comp`, [`form_factor`] |
 //! | equation (3), light sent by direction | [`meso`], `shaders/send_relief.comp` |
 //! | equation (4), light received by direction | [`directions`], `shaders/bin_to_relief.comp` |
+//! | Figure 1, from elements to vertices | [`meso::MesoVertices`] |
+//! | drawing by relief mapping | [`render`], `shaders/relief.frag` |
 //! | hemicubes | [`hemicube`], [`passes::item_buffer`] |
 //!
 //! [`bake::bake`] is the main road; [`solver::Solver`] gives each step.
