@@ -57,7 +57,7 @@ const float PI = 3.14159265358979;
 const float LIFT = 1e-4;
 // Shares of its size that a tetrahedron is padded by.
 const float PADDING = 2e-5;
-// Share of a prism's height that counts as its bottom; MARGIN of src/render/relief.rs lies below the relief.
+// Share of a prism's height that counts as its bottom; MARGIN of src/render/relief_mesh.rs lies below the relief.
 const float BOTTOM = 5e-4;
 
 // A place on the relief.
@@ -323,10 +323,9 @@ void main() {
     case VIEW_ALBEDO:
         shown = rho;
         break;
-    case VIEW_NORMAL: {
+    case VIEW_NORMAL:
         shown = 0.5 + 0.5 * facet_normal(place);
         break;
-    }
     case VIEW_HEIGHT:
         shown = vec3((place.height - surface.lowest) / (surface.top - surface.lowest));
         break;

@@ -302,7 +302,7 @@ fn point(light: &PointLight, elements: &Elements) -> [Source; 2] {
     [half(DVec3::Y, 0.0), half(DVec3::NEG_Y, 1.0)]
 }
 
-fn triangle_area([a, b, c]: [DVec3; 3]) -> f64 {
+pub(crate) fn triangle_area([a, b, c]: [DVec3; 3]) -> f64 {
     0.5 * (b - a).cross(c - a).length()
 }
 

@@ -6,6 +6,7 @@ use glam::Vec3;
 use serde::Serialize;
 
 use crate::scene::{Scene, Triangle};
+use crate::sources::triangle_area;
 
 /// Difference of irradiance over triangles that two scenes share, by area, colours together.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -41,8 +42,7 @@ impl Difference {
     pub fn new(scene: &Scene, pairs: &[[usize; 2]], (ours, reference): (&[Vec3], &[Vec3])) -> Self {
         let (mut whole, mut difference, mut squares, mut light) = (0.0, 0.0, 0.0, 0.0);
         for &[a, b] in pairs {
-            let [p, q, r] = scene.corners(&scene.triangles[a]);
-            let area = (q - p).cross(r - p).length() / 2.0;
+            let area = triangle_area(scene.corners(&scene.triangles[a]));
             let (ours, reference) = (ours[a].as_dvec3(), reference[b].as_dvec3());
             let apart = ours - reference;
             whole += area;

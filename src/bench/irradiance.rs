@@ -4,8 +4,8 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use crate::error::Result;
-use crate::path_tracer::PathTracer;
+use crate::error::{Error, Result};
+use crate::path_tracer::{NORMAL_95, PathTracer};
 use crate::render::Light;
 use crate::scene::{Scene, displace};
 
@@ -37,9 +37,6 @@ pub struct Sample {
     error: Vec3,
 }
 
-/// Standard errors on each side that hold 95 % of a normal distribution.
-const NORMAL_95: f64 = 1.959_964;
-
 /// The truth at the centroids of triangles without relief, chosen by area, stratified.
 pub fn samples(scene: &Scene, options: &Options) -> Result<Vec<Sample>> {
     let plain: Vec<usize> = (0..scene.triangles.len())
@@ -48,6 +45,12 @@ pub fn samples(scene: &Scene, options: &Options) -> Result<Vec<Sample>> {
             !material.has_relief() && !material.emits()
         })
         .collect();
+    if plain.is_empty() {
+        return Err(Error::Scene {
+            scene: scene.name.clone(),
+            what: "it has no triangles without relief and emission to compare".into(),
+        });
+    }
     let cross = |e: usize| {
         let [a, b, c] = scene.corners(&scene.triangles[e]);
         (b - a).cross(c - a)

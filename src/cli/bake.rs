@@ -1,6 +1,7 @@
 //! `mesolux bake`.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
@@ -11,8 +12,10 @@ use super::{Builtin, DeviceOptions};
 use mesolux::directions::Directions;
 use mesolux::error::{Error, Result};
 use mesolux::meso::{self, Transport};
-use mesolux::solution::Origin;
+use mesolux::scene::Scene;
+use mesolux::solution::{Origin, Solution};
 use mesolux::solver::{Estimator, Report, Settings, Update};
+use mesolux::vk::Device;
 
 /// Solve a scene and write the light on every element
 ///
@@ -171,14 +174,7 @@ pub fn run(options: &Options) -> Result<()> {
     let scene = options.builtin.load(&options.scene)?;
     let read_seconds = start.elapsed().as_secs_f64();
     let device = options.device.open()?;
-    catch_interrupts();
-    let bar = Bar::new();
-    let solution = mesolux::bake::bake(&device, &scene, &settings, |update| {
-        bar.show(progress(update));
-        !interrupted()
-    });
-    bar.finish();
-    let solution = solution?;
+    let solution = bake_visibly(&device, &scene, &settings)?;
     options.device.check()?;
     let origin = origin(&options.scene, &options.builtin, scene.hash());
     solution.save(&options.output, &origin, &options.solve)?;
@@ -215,6 +211,18 @@ pub fn run(options: &Options) -> Result<()> {
         println!("{text}");
     }
     Ok(())
+}
+
+/// Bakes with progress on stderr; Ctrl-C stops the bake and keeps what it has.
+pub fn bake_visibly(device: &Arc<Device>, scene: &Scene, settings: &Settings) -> Result<Solution> {
+    catch_interrupts();
+    let bar = Bar::new();
+    let solution = mesolux::bake::bake(device, scene, settings, |update| {
+        bar.show(progress(update));
+        !interrupted()
+    });
+    bar.finish();
+    solution
 }
 
 /// Where the scene came from, for the bake's metadata; paths are made absolute.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use clap::Args;
 
-use super::bake::{SolveOptions, writable};
+use super::bake::{SolveOptions, bake_visibly, writable};
 use super::camera::CameraOptions;
 use super::reference::{self, ReferenceOptions};
 use super::show::ShowOptions;
@@ -107,7 +107,7 @@ pub fn run(options: &Options) -> Result<()> {
     let camera = options.camera.of(&scene)?;
     let view = options.view(&camera);
     let device = options.device.open()?;
-    let solution = mesolux::bake::bake(&device, &scene, &settings, |_| true)?;
+    let solution = bake_visibly(&device, &scene, &settings)?;
     draw(&device, &scene, (&solution).into(), &view)
 }
 

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::render::Picture;
 
 /// Standard errors on each side of a mean that hold 95 % of a normal distribution.
-const NORMAL_95: f64 = 1.959_964;
+pub(crate) const NORMAL_95: f64 = 1.959_964;
 
 /// What paths have found. Every pass of [`PathTracer::render`](super::PathTracer::render) is one batch, independent of the
 /// others.

@@ -23,6 +23,7 @@ use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 pub use film::Film;
+pub(crate) use film::NORMAL_95;
 
 use crate::error::{Error, Result};
 use crate::render::{Light, Projection, View};

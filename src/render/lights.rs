@@ -6,6 +6,7 @@ use super::Projection;
 use crate::constants::{KIND_POINT, KIND_SURFACE, LIGHT_POINTS};
 use crate::passes::types::LightPoint;
 use crate::scene::Scene;
+use crate::sources::triangle_area;
 
 /// A light point in scene units.
 pub struct Shining {
@@ -23,8 +24,7 @@ pub fn shining(scene: &Scene) -> Vec<Shining> {
         .enumerate()
         .filter_map(|(e, t)| {
             let emitted = DVec3::from(scene.materials[t.material as usize].ke.map(f64::from));
-            let [a, b, c] = scene.corners(t);
-            let power = emitted.element_sum() * (b - a).cross(c - a).length() / 2.0;
+            let power = emitted.element_sum() * triangle_area(scene.corners(t));
             (power > 0.0).then_some((e, emitted, power))
         })
         .collect();

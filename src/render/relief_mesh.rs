@@ -75,13 +75,12 @@ impl ReliefMesh {
         let mut factors = Vec::with_capacity(tiles.len());
         for tile in &tiles {
             let (visibility, _) = visibility(device, &tile.field, lighting.cache, &mut marcher)?;
-            let error = FACTOR_ERROR;
             factors.push(Factors::new(
                 &directions,
                 &tile.field,
                 &visibility,
                 &tile.shading,
-                error,
+                FACTOR_ERROR,
             ));
         }
         let surfaces = Surfaces::new(scene, &tiles, &factors);
@@ -169,10 +168,7 @@ impl ReliefMesh {
             let triangle = &scene.triangles[e];
             let surface = surface_of[e];
             let tile = &tiles[surface as usize];
-            let (material, range) = (
-                &scene.materials[triangle.material as usize],
-                &surfaces.ranges[surface as usize],
-            );
+            let range = &surfaces.ranges[surface as usize];
             let mut corners = [0, 1, 2];
             corners.sort_by_key(|&k| triangle.vertices[k]);
             let place = |k: usize, height: f64| {
@@ -223,7 +219,6 @@ impl ReliefMesh {
                 bitangent,
                 normal,
             });
-            debug_assert!(material.has_relief());
             mirrored.push(matches!(corners, [0, 2, 1] | [1, 0, 2] | [2, 1, 0]));
         }
         let mut ranges: Vec<(u32, u32, u32)> = Vec::new();
