@@ -1,4 +1,5 @@
-// Chooses the sources of a batch: those with the most unshot power (Southwell), ties to the lower index. One workgroup.
+// Chooses the sources of a batch: those to be drawn with the most unshot power (Southwell), ties to the lower index, and of
+// those whose form factors are kept all that come near the strongest in power, in the order of their indices. One workgroup.
 // When the stop rule holds it chooses none, so that batches already submitted do nothing.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -11,10 +12,12 @@ layout(scalar, binding = 1) buffer Shot { vec4 shot[]; };
 layout(scalar, binding = 2) buffer Unshot { vec4 unshot[]; };
 layout(scalar, binding = 3) writeonly buffer Slots { Slot slots[]; };
 layout(scalar, binding = 4) buffer State { Progress progress; };
+layout(scalar, binding = 5) readonly buffer KeptRows { KeptRow kept_rows[]; };
 
 layout(push_constant, scalar) uniform Parameters {
     uint source_count;
-    uint slot_count;
+    uint fresh_slots;    // for sources that are drawn; those for kept ones follow
+    uint replay_slots;
     uint shot_limit;
     float stop_power;    // stops when all emission is shot and no more reflected power than this is unshot
 };
@@ -23,13 +26,19 @@ shared float best_power[SELECT_GROUP];
 shared uint best_source[SELECT_GROUP];
 shared float sum_emitted[SELECT_GROUP];
 shared float sum_reflected[SELECT_GROUP];
+shared float best_kept[SELECT_GROUP];
+shared uint replays_before[SELECT_GROUP];
 
-// This invocation's own best of the sources that it looks after.
+bool is_kept(uint s) {
+    return kept_rows[s].chunk != NONE;
+}
+
+// This invocation's own best of the sources that it looks after and that need drawing.
 void scan(uint lane) {
     float power = 0.0;
     uint source = NONE;
     for (uint s = lane; s < source_count; s += SELECT_GROUP) {
-        if (unshot[s].w > power) {
+        if (unshot[s].w > power && !is_kept(s)) {
             power = unshot[s].w;
             source = s;
         }
@@ -38,16 +47,28 @@ void scan(uint lane) {
     best_source[lane] = source;
 }
 
+// Gives a slot all that a source has left.
+void shoot(uint slot, uint source) {
+    bool emission_left = shot[source].w == 0.0;
+    vec3 of_reflected = unshot[source].rgb;
+    slots[slot] = Slot(emission_left ? sources[source].emitted : vec3(0.0), source, of_reflected);
+    shot[source] = vec4(shot[source].rgb + of_reflected, 1.0);
+    unshot[source].w = 0.0;
+}
+
 void main() {
     uint lane = gl_LocalInvocationID.x;
     float emitted = 0.0;
     float reflected = 0.0;
+    float kept = 0.0;
     for (uint s = lane; s < source_count; s += SELECT_GROUP) {
         vec3 rgb = unshot[s].rgb;
         float of_reflected = sources[s].kind == KIND_POINT ? 0.0 : sources[s].area * (rgb.r + rgb.g + rgb.b);
         reflected += of_reflected;
         emitted += shot[s].w == 0.0 ? max(unshot[s].w - of_reflected, 0.0) : 0.0;
+        kept = is_kept(s) ? max(kept, unshot[s].w) : kept;
     }
+    best_kept[lane] = kept;
     sum_emitted[lane] = emitted;
     sum_reflected[lane] = reflected;
     scan(lane);
@@ -56,19 +77,24 @@ void main() {
         if (lane < half_count) {
             sum_emitted[lane] += sum_emitted[lane + half_count];
             sum_reflected[lane] += sum_reflected[lane + half_count];
+            best_kept[lane] = max(best_kept[lane], best_kept[lane + half_count]);
         }
         barrier();
     }
     float unshot_emitted = sum_emitted[0];
     float unshot_reflected = sum_reflected[0];
+    float kept_power = best_kept[0];
     uint shots = progress.shots;
     barrier();
     bool stop = unshot_emitted == 0.0 && unshot_reflected <= stop_power;
-    uint wanted = stop ? 0 : min(slot_count, shot_limit - min(shots, shot_limit));
+    uint shots_left = stop ? 0 : shot_limit - min(shots, shot_limit);
+    uint wanted = min(fresh_slots, shots_left);
 
+    // Draw: a tournament.
+    float top = kept_power;
     uint chosen = 0;
-    for (uint slot = 0; slot < slot_count; slot++) {
-        // Every invocation walks the same list of the lanes' bests: a tournament in which the lower index wins a tie.
+    for (uint slot = 0; slot < fresh_slots; slot++) {
+        // Every invocation walks the same list of the lanes' bests, in which the lower index wins a tie.
         uint winner = NONE;
         if (slot < wanted) {
             float power = 0.0;
@@ -78,26 +104,57 @@ void main() {
                     winner = best_source[l];
                 }
             }
+            top = max(top, power);
+            if (power * float(DRAW_SHARE) < kept_power) {
+                winner = NONE;
+                wanted = slot;
+            }
         }
         barrier();
         if (winner == NONE) {
             if (lane == 0) {
-                slots[slot] = Slot(vec3(0.0), NONE, vec3(0.0));
+                slots[slot].source = NONE;
             }
             continue;
         }
         chosen++;
         if (winner % SELECT_GROUP == lane) {
-            bool emission_left = shot[winner].w == 0.0;
-            vec3 of_reflected = unshot[winner].rgb;
-            slots[slot] = Slot(emission_left ? sources[winner].emitted : vec3(0.0), winner, of_reflected);
-            shot[winner] = vec4(shot[winner].rgb + of_reflected, 1.0);
-            unshot[winner].w = 0.0;
+            shoot(slot, winner);
             scan(lane);
         }
         barrier();
     }
+
+    // Replay: each invocation looks after a range of sources, and its slots follow those of the invocations before it.
+    uint most = min(replay_slots, shots_left - chosen);
+    float least = top / float(REPLAY_SHARE);
+    uint share = (source_count + SELECT_GROUP - 1) / SELECT_GROUP;
+    uint begin = min(lane * share, source_count);
+    uint end = min(begin + share, source_count);
+    uint mine = 0;
+    for (uint s = begin; s < end && most > 0; s++) {
+        mine += is_kept(s) && unshot[s].w > 0.0 && unshot[s].w >= least ? 1 : 0;
+    }
+    replays_before[lane] = mine;
+    barrier();
+    uint before = 0;
+    uint all = 0;
+    for (uint l = 0; l < SELECT_GROUP; l++) {
+        before += l < lane ? replays_before[l] : 0;
+        all += replays_before[l];
+    }
+    uint replayed = min(all, most);
+    for (uint s = begin; s < end && before < most && mine > 0; s++) {
+        if (is_kept(s) && unshot[s].w > 0.0 && unshot[s].w >= least) {
+            shoot(fresh_slots + before, s);
+            before++;
+            mine--;
+        }
+    }
+    for (uint slot = replayed + lane; slot < replay_slots; slot += SELECT_GROUP) {
+        slots[fresh_slots + slot].source = NONE;
+    }
     if (lane == 0) {
-        progress = Progress(unshot_emitted, unshot_reflected, shots + chosen, chosen);
+        progress = Progress(unshot_emitted, unshot_reflected, shots + chosen + replayed, chosen, replayed);
     }
 }

@@ -130,18 +130,20 @@ void main() {
         float scale = facing > 0.0 ? 1.0 / facing : 0.0;
         reflected *= scale;
         emitted *= scale * shot.emitted;
-        uint kept = (shot.source - first_source) * count + j;
-        vec3 before = shot_exits[kept];
-        shot_exits[kept] = reflected;
-        reflected -= before;
     }
 
-    // Keep the energy: the directions together carry what the source has to send.
+    // Keep the energy: all that the source has been given to send carries its power, whatever the order it came in. What it
+    // sends now is that less what it has sent.
+    uint kept = (shot.source - first_source) * count + j;
+    vec3 before = mine ? shot_exits[kept] : vec3(0.0);
     float share = mine ? shares[j] : 0.0;
     vec3 power = sum_over_directions(j, share * reflected);
+    vec3 power_before = sum_over_directions(j, share * before);
     vec3 emitted_power = sum_over_directions(j, share * emitted);
     if (mine) {
+        reflected = with_power(reflected, power, power_before + shot.reflected);
+        shot_exits[kept] = reflected;
         exits[2 * slot * count + j] = with_power(emitted, emitted_power, shot.emitted);
-        exits[(2 * slot + 1) * count + j] = with_power(reflected, power, shot.reflected);
+        exits[(2 * slot + 1) * count + j] = reflected - before;
     }
 }

@@ -16,9 +16,9 @@
 //! | --- | --- |
 //! | equation (1), F_ij = Σ ΔF_q | `shaders/bin_pixels.comp`, [`hemicube::delta_form_factor`] |
 //! | equation (2), ΔIrrad = ΔB ΔF A_i / A_j | `shaders/apply_pixels.comp`, [`reference::bin_pixels`] |
-//! | the same by reciprocity and Lambert's formula | `shaders/bin_receivers.comp`, [`form_factor`] |
+//! | the same by reciprocity and Lambert's formula | `shaders/form_factors.comp`, [`form_factor`] |
 //! | equation (3), light sent by direction | [`meso`], `shaders/send_relief.comp` |
-//! | equation (4), light received by direction | [`directions`], `shaders/bin_to_relief.comp` |
+//! | equation (4), light received by direction | [`directions`], `shaders/gather_to_relief.comp` |
 //! | Figure 1, from elements to vertices | [`meso::MesoVertices`] |
 //! | drawing by relief mapping | [`render`], `shaders/relief.frag` |
 //! | hemicubes | [`hemicube`], [`passes::item_buffer`] |

@@ -188,7 +188,7 @@ fn estimators_equal_their_twins() {
                 *sum += emitted
                     * match estimator {
                         Estimator::Receiver => {
-                            reference::bin_receivers::gather(elements, source, &items, FACE, e)
+                            reference::form_factors::gather(elements, source, &items, FACE, e)
                         }
                         Estimator::Pixel => {
                             reference::bin_pixels::irradiance(source, sums[e], elements.area[e])

@@ -54,6 +54,8 @@ fn solver(transport: Transport, k: u32, shots: Option<u32>) -> Solver {
         hemicube: 32,
         batch: BATCH,
         shots,
+        // Every shot is drawn, so that a batch is BATCH of them.
+        visibility_memory: Some(0),
         relief: Options {
             transport,
             directions: Directions::new(k).expect("a number of the paper"),

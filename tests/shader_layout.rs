@@ -49,8 +49,8 @@ fn spirv() -> BTreeSet<Vec<u32>> {
         shaders::CULL_COMP,
         shaders::SELECT_COMP,
         shaders::MEASURE_COMP,
-        shaders::BIN_RECEIVERS_COMP,
-        shaders::BIN_TO_RELIEF_COMP,
+        shaders::FORM_FACTORS_COMP,
+        shaders::GATHER_TO_RELIEF_COMP,
         shaders::ITEM_BUFFER_VERT,
         shaders::RELIEF_FRAG,
         shaders::RELIEF_RAYS_COMP,
@@ -103,6 +103,7 @@ fn rust_and_glsl_agree() {
     check!(true, Slot: emitted source reflected);
     check!(true, View: eye x y w);
     check!(true, Draw: index_count instance_count first_index vertex_offset first_instance);
+    check!(true, KeptRow: chunk first);
     check!(true, MesoElement: tangent response bitangent scale);
     check!(true, Reflected: sum error);
     check!(true, Prism: low_a low_b low_c high_a high_b high_c uv_a uv_b uv_c light_a light_b light_c surface
@@ -112,6 +113,7 @@ fn rust_and_glsl_agree() {
     check!(true, HeightTile: first width height top highest);
     check!(true, HeightRay: from tile to);
     check!(true, HeightHit: t cell local height gradient steps);
-    // Progress stands alone in its buffer, not in an array.
-    check!(false, Progress: unshot_emitted unshot_reflected shots selected);
+    // Progress and KeptState stand alone in their buffers, not in an array.
+    check!(false, Progress: unshot_emitted unshot_reflected shots selected replayed);
+    check!(false, KeptState: chunk used rows);
 }

@@ -48,6 +48,19 @@ struct Slot {
     vec3 reflected;
 };
 
+// Where the kept form factors of a source start: first the table of its blocks, in words from here.
+struct KeptRow {
+    uint chunk;        // NONE: they are not kept
+    uint first;
+};
+
+// How far the memory for kept form factors is filled.
+struct KeptState {
+    uint chunk;        // the one under way
+    uint used;         // words of it
+    uint rows;         // kept in all
+};
+
 // One face of a hemicube: clip = (dot(d, x), dot(d, y), near, dot(d, w)) with d = position - eye.
 struct View {
     vec3 eye;
@@ -70,7 +83,8 @@ struct Progress {
     float unshot_emitted;    // power, internal units
     float unshot_reflected;
     uint shots;              // so far, this batch included
-    uint selected;           // in this batch
+    uint selected;           // to be drawn in this batch
+    uint replayed;           // in this batch, from kept form factors
 };
 
 // An element with a relief.

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use bytemuck::Pod;
 use glam::Vec3;
 
-use super::types::{Component, Draw, Meshlet, Progress, Slot, Source, View, contour_corners};
+use super::types::{
+    Component, Draw, KeptRow, Meshlet, Progress, Slot, Source, View, contour_corners,
+};
 use crate::charts::Connections;
 use crate::constants::{FACES, NONE};
 use crate::elements::Elements;
@@ -137,6 +139,8 @@ pub struct State {
     pub shot: Buffer,
     pub unshot: Buffer,
     pub progress: Buffer,
+    /// Where the form factors of each source are kept.
+    pub kept_rows: Buffer,
 }
 
 impl State {
@@ -144,14 +148,7 @@ impl State {
     pub fn new(device: &Arc<Device>, scene: &SceneBuffers) -> Result<Self> {
         let elements = u64::from(scene.element_count);
         let sources = u64::from(scene.source_count);
-        let zeroed = |name, bytes| -> Result<Buffer> {
-            let buffer = Buffer::new(device, name, bytes, BufferUse::Storage)?;
-            Commands::run(device, name, |cmd| {
-                cmd.fill(&buffer, 0);
-                Ok(())
-            })?;
-            Ok(buffer)
-        };
+        let zeroed = |name, bytes| filled(device, name, bytes, 0);
         Ok(Self {
             direct: zeroed("direct", 12 * elements)?,
             direct_error: zeroed("direct error", 12 * elements)?,
@@ -161,13 +158,22 @@ impl State {
             shot: zeroed("shot", 16 * sources)?,
             unshot: zeroed("unshot", 16 * sources)?,
             progress: zeroed("progress", size_of::<Progress>() as u64)?,
+            kept_rows: filled(
+                device,
+                "kept rows",
+                size_of::<KeptRow>() as u64 * sources,
+                NONE,
+            )?,
         })
     }
 }
 
 /// A batch of sources with their hemicubes.
 pub struct Batch {
+    /// Sources that are drawn.
     pub slot_count: u32,
+    /// Slots behind theirs, for sources whose form factors were kept.
+    pub replay_slots: u32,
     /// Pixels a side of a face.
     pub face_size: u32,
     pub slots: Buffer,
@@ -188,6 +194,11 @@ pub struct Batch {
 const DRAWN_BYTES: u64 = 16;
 
 impl Batch {
+    /// Of both kinds.
+    pub fn all_slots(&self) -> u32 {
+        self.slot_count + self.replay_slots
+    }
+
     /// How many slots a batch may have: what fits the device's largest buffer, its widest image and an eighth of its
     /// memory, and no more than `wanted`.
     pub fn fitting_slots(
@@ -209,12 +220,13 @@ impl Batch {
             .max(1) as u32
     }
 
+    /// `(slot_count, replay_slots)` as in the fields.
     pub fn new(
         device: &Arc<Device>,
         pass: &RenderPass,
         scene: &SceneBuffers,
         face_size: u32,
-        slot_count: u32,
+        (slot_count, replay_slots): (u32, u32),
     ) -> Result<Self> {
         let regions = u64::from(slot_count * FACES);
         let drawn = regions * u64::from(scene.element_count);
@@ -240,10 +252,11 @@ impl Batch {
                 source: NONE,
                 reflected: Vec3::ZERO,
             };
-            slot_count as usize
+            (slot_count + replay_slots) as usize
         ];
         Ok(Self {
             slot_count,
+            replay_slots,
             face_size,
             slots: upload(device, "slots", &empty, BufferUse::Storage)?,
             views: buffer(
@@ -265,6 +278,16 @@ impl Batch {
             _depth: depth,
         })
     }
+}
+
+/// A device buffer of one word over and over.
+pub fn filled(device: &Arc<Device>, name: &str, bytes: u64, word: u32) -> Result<Buffer> {
+    let buffer = Buffer::new(device, name, bytes, BufferUse::Storage)?;
+    Commands::run(device, name, |cmd| {
+        cmd.fill(&buffer, word);
+        Ok(())
+    })?;
+    Ok(buffer)
 }
 
 /// A device buffer filled with `data`.

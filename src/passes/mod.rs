@@ -2,10 +2,13 @@
 //! never each other; only the solver orders them.
 
 pub mod bin_pixels;
-pub mod bin_receivers;
 pub mod buffers;
 pub mod cull;
+pub mod factor_buffers;
+pub mod form_factors;
+pub mod gather;
 pub mod item_buffer;
+pub mod keep;
 pub mod measure;
 pub mod measure_relief;
 pub mod relief;

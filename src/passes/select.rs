@@ -17,7 +17,9 @@ pub struct Select {
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub struct Parameters {
     pub source_count: u32,
-    pub slot_count: u32,
+    /// For sources that are drawn; those for kept ones follow.
+    pub fresh_slots: u32,
+    pub replay_slots: u32,
     /// Shots at most, from the start.
     pub shot_limit: u32,
     /// No more shots once all emission is shot and this much reflected power is unshot, internal units.
@@ -31,7 +33,7 @@ impl Select {
                 device,
                 "select",
                 shaders::SELECT_COMP,
-                &[Binding::Storage; 5],
+                &[Binding::Storage; 6],
                 size_of::<Parameters>(),
                 &[],
                 false,
@@ -53,6 +55,7 @@ impl Select {
                 &state.unshot,
                 &batch.slots,
                 &state.progress,
+                &state.kept_rows,
             ]
             .map(Bind::Buffer),
         )

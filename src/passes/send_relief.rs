@@ -72,6 +72,6 @@ impl SendRelief {
             columns,
             rows,
         ];
-        cmd.dispatch(&self.pipeline, set, &parameters, [batch.slot_count, 1, 1]);
+        cmd.dispatch(&self.pipeline, set, &parameters, [batch.all_slots(), 1, 1]);
     }
 }

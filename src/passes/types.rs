@@ -113,6 +113,23 @@ pub struct Slot {
     pub reflected: Vec3,
 }
 
+/// Where the kept form factors of a source start; `chunk` is `NONE` where they are not kept.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub struct KeptRow {
+    pub chunk: u32,
+    pub first: u32,
+}
+
+/// How far the memory for kept form factors is filled.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+pub struct KeptState {
+    pub chunk: u32,
+    pub used: u32,
+    pub rows: u32,
+}
+
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub struct View {
@@ -139,6 +156,7 @@ pub struct Progress {
     pub unshot_reflected: f32,
     pub shots: u32,
     pub selected: u32,
+    pub replayed: u32,
 }
 
 /// An element with a relief.

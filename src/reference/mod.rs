@@ -1,9 +1,10 @@
 //! The slow, obviously right twin of each GPU pass, in f64 on the CPU.
 
 pub mod bin_pixels;
-pub mod bin_receivers;
 pub mod cull;
+pub mod form_factors;
 pub mod item_buffer;
+pub mod kept;
 pub mod measure;
 pub mod relief_rays;
 pub mod relief_visibility;

@@ -78,26 +78,27 @@ pub fn send_relief(
         let response = relief.response(members.start + i);
         (response.emission[slot] / response.mean_emission).as_dvec3()
     };
-    let kept: Vec<DVec3> = (0..k)
+    let shares = slot_shares(directions);
+    let all: Vec<DVec3> = (0..k)
         .map(|j| mean(j, &|i, slot| responded[i][slot]))
         .collect();
-    let new: Vec<DVec3> = kept
-        .iter()
-        .zip(before)
-        .map(|(now, before)| *now - *before)
-        .collect();
+    let kept = with_power(all, &shares, power(before, &shares) + reflected);
+    let new = kept.iter().zip(before).map(|(now, before)| *now - *before);
     let glow: Vec<DVec3> = (0..k).map(|j| emitted * mean(j, &emission)).collect();
-    let shares = slot_shares(directions);
     Sent {
         emitted: with_power(glow, &shares, emitted),
-        reflected: with_power(new, &shares, reflected),
+        reflected: new.collect(),
         kept,
     }
 }
 
+fn power(values: &[DVec3], shares: &[f64]) -> DVec3 {
+    values.iter().zip(shares).map(|(v, &s)| *v * s).sum()
+}
+
 /// Brings a distribution to the power that it must have: scaled, or where less than half of it is there, shifted.
 fn with_power(mut values: Vec<DVec3>, shares: &[f64], wanted: DVec3) -> Vec<DVec3> {
-    let power: DVec3 = values.iter().zip(shares).map(|(v, &s)| *v * s).sum();
+    let power = power(&values, shares);
     for value in &mut values {
         for c in 0..3 {
             if power[c] > 0.5 * wanted[c] {

@@ -7,10 +7,13 @@ use crate::constants::FACES;
 use crate::error::Result;
 use crate::hemicube::pixel_count;
 use crate::passes::bin_pixels::{self, BinPixels};
-use crate::passes::bin_receivers::{BinReceivers, BinRelief, ReliefSets};
 use crate::passes::buffers::{Batch, SceneBuffers, State, download};
 use crate::passes::cull::Cull;
+use crate::passes::factor_buffers::FactorBuffers;
+use crate::passes::form_factors::{self, FormFactors};
+use crate::passes::gather::{Gather, GatherRelief, ReliefSets};
 use crate::passes::item_buffer::ItemBuffer;
+use crate::passes::keep::{self, Keep};
 use crate::passes::measure::Measure;
 use crate::passes::measure_relief::MeasureRelief;
 use crate::passes::relief_buffers::ReliefBuffers;
@@ -26,7 +29,10 @@ pub struct Stages {
     pub select: f64,
     pub cull: f64,
     pub item_buffer: f64,
+    /// Form factors.
     pub bin: f64,
+    /// Irradiance from form factors, fresh and kept, and keeping them; `receiver` alone.
+    pub gather: f64,
 }
 
 /// What a batch did.
@@ -57,6 +63,8 @@ pub(super) struct OnDevice<'a> {
     pub scene: &'a SceneBuffers,
     pub state: &'a State,
     pub relief: Option<&'a ReliefBuffers>,
+    /// For the `receiver` estimator.
+    pub factors: Option<&'a FactorBuffers>,
 }
 
 struct Passes {
@@ -69,16 +77,28 @@ struct Passes {
 
 #[allow(clippy::large_enum_variant)] // one of each lives as long as the solver
 enum Bin {
-    Receivers(BinReceivers),
-    Relief(ReliefPasses),
+    Receivers(ReceiverPasses),
     Pixels(BinPixels),
+}
+
+struct ReceiverPasses {
+    form_factors: FormFactors,
+    /// None where nothing is to be kept.
+    keep: Option<Keep>,
+    gather: GatherPasses,
+}
+
+#[allow(clippy::large_enum_variant)] // as `Bin`
+enum GatherPasses {
+    Plain(Gather),
+    Relief(ReliefPasses),
 }
 
 /// What only scenes with relief compile.
 struct ReliefPasses {
     measure: MeasureRelief,
     send: SendRelief,
-    bin: BinRelief,
+    gather: GatherRelief,
 }
 
 struct Sets {
@@ -91,16 +111,76 @@ struct Sets {
 
 #[allow(clippy::large_enum_variant)] // as `Bin`
 enum BinSets {
-    Receivers(DescriptorSet),
-    Relief {
-        measure: DescriptorSet,
-        send: DescriptorSet,
-        bin: ReliefSets,
-    },
+    Receivers(ReceiverSets),
     Pixels(bin_pixels::Buffers),
 }
 
-const STAMPS: u32 = 5;
+struct ReceiverSets {
+    form_factors: form_factors::Sets,
+    keep: Option<keep::Sets>,
+    gather: GatherSets,
+}
+
+#[allow(clippy::large_enum_variant)] // as `Bin`
+enum GatherSets {
+    Plain(DescriptorSet),
+    Relief {
+        measure: DescriptorSet,
+        send: DescriptorSet,
+        gather: ReliefSets,
+    },
+}
+
+impl Bin {
+    fn new(device: &Arc<Device>, estimator: Estimator, on: &OnDevice<'_>) -> Result<Self> {
+        let Some(factors) = on.factors.filter(|_| estimator == Estimator::Receiver) else {
+            return Ok(Self::Pixels(BinPixels::new(device)?));
+        };
+        let gather = match on.relief {
+            Some(_) => GatherPasses::Relief(ReliefPasses {
+                measure: MeasureRelief::new(device)?,
+                send: SendRelief::new(device)?,
+                gather: GatherRelief::new(device)?,
+            }),
+            None => GatherPasses::Plain(Gather::new(device)?),
+        };
+        Ok(Self::Receivers(ReceiverPasses {
+            form_factors: FormFactors::new(device, on.relief.is_some())?,
+            keep: factors.keeps().then(|| Keep::new(device)).transpose()?,
+            gather,
+        }))
+    }
+
+    fn bind(&self, device: &Arc<Device>, batch: &Batch, on: &OnDevice<'_>) -> Result<BinSets> {
+        let (scene, state) = (on.scene, on.state);
+        let (passes, factors) = match (self, on.factors) {
+            (Self::Receivers(passes), Some(factors)) => (passes, factors),
+            (Self::Pixels(bin), _) => {
+                return Ok(BinSets::Pixels(bin.bind(device, scene, state, batch)?));
+            }
+            (Self::Receivers(_), None) => unreachable!("made for form factors"),
+        };
+        let gather = match (&passes.gather, on.relief) {
+            (GatherPasses::Plain(gather), _) => {
+                GatherSets::Plain(gather.bind(scene, state, batch, factors)?)
+            }
+            (GatherPasses::Relief(passes), Some(relief)) => GatherSets::Relief {
+                measure: passes.measure.bind(scene, state, relief)?,
+                send: passes.send.bind(scene, batch, relief)?,
+                gather: passes.gather.bind(scene, state, batch, factors, relief)?,
+            },
+            (GatherPasses::Relief(_), None) => unreachable!("made for a scene with relief"),
+        };
+        let keep = passes.keep.as_ref();
+        Ok(BinSets::Receivers(ReceiverSets {
+            form_factors: passes.form_factors.bind(scene, batch, factors, on.relief)?,
+            keep: keep.map(|k| k.bind(state, batch, factors)).transpose()?,
+            gather,
+        }))
+    }
+}
+
+const STAMPS: u32 = 6;
 
 impl BatchLoop {
     pub(super) fn new(
@@ -111,45 +191,30 @@ impl BatchLoop {
         on: &OnDevice<'_>,
         stop_power: f64,
     ) -> Result<Self> {
-        let OnDevice {
+        let &OnDevice {
             scene,
             state,
             relief,
-        } = *on;
+            factors,
+        } = on;
         let passes = Passes {
             measure: Measure::new(device)?,
             select: Select::new(device)?,
             cull: Cull::new(device, settings.culling)?,
             item_buffer,
-            bin: match (settings.estimator, relief) {
-                (Estimator::Receiver, Some(_)) => Bin::Relief(ReliefPasses {
-                    measure: MeasureRelief::new(device)?,
-                    send: SendRelief::new(device)?,
-                    bin: BinRelief::new(device)?,
-                }),
-                (Estimator::Receiver, None) => Bin::Receivers(BinReceivers::new(device)?),
-                (Estimator::Pixel, _) => Bin::Pixels(BinPixels::new(device)?),
-            },
+            bin: Bin::new(device, settings.estimator, on)?,
         };
         let sets = Sets {
             measure: passes.measure.bind(scene, state)?,
             select: passes.select.bind(scene, state, &batch)?,
             cull: passes.cull.bind(scene, &batch)?,
             item_buffer: passes.item_buffer.bind(&batch)?,
-            bin: match (&passes.bin, relief) {
-                (Bin::Receivers(bin), _) => BinSets::Receivers(bin.bind(scene, state, &batch)?),
-                (Bin::Relief(passes), Some(relief)) => BinSets::Relief {
-                    measure: passes.measure.bind(scene, state, relief)?,
-                    send: passes.send.bind(scene, &batch, relief)?,
-                    bin: passes.bin.bind(scene, state, &batch, relief)?,
-                },
-                (Bin::Relief(_), None) => unreachable!("made for a scene with relief"),
-                (Bin::Pixels(bin), _) => BinSets::Pixels(bin.bind(device, scene, state, &batch)?),
-            },
+            bin: passes.bin.bind(device, &batch, on)?,
         };
         let select = Parameters {
             source_count: scene.source_count,
-            slot_count: batch.slot_count,
+            fresh_slots: batch.slot_count,
+            replay_slots: batch.replay_slots,
             shot_limit: settings.shots.unwrap_or(u32::MAX),
             stop_power: stop_power as f32,
         };
@@ -176,8 +241,8 @@ impl BatchLoop {
                 measure_relief(cmd, &passes, &sets, relief);
                 passes.select.record(cmd, &sets.select, &select);
                 cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-                if let (Bin::Relief(passes), BinSets::Relief { send, .. }, Some(relief)) =
-                    (&passes.bin, &sets.bin, relief)
+                if let Some((passes, GatherSets::Relief { send, .. }, relief)) =
+                    of_relief(&passes, &sets, relief)
                 {
                     passes.send.record(cmd, send, relief, &batch);
                     cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
@@ -190,21 +255,37 @@ impl BatchLoop {
                     .item_buffer
                     .record(cmd, &sets.item_buffer, scene, &batch);
                 cmd.timestamp(stamps, 3);
-                match (&passes.bin, &sets.bin) {
-                    (Bin::Receivers(bin), BinSets::Receivers(set)) => {
-                        bin.record(cmd, set, scene, &batch);
-                    }
-                    (Bin::Relief(passes), BinSets::Relief { bin, .. }) => {
-                        if let Some(relief) = relief {
-                            passes.bin.record(cmd, bin, relief, &batch);
+                match (&passes.bin, &sets.bin, factors) {
+                    (Bin::Receivers(passes), BinSets::Receivers(sets), Some(factors)) => {
+                        let form_factors = &sets.form_factors;
+                        passes
+                            .form_factors
+                            .record(cmd, form_factors, &batch, factors);
+                        cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+                        cmd.timestamp(stamps, 4);
+                        match (&passes.gather, &sets.gather, relief) {
+                            (GatherPasses::Plain(pass), GatherSets::Plain(set), _) => {
+                                pass.record(cmd, set, scene, &batch);
+                            }
+                            (
+                                GatherPasses::Relief(passes),
+                                GatherSets::Relief { gather, .. },
+                                Some(relief),
+                            ) => passes.gather.record(cmd, gather, relief, &batch, factors),
+                            _ => unreachable!("passes and sets are made of one scene"),
+                        }
+                        if let (Some(keep), Some(set)) = (&passes.keep, &sets.keep) {
+                            cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+                            keep.record(cmd, set, &batch, factors);
                         }
                     }
-                    (Bin::Pixels(bin), BinSets::Pixels(buffers)) => {
+                    (Bin::Pixels(bin), BinSets::Pixels(buffers), _) => {
                         bin.record(cmd, buffers, scene, &batch);
+                        cmd.timestamp(stamps, 4);
                     }
                     _ => unreachable!("passes and sets are made of one estimator"),
                 }
-                cmd.timestamp(stamps, 4);
+                cmd.timestamp(stamps, 5);
                 layout.record(cmd, state, &batch, &readback[i]);
                 Ok(())
             })
@@ -256,7 +337,7 @@ impl BatchLoop {
         self.commands[i].wait()?;
         let layout = ReadbackLayout::new(&self.batch);
         let stamps = self.timestamps[i].intervals()?;
-        let [select, cull, item_buffer, bin] = stamps[..] else {
+        let [select, cull, item_buffer, bin, gather] = stamps[..] else {
             panic!("a batch has {STAMPS} timestamps");
         };
         let readback = &self.readback[i];
@@ -267,6 +348,7 @@ impl BatchLoop {
                 cull,
                 item_buffer,
                 bin,
+                gather,
             },
             counts: readback.read(layout.counts, layout.regions),
             draws: readback.read(layout.draws, layout.regions),
@@ -295,20 +377,38 @@ impl BatchLoop {
         })?;
         Ok((
             readback.read(0, texels),
-            self.slots(device)?.iter().map(|s| s.source).collect(),
+            (self.slots(device)?.iter())
+                .take(self.batch.slot_count as usize)
+                .map(|s| s.source)
+                .collect(),
         ))
     }
 
     /// What the last batch chose.
     pub(super) fn slots(&self, device: &Arc<Device>) -> Result<Vec<Slot>> {
-        download(device, &self.batch.slots, self.batch.slot_count as usize)
+        download(device, &self.batch.slots, self.batch.all_slots() as usize)
+    }
+}
+
+/// What a scene with relief has more of.
+fn of_relief<'a>(
+    passes: &'a Passes,
+    sets: &'a Sets,
+    relief: Option<&'a ReliefBuffers>,
+) -> Option<(&'a ReliefPasses, &'a GatherSets, &'a ReliefBuffers)> {
+    match (&passes.bin, &sets.bin, relief) {
+        (Bin::Receivers(passes), BinSets::Receivers(sets), Some(relief)) => match &passes.gather {
+            GatherPasses::Relief(passes) => Some((passes, &sets.gather, relief)),
+            GatherPasses::Plain(_) => None,
+        },
+        _ => None,
     }
 }
 
 /// The unshot light of the sources with a relief, over what [`Measure`] took them for.
 fn measure_relief(cmd: &Commands, passes: &Passes, sets: &Sets, relief: Option<&ReliefBuffers>) {
-    if let (Bin::Relief(passes), BinSets::Relief { measure, .. }, Some(relief)) =
-        (&passes.bin, &sets.bin, relief)
+    if let Some((passes, GatherSets::Relief { measure, .. }, relief)) =
+        of_relief(passes, sets, relief)
     {
         passes.measure.record(cmd, measure, relief);
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);

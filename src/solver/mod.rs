@@ -1,6 +1,6 @@
 //! The progressive solver: it alone orders the passes.
 //!
-//! A batch is one submission: measure → select → cull → item buffer → binning. Two batches are under way at a time; the
+//! A batch is one submission: measure → select → cull → item buffer → form factors → gather → keep. Two batches are under way at a time; the
 //! device chooses what to shoot and when to stop, and the CPU looks on one batch behind.
 
 mod batch;
@@ -14,14 +14,16 @@ use std::time::{Duration, Instant};
 use glam::Vec3;
 
 use crate::charts::Connections;
+use crate::constants::REPLAYS;
 use crate::elements::Elements;
 use crate::error::{Error, Result};
 use crate::meso;
 use crate::passes::buffers::{Batch, SceneBuffers, State, download};
 use crate::passes::cull::Culling;
+use crate::passes::factor_buffers::FactorBuffers;
 use crate::passes::item_buffer::ItemBuffer;
 use crate::passes::relief_buffers::ReliefBuffers;
-use crate::passes::types::{Progress, Reflected, Slot};
+use crate::passes::types::{KeptState, Progress, Reflected, Slot};
 use crate::scene::PointLight;
 use crate::sources::{self, Grouping, Sources};
 use crate::vk::Device;
@@ -55,8 +57,11 @@ pub struct Settings {
     pub seed: u64,
     pub grouping: Grouping,
     pub culling: Culling,
-    /// Sources of a batch, at most.
+    /// Sources of a batch that are drawn, at most.
     pub batch: u32,
+    /// Bytes on the device for form factors of sources that have been drawn, so that their further shots need no drawing. None:
+    /// [`VISIBILITY_MEMORY`], or a third of the device's memory if that is less. The `pixel` estimator keeps none.
+    pub visibility_memory: Option<u64>,
     /// How relief takes part; see [`crate::bake::elements`].
     pub relief: meso::Options,
 }
@@ -73,10 +78,14 @@ impl Default for Settings {
             grouping: Grouping::default(),
             culling: Culling::default(),
             batch: 16,
+            visibility_memory: None,
             relief: meso::Options::default(),
         }
     }
 }
+
+/// Bytes for kept form factors, unless told otherwise.
+pub const VISIBILITY_MEMORY: u64 = 768 << 20;
 
 /// Smallest and largest hemicube.
 pub const HEMICUBE_RANGE: std::ops::RangeInclusive<u32> = 8..=2048;
@@ -138,6 +147,7 @@ pub struct Solver {
     scene: SceneBuffers,
     state: State,
     relief: Option<ReliefBuffers>,
+    factors: Option<FactorBuffers>,
     report: Report,
     emitted_power: f64,
     setup: Duration,
@@ -165,12 +175,32 @@ impl Solver {
         let item_buffer = ItemBuffer::new(device)?;
         let wanted = settings.batch.clamp(1, scene.source_count.max(1));
         let slots = Batch::fitting_slots(device, &scene, settings.hemicube, wanted);
-        let batch = Batch::new(device, &item_buffer.pass, &scene, settings.hemicube, slots)?;
+        let memory = settings
+            .visibility_memory
+            .unwrap_or_else(|| VISIBILITY_MEMORY.min(device.limits().heap_bytes / 3));
+        let replays = match settings.estimator {
+            Estimator::Receiver if memory > 0 => REPLAYS,
+            _ => 0,
+        };
+        let (face, slots) = (settings.hemicube, (slots, replays));
+        let batch = Batch::new(device, &item_buffer.pass, &scene, face, slots)?;
         let relief = elements
             .relief
             .as_ref()
-            .map(|relief| ReliefBuffers::new(device, &elements, relief, &sources, slots))
+            .map(|relief| {
+                ReliefBuffers::new(device, &elements, relief, &sources, batch.all_slots())
+            })
             .transpose()?;
+        let factors = match settings.estimator {
+            Estimator::Receiver => Some(FactorBuffers::new(
+                device,
+                &scene,
+                relief.as_ref(),
+                slots.0,
+                memory,
+            )?),
+            Estimator::Pixel => None,
+        };
         let emitted_power: f64 = sources
             .list
             .iter()
@@ -188,10 +218,11 @@ impl Solver {
                 scene: &scene,
                 state: &state,
                 relief: relief.as_ref(),
+                factors: factors.as_ref(),
             },
             stop_power,
         )?;
-        let mut report = Report::new(device, settings, &elements, &sources, slots);
+        let mut report = Report::new(device, settings, &elements, &sources, slots.0);
         report.set_meshlets(scene.meshlet_count);
         Ok(Self {
             device: Arc::clone(device),
@@ -203,6 +234,7 @@ impl Solver {
             scene,
             state,
             relief,
+            factors,
             report,
             emitted_power,
             setup: start.elapsed(),
@@ -226,6 +258,7 @@ impl Solver {
                 unshot_reflected,
                 shots,
                 selected,
+                replayed,
             } = batch.progress;
             let unshot_share = ratio(f64::from(unshot_emitted + unshot_reflected), emitted);
             let error_bound = factor.map(|f| unshot_share * f.max(1.0));
@@ -236,7 +269,7 @@ impl Solver {
             if stop.is_some() {
                 return false;
             }
-            if selected == 0 {
+            if selected + replayed == 0 {
                 stop = Some(match self.settings.shots {
                     Some(limit) if shots >= limit => StopReason::Shots,
                     _ => StopReason::Residual,
@@ -272,6 +305,12 @@ impl Solver {
         report.stop = stop.unwrap_or(StopReason::Residual);
         report.seconds.setup = self.setup.as_secs_f64();
         report.seconds.solve_wall += start.elapsed().as_secs_f64();
+        if let Some(factors) = &self.factors {
+            let [state] = download::<KeptState>(&self.device, &factors.state, 1)?[..] else {
+                unreachable!("one was asked for");
+            };
+            report.kept_sources = state.rows.into();
+        }
         let behind: Vec<u32> = download(&self.device, &self.state.behind, self.elements.len())?;
         report.skipped.receivers_behind_source = behind.iter().map(|&b| u64::from(b)).sum();
         if let Some(relief) = &self.relief {

@@ -31,7 +31,10 @@ pub struct Seconds {
     pub select: f64,
     pub cull: f64,
     pub item_buffer: f64,
+    /// Form factors.
     pub bin: f64,
+    /// Irradiance from form factors, fresh and kept.
+    pub gather: f64,
 }
 
 /// What the scene did not need.
@@ -63,6 +66,10 @@ pub struct Report {
     pub batch: u32,
     pub hemicubes: u64,
     pub triangles_drawn: u64,
+    /// Sources whose form factors are kept: they were drawn once.
+    pub kept_sources: u64,
+    /// Shots from kept form factors, without drawing.
+    pub replayed: u64,
     pub shots: u32,
     pub unshot_share: f64,
     /// Null where a reflectance is 1: nothing bounds what is left then.
@@ -119,6 +126,8 @@ impl Report {
             batch,
             hemicubes: 0,
             triangles_drawn: 0,
+            kept_sources: 0,
+            replayed: 0,
             shots: 0,
             unshot_share: 1.0,
             error_bound: None,
@@ -145,6 +154,8 @@ impl Report {
         self.seconds.cull += batch.stages.cull;
         self.seconds.item_buffer += batch.stages.item_buffer;
         self.seconds.bin += batch.stages.bin;
+        self.seconds.gather += batch.stages.gather;
+        self.replayed += u64::from(batch.progress.replayed);
         for (draw, counts) in batch.draws.iter().zip(&batch.counts).take(faces) {
             let drawn = u64::from(draw.index_count / 3);
             self.triangles_drawn += drawn;

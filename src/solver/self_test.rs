@@ -67,7 +67,7 @@ pub fn ids_come_back_right(device: &Arc<Device>) -> Result<bool> {
     let scene = SceneBuffers::new(device, &elements, &sources, &connections)?;
     let state = State::new(device, &scene)?;
     let item_buffer = ItemBuffer::new(device)?;
-    let batch = Batch::new(device, &item_buffer.pass, &scene, SIZE, 1)?;
+    let batch = Batch::new(device, &item_buffer.pass, &scene, SIZE, (1, 0))?;
     let measure = crate::passes::measure::Measure::new(device)?;
     let select = crate::passes::select::Select::new(device)?;
     let cull = crate::passes::cull::Cull::new(device, settings.culling)?;
@@ -85,7 +85,8 @@ pub fn ids_come_back_right(device: &Arc<Device>) -> Result<bool> {
         then();
         let parameters = crate::passes::select::Parameters {
             source_count: scene.source_count,
-            slot_count: 1,
+            fresh_slots: 1,
+            replay_slots: 0,
             shot_limit: 1,
             stop_power: 0.0,
         };

@@ -17,6 +17,8 @@ pub enum BufferUse {
     Storage,
     /// Device memory that also feeds vertices, indices or draw commands.
     Geometry,
+    /// Device memory that shaders reach by its address: no larger limit than the device's memory.
+    Addressed,
     /// Memory that the CPU writes once and the device copies from.
     Upload,
     /// Memory that the device writes and the CPU reads.
@@ -41,6 +43,9 @@ impl Buffer {
             flags |= vk::BufferUsageFlags::VERTEX_BUFFER
                 | vk::BufferUsageFlags::INDEX_BUFFER
                 | vk::BufferUsageFlags::INDIRECT_BUFFER;
+        }
+        if usage == BufferUse::Addressed {
+            flags |= vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS;
         }
         if bytes > device.limits().max_storage_buffer_range
             && matches!(usage, BufferUse::Storage | BufferUse::Geometry)
@@ -70,7 +75,9 @@ impl Buffer {
                 name,
                 requirements,
                 location: match usage {
-                    BufferUse::Storage | BufferUse::Geometry => MemoryLocation::GpuOnly,
+                    BufferUse::Storage | BufferUse::Geometry | BufferUse::Addressed => {
+                        MemoryLocation::GpuOnly
+                    }
                     BufferUse::Upload => MemoryLocation::CpuToGpu,
                     BufferUse::Readback => MemoryLocation::GpuToCpu,
                 },
@@ -95,6 +102,13 @@ impl Buffer {
 
     pub fn bytes(&self) -> u64 {
         self.bytes
+    }
+
+    /// Where an [`BufferUse::Addressed`] buffer lies, for shaders.
+    pub fn address(&self) -> u64 {
+        let info = vk::BufferDeviceAddressInfo::default().buffer(self.raw);
+        // SAFETY: the buffer is bound, and made with an address unless the caller is wrong, which validation tells.
+        unsafe { self.device.raw.get_buffer_device_address(&info) }
     }
 
     /// Writes `data` at byte `offset`. The buffer must be an [`BufferUse::Upload`] buffer that no submission reads.

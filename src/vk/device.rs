@@ -66,6 +66,7 @@ impl Device {
             .queue_priorities(&priorities)];
         let mut f12 = vk::PhysicalDeviceVulkan12Features::default()
             .scalar_block_layout(true)
+            .buffer_device_address(true)
             .shader_buffer_int64_atomics(candidate.int64_atomics);
         let mut f13 = vk::PhysicalDeviceVulkan13Features::default()
             .synchronization2(true)
@@ -96,7 +97,7 @@ impl Device {
             device: raw.clone(),
             physical_device: candidate.raw,
             debug_settings: Default::default(),
-            buffer_device_address: false,
+            buffer_device_address: true,
             allocation_sizes: Default::default(),
         });
         let allocator = match allocator {

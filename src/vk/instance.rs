@@ -188,6 +188,7 @@ impl Instance {
                     "fullDrawIndexUint32",
                 ),
                 (f12.scalar_block_layout != 0, "scalarBlockLayout"),
+                (f12.buffer_device_address != 0, "bufferDeviceAddress"),
                 (f13.synchronization2 != 0, "synchronization2"),
                 (
                     f13.maintenance4 != 0,

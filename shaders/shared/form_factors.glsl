@@ -1,12 +1,10 @@
-// The receiver estimator's gathering, for elements of all kinds. FROM_RELIEF: some sources send by direction. TO_RELIEF, with
-// VECTOR_FLUX: the elements of this dispatch receive by direction.
+// Form factor, with visibility, from every element to every source of a batch. VECTOR_FLUX: the elements of this dispatch
+// receive by direction, and get the vector whose dot product with the normal is the form factor.
 
 #include "shared/types.glsl"
 #include "shared/hemicube.glsl"
 #include "shared/lambert.glsl"
-#ifdef FROM_RELIEF
-#include "shared/directions.glsl"
-#endif
+#include "shared/kept.glsl"
 
 layout(local_size_x = GROUP) in;
 
@@ -20,42 +18,23 @@ layout(scalar, binding = 4) readonly buffer Vertices { vec3 vertices[]; };
 layout(scalar, binding = 5) readonly buffer Planes { vec4 planes[]; };
 // xyz: centroid; w: radius of the ball about it that holds the element.
 layout(scalar, binding = 6) readonly buffer Balls { vec4 balls[]; };
-layout(scalar, binding = 7) buffer Direct { vec3 direct[]; };
-layout(scalar, binding = 8) buffer DirectError { vec3 direct_error[]; };
-layout(scalar, binding = 9) buffer Indirect { vec3 indirect[]; };
-layout(scalar, binding = 10) buffer IndirectError { vec3 indirect_error[]; };
-// Shots that were passed over because the source lies behind the element's plane.
-layout(scalar, binding = 11) buffer Behind { uint behind_count[]; };
-layout(scalar, binding = 12) readonly buffer Areas { float element_area[]; };
-layout(binding = 13) uniform usampler2D items;
-
-#ifdef FROM_RELIEF
-// Light that the sources with a relief send by direction, [slot][emitted, reflected][direction].
-layout(scalar, binding = 14) readonly buffer Exits { vec3 exits[]; };
-#endif
-#ifdef TO_RELIEF
-layout(scalar, binding = 15) readonly buffer MesoElements { MesoElement meso_elements[]; };
-// Radiosity for each moment, [response][direction][colour].
-layout(scalar, binding = 16) readonly buffer Albedos { vec3 albedos[]; };
-// Moments ∫ L ω dω of the light that arrives, in the element's frame, [meso element][direction][colour].
-layout(scalar, binding = 17) buffer MomentsDirect { vec3 moments_direct[]; };
-layout(scalar, binding = 18) buffer MomentsIndirect { vec3 moments_indirect[]; };
-layout(scalar, binding = 19) buffer MesoReflected { Reflected meso_reflected[]; };
+layout(scalar, binding = 7) readonly buffer Areas { float element_area[]; };
+// Whether any element of a block of GROUP sees the source, [slot][block].
+layout(scalar, binding = 8) writeonly buffer Occupied { uint occupied[]; };
+// [slot][element of this dispatch]
+layout(scalar, binding = 9) writeonly buffer Fresh { FLUX fresh[]; };
+layout(binding = 10) uniform usampler2D items;
+#ifdef VECTOR_FLUX
+layout(scalar, binding = 11) readonly buffer MesoElements { MesoElement meso_elements[]; };
 #endif
 
 layout(push_constant, scalar) uniform Parameters {
     uint first_element;
     uint element_count;
-    uint slot_count;
     uint face_size;
-#ifdef FROM_RELIEF
-    uint first_relief_source;
-    uint relief_source_count;
-    uvec2 cells;              // of the directions' square
-#endif
+    uint first_block;
+    uint block_count;    // of all elements
 };
-
-#include "shared/accumulate.glsl"
 
 // Rounding of a plane's height at a point: a few steps of f32 at coordinates up to 1.
 const float HEIGHT_EPSILON = 1e-6;
@@ -194,6 +173,11 @@ const vec3 POINTS[11] = vec3[](
     vec3(0.101286507, 0.797426985, 0.125939181)
 );
 
+// Whether the whole source lies behind an element.
+bool behind(Source s, vec3 middle, vec3 n) {
+    return dot(middle - s.eye, n) >= s.radius;
+}
+
 // Mean over the element of form factor (see FLUX) times visibility.
 FLUX gather(uint element, vec4 ball, vec3 n, uint slot, Source s) {
     vec3 d = ball.xyz - s.eye;
@@ -221,89 +205,49 @@ FLUX gather(uint element, vec4 ball, vec3 n, uint slot, Source s) {
     return sum;
 }
 
-#ifdef FROM_RELIEF
-// What a source with a relief sends towards a place: the slot's own light, by direction.
-void send_by_direction(uint slot, Source s, vec3 to, inout vec3 emitted, inout vec3 reflected) {
-    vec3 d = to - s.middle;
-    vec3 local = vec3(dot(d, s.tangent), dot(d, s.bitangent), dot(d, s.normal)) * inversesqrt(max(dot(d, d), 1e-38));
-    Look at = look(local, cells);
-    uint count = cells.x * cells.y;
-    uint first = 2 * slot * count;
-    bool emits = emitted != vec3(0.0);
-    emitted = vec3(0.0);
-    reflected = vec3(0.0);
-    for (uint i = 0; i < 4; i++) {
-        if (emits) {
-            emitted += at.weight[i] * exits[first + at.k[i]];
-        }
-        reflected += at.weight[i] * exits[first + count + at.k[i]];
-    }
-}
-#endif
+shared uint any_seen;
 
 void main() {
-    uint e = first_element + gl_GlobalInvocationID.x;
-    if (gl_GlobalInvocationID.x >= element_count) {
+    uint slot = gl_WorkGroupID.y;
+    Slot shot = slots[slot];
+    if (shot.source == NONE) {
         return;
     }
-    vec4 ball = balls[e];
-    vec3 n = planes[e].xyz;
-    vec3 add_direct = vec3(0.0);
-    vec3 add_indirect = vec3(0.0);
-    uint behind = 0;
-#ifdef TO_RELIEF
-    uint m = gl_GlobalInvocationID.x;
-    MesoElement meso = meso_elements[m];
-    uint directions = cells.x * cells.y;
-    vec3 add_reflected = vec3(0.0);
-#endif
-    // Without `continue`, whose several ways back would keep compilers from seeing that every lane is at the same slot
-    // and loads the same source.
-    for (uint slot = 0; slot < slot_count && slots[slot].source != NONE; slot++) {
-        Slot shot = slots[slot];
-        Source s = sources[shot.source];
-        bool is_behind = dot(ball.xyz - s.eye, n) >= s.radius;
-        behind += is_behind ? 1 : 0;
-        FLUX f = is_behind ? FLUX(0.0) : gather(e, ball, n, slot, s);
-        if (f != FLUX(0.0)) {
-            vec3 emitted = shot.emitted;
-            vec3 reflected = shot.reflected;
-#ifdef FROM_RELIEF
-            if (shot.source - first_relief_source < relief_source_count) {
-                send_by_direction(slot, s, ball.xyz, emitted, reflected);
-            }
-#endif
-#ifdef TO_RELIEF
-            vec3 local = vec3(dot(meso.tangent, f), dot(meso.bitangent, f), dot(n, f));
-            uint k = direction_of(local * inversesqrt(dot(local, local)), cells);
-            uint at = 3 * (m * directions + k);
-            uint response = 3 * (meso.response * directions + k);
-            bool emits = emitted != vec3(0.0);
-            bool reflects = reflected != vec3(0.0);
-            for (uint c = 0; c < 3; c++) {
-                if (emits) {
-                    moments_direct[at + c] += emitted[c] * local;
-                }
-                if (reflects) {
-                    moments_indirect[at + c] += reflected[c] * local;
-                }
-                add_reflected[c] += dot(albedos[response + c], local) * (emitted[c] + reflected[c]);
-            }
-            add_direct += local.z * emitted;
-            add_indirect += local.z * reflected;
-#else
-            add_direct += f * emitted;
-            add_indirect += f * reflected;
-#endif
-        }
+    if (gl_LocalInvocationID.x == 0) {
+        any_seen = 0;
     }
-    behind_count[e] += behind;
-    accumulate(e, add_direct, add_indirect);
-#ifdef TO_RELIEF
-    precise vec3 y = add_reflected * meso.scale - meso_reflected[m].error;
-    precise vec3 sum = meso_reflected[m].sum;
-    precise vec3 total = sum + y;
-    precise vec3 error = (total - sum) - y;
-    meso_reflected[m] = Reflected(total, error);
+    barrier();
+    uint i = gl_GlobalInvocationID.x;
+    uint e = first_element + i;
+    if (i < element_count) {
+        Source s = sources[shot.source];
+        vec4 ball = balls[e];
+        vec3 n = planes[e].xyz;
+        FLUX f = FLUX(0.0);
+        if (!behind(s, ball.xyz, n)) {
+            f = gather(e, ball, n, slot, s);
+        }
+#ifdef VECTOR_FLUX
+        MesoElement meso = meso_elements[i];
+        vec3 local = vec3(dot(meso.tangent, f), dot(meso.bitangent, f), dot(n, f));
+        float strength = as_kept(length(local));
+        if (strength > 0.0) {
+            any_seen = 1;
+            local = strength * kept_direction(direction_code(local / strength));
+        } else {
+            local = vec3(0.0);
+        }
+        fresh[slot * element_count + i] = local;
+#else
+        f = as_kept(f);
+        if (f > 0.0) {
+            any_seen = 1;
+        }
+        fresh[slot * element_count + i] = f;
 #endif
+    }
+    barrier();
+    if (gl_LocalInvocationID.x == 0) {
+        occupied[slot * block_count + first_block + gl_WorkGroupID.x] = any_seen;
+    }
 }

@@ -1,0 +1,91 @@
+// Finds room for the form factors of the batch's fresh sources and writes the tables of their rows: for each block of GROUP
+// elements where its factors start, 0 for a block that sees nothing of the source. One workgroup; slots in order, so that
+// which sources are kept is the same every run.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_buffer_reference : require
+#extension GL_EXT_buffer_reference_uvec2 : require
+#include "shared/types.glsl"
+
+layout(local_size_x = SELECT_GROUP) in;
+
+layout(scalar, binding = 0) readonly buffer Slots { Slot slots[]; };
+// [slot][block]
+layout(scalar, binding = 1) readonly buffer Occupied { uint occupied[]; };
+layout(scalar, binding = 2) buffer KeptRows { KeptRow kept_rows[]; };
+layout(scalar, binding = 3) readonly buffer Chunks { uvec2 chunks[]; };
+layout(scalar, binding = 4) buffer State { KeptState state; };
+
+layout(push_constant, scalar) uniform Parameters {
+    uint fresh_slots;
+    uint block_count;
+    uint meso_blocks;    // the last of them, with vectors
+    uint chunk_count;
+    uint chunk_words;
+};
+
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Words { uint word[]; };
+
+// 16 bits an element; a vector takes 32 for its direction.
+const uint PLAIN_WORDS = GROUP / 2;
+const uint MESO_WORDS = GROUP / 2 + GROUP;
+
+shared uint first_word[SELECT_GROUP];
+shared uint row_words;
+shared uint row_chunk;
+shared uint row_first;
+
+uint words_of(uint slot, uint block) {
+    uint words = block < block_count - meso_blocks ? PLAIN_WORDS : MESO_WORDS;
+    return occupied[slot * block_count + block] == 0 ? 0 : words;
+}
+
+void main() {
+    uint lane = gl_LocalInvocationID.x;
+    uint share = (block_count + SELECT_GROUP - 1) / SELECT_GROUP;
+    uint begin = min(lane * share, block_count);
+    uint end = min(begin + share, block_count);
+    for (uint slot = 0; slot < fresh_slots; slot++) {
+        uint source = slots[slot].source;
+        if (source == NONE) {
+            break;
+        }
+        uint mine = 0;
+        for (uint block = begin; block < end; block++) {
+            mine += words_of(slot, block);
+        }
+        first_word[lane] = mine;
+        barrier();
+        if (lane == 0) {
+            uint words = block_count;
+            for (uint l = 0; l < SELECT_GROUP; l++) {
+                uint of_lane = first_word[l];
+                first_word[l] = words;
+                words += of_lane;
+            }
+            if (state.chunk < chunk_count && state.used + words > chunk_words) {
+                state.chunk++;
+                state.used = 0;
+            }
+            bool fits = state.chunk < chunk_count && words <= chunk_words;
+            row_chunk = fits ? state.chunk : NONE;
+            row_first = state.used;
+            if (fits) {
+                kept_rows[source] = KeptRow(row_chunk, row_first);
+                state.used += words;
+                state.rows++;
+            }
+        }
+        barrier();
+        if (row_chunk != NONE) {
+            Words words = Words(chunks[row_chunk]);
+            uint at = first_word[lane];
+            for (uint block = begin; block < end; block++) {
+                uint count = words_of(slot, block);
+                words.word[row_first + block] = count == 0 ? 0 : at;
+                at += count;
+            }
+        }
+        barrier();
+    }
+}

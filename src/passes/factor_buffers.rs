@@ -1,0 +1,105 @@
+//! Form factors on the device: those of the batch, and those that are kept so that a source is drawn once.
+
+use std::sync::Arc;
+
+use super::buffers::{SceneBuffers, filled, upload};
+use super::groups;
+use super::relief_buffers::ReliefBuffers;
+use super::types::KeptState;
+use crate::constants::GROUP;
+use crate::error::Result;
+use crate::vk::{Buffer, BufferUse, Device};
+
+/// Form factors of the batch, and the memory for kept ones: a row for each source, in 16 bits an element (48 with relief),
+/// without the blocks of GROUP elements that see nothing of it.
+pub struct FactorBuffers {
+    pub plain_count: u32,
+    pub meso_count: u32,
+    /// `[slot][element]`, of elements without relief.
+    pub fresh: Buffer,
+    /// `[slot][meso element]`, vectors in its frame.
+    pub fresh_meso: Buffer,
+    /// Whether a block sees anything, `[slot][block]`.
+    pub occupied: Buffer,
+    /// Addresses of the chunks.
+    pub table: Buffer,
+    pub state: Buffer,
+    pub chunk_words: u32,
+    chunks: Vec<Buffer>,
+}
+
+/// Bytes of a chunk at most.
+const CHUNK: u64 = 256 << 20;
+
+impl FactorBuffers {
+    /// Keeps rows in `memory` bytes at most, and no more than all sources need. A device that has less keeps fewer.
+    pub fn new(
+        device: &Arc<Device>,
+        scene: &SceneBuffers,
+        relief: Option<&ReliefBuffers>,
+        slots: u32,
+        memory: u64,
+    ) -> Result<Self> {
+        let meso_count = relief.map_or(0, |r| r.element_count);
+        let plain_count = scene.element_count - meso_count;
+        let blocks = u64::from(groups(plain_count) + groups(meso_count));
+        let row = 4 * blocks
+            + u64::from(GROUP)
+                * (2 * u64::from(groups(plain_count)) + 6 * u64::from(groups(meso_count)));
+        let most = memory.min(row * u64::from(scene.source_count));
+        // Rows lie in one chunk each, so that a chunk may end with most of a row unused.
+        let chunk = most.min(CHUNK).next_multiple_of(4);
+        let count = if row > chunk { 0 } else { most.div_ceil(chunk) };
+        let mut chunks = Vec::new();
+        for _ in 0..count {
+            match Buffer::new(device, "kept form factors", chunk, BufferUse::Addressed) {
+                Ok(buffer) => chunks.push(buffer),
+                Err(e) => {
+                    tracing::warn!("{e}: keeping fewer form factors");
+                    break;
+                }
+            }
+        }
+        let addresses: Vec<u64> = chunks.iter().map(Buffer::address).collect();
+        let slots = u64::from(slots);
+        let storage = |name, bytes| Buffer::new(device, name, bytes, BufferUse::Storage);
+        Ok(Self {
+            plain_count,
+            meso_count,
+            fresh: storage("form factors", 4 * slots * u64::from(plain_count))?,
+            fresh_meso: storage("form factors to relief", 12 * slots * u64::from(meso_count))?,
+            occupied: storage("occupied blocks", 4 * slots * blocks)?,
+            table: upload(
+                device,
+                "chunks of form factors",
+                &addresses,
+                BufferUse::Storage,
+            )?,
+            state: filled(device, "kept state", size_of::<KeptState>() as u64, 0)?,
+            chunk_words: (chunk / 4) as u32,
+            chunks,
+        })
+    }
+
+    pub fn plain_blocks(&self) -> u32 {
+        groups(self.plain_count)
+    }
+
+    pub fn meso_blocks(&self) -> u32 {
+        groups(self.meso_count)
+    }
+
+    /// Blocks of all elements, those with relief last.
+    pub fn blocks(&self) -> u32 {
+        self.plain_blocks() + self.meso_blocks()
+    }
+
+    /// Whether anything can be kept.
+    pub fn keeps(&self) -> bool {
+        !self.chunks.is_empty()
+    }
+
+    pub fn chunk_count(&self) -> u32 {
+        self.chunks.len() as u32
+    }
+}

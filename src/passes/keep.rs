@@ -1,0 +1,76 @@
+//! Keeps the form factors of drawn sources, so that their further shots need no drawing. Shaders: `allocate.comp`, `keep.comp`;
+//! the codes' twin: [`crate::reference::kept`].
+
+use std::sync::Arc;
+
+use super::buffers::{Batch, State};
+use super::factor_buffers::FactorBuffers;
+use super::shaders;
+use crate::error::Result;
+use crate::vk::{Bind, Binding, Commands, ComputePipeline, DescriptorSet, Device, Stage};
+
+pub struct Keep {
+    allocate: ComputePipeline,
+    keep: ComputePipeline,
+}
+
+/// Sets of [`Keep`].
+pub struct Sets {
+    allocate: DescriptorSet,
+    keep: DescriptorSet,
+}
+
+impl Keep {
+    pub fn new(device: &Arc<Device>) -> Result<Self> {
+        let make = |name, spirv, words: usize| {
+            let kinds = [Binding::Storage; 5];
+            ComputePipeline::new(device, name, spirv, &kinds, 4 * words, &[], false)
+        };
+        Ok(Self {
+            allocate: make("allocate", shaders::ALLOCATE_COMP, 5)?,
+            keep: make("keep", shaders::KEEP_COMP, 3)?,
+        })
+    }
+
+    pub fn bind(&self, state: &State, batch: &Batch, factors: &FactorBuffers) -> Result<Sets> {
+        let allocate = [
+            &batch.slots,
+            &factors.occupied,
+            &state.kept_rows,
+            &factors.table,
+            &factors.state,
+        ];
+        let keep = [
+            &batch.slots,
+            &state.kept_rows,
+            &factors.table,
+            &factors.fresh,
+            &factors.fresh_meso,
+        ];
+        Ok(Sets {
+            allocate: self
+                .allocate
+                .bind("allocate", &allocate.map(Bind::Buffer))?,
+            keep: self.keep.bind("keep", &keep.map(Bind::Buffer))?,
+        })
+    }
+
+    pub fn record(&self, cmd: &Commands, sets: &Sets, batch: &Batch, factors: &FactorBuffers) {
+        let allocate = [
+            batch.slot_count,
+            factors.blocks(),
+            factors.meso_blocks(),
+            factors.chunk_count(),
+            factors.chunk_words,
+        ];
+        cmd.dispatch(&self.allocate, &sets.allocate, &allocate, [1, 1, 1]);
+        cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+        let keep = [
+            factors.plain_count,
+            factors.plain_blocks(),
+            factors.meso_count,
+        ];
+        let size = [factors.blocks(), batch.slot_count, 1];
+        cmd.dispatch(&self.keep, &sets.keep, &keep, size);
+    }
+}
