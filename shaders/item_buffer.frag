@@ -11,6 +11,7 @@ layout(push_constant, scalar) uniform Parameters {
     uint region;
     uint first_item;
     float near;
+    vec2 half_size;
 };
 
 void main() {

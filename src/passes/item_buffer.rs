@@ -27,6 +27,7 @@ struct Parameters {
     region: u32,
     first_item: u32,
     near: f32,
+    half_size: [f32; 2],
 }
 
 /// Distance of the near plane, internal units: nearer than any two surfaces that are not one.
@@ -80,6 +81,7 @@ impl ItemBuffer {
                         region,
                         first_item: region * scene.element_count,
                         near: NEAR,
+                        half_size: [width as f32 / 2.0, height as f32 / 2.0],
                     },
                 );
                 cmd.draw_indexed_indirect(
