@@ -11,7 +11,7 @@ layout(local_size_x = SELECT_GROUP) in;
 
 layout(scalar, binding = 0) readonly buffer Slots { Slot slots[]; };
 // [slot][block]
-layout(scalar, binding = 1) readonly buffer Occupied { uint occupied[]; };
+layout(scalar, binding = 1) buffer Occupied { uint occupied[]; };
 layout(scalar, binding = 2) buffer KeptRows { KeptRow kept_rows[]; };
 layout(scalar, binding = 3) readonly buffer Chunks { uvec2 chunks[]; };
 layout(scalar, binding = 4) buffer State { KeptState state; };
@@ -85,6 +85,9 @@ void main() {
                 words.word[row_first + block] = count == 0 ? 0 : at;
                 at += count;
             }
+        }
+        for (uint block = begin; block < end; block++) {
+            occupied[slot * block_count + block] = 0;
         }
         barrier();
     }

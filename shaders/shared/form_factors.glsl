@@ -1,6 +1,9 @@
 // Form factor, with visibility, from every element to every source of a batch. VECTOR_FLUX: the elements of this dispatch
 // receive by direction, and get the vector whose dot product with the normal is the form factor.
 
+#extension GL_KHR_shader_subgroup_basic : require
+#extension GL_KHR_shader_subgroup_vote : require
+#extension GL_KHR_shader_subgroup_ballot : require
 #include "shared/types.glsl"
 #include "shared/hemicube.glsl"
 #include "shared/lambert.glsl"
@@ -9,23 +12,23 @@
 layout(local_size_x = GROUP) in;
 
 layout(scalar, binding = 0) readonly buffer Slots { Slot slots[]; };
-layout(scalar, binding = 1) readonly buffer Sources { Source sources[]; };
-// xyz: a corner; w: 1 where a loop of the contour starts (each loop ends with its first corner again).
-layout(scalar, binding = 2) readonly buffer Contours { vec4 contours[]; };
-layout(scalar, binding = 3) readonly buffer Indices { uint corners[]; };
-layout(scalar, binding = 4) readonly buffer Vertices { vec3 vertices[]; };
+// Words of struct Source.
+layout(scalar, binding = 1) readonly buffer Sources { uint source_words[]; };
+// Words of vec4: a corner; w: 1 where a loop of the contour starts (each loop ends with its first corner again).
+layout(scalar, binding = 2) readonly buffer Contours { uint contour_words[]; };
+// Words of struct Triangle.
+layout(scalar, binding = 3) readonly buffer Triangles { uint triangle_words[]; };
 // xyz: unit normal n; w: n · x on the plane.
-layout(scalar, binding = 5) readonly buffer Planes { vec4 planes[]; };
+layout(scalar, binding = 4) readonly buffer Planes { vec4 planes[]; };
 // xyz: centroid; w: radius of the ball about it that holds the element.
-layout(scalar, binding = 6) readonly buffer Balls { vec4 balls[]; };
-layout(scalar, binding = 7) readonly buffer Areas { float element_area[]; };
-// Whether any element of a block of GROUP sees the source, [slot][block].
-layout(scalar, binding = 8) writeonly buffer Occupied { uint occupied[]; };
+layout(scalar, binding = 5) readonly buffer Balls { vec4 balls[]; };
+// Whether any element of a block of GROUP sees the source, [slot][block]. Whoever reads it sets it to 0 again.
+layout(scalar, binding = 6) buffer Occupied { uint occupied[]; };
 // [slot][element of this dispatch]
-layout(scalar, binding = 9) writeonly buffer Fresh { FLUX fresh[]; };
-layout(binding = 10) uniform usampler2D items;
+layout(scalar, binding = 7) writeonly buffer Fresh { FLUX fresh[]; };
+layout(binding = 8) uniform usampler2D items;
 #ifdef VECTOR_FLUX
-layout(scalar, binding = 11) readonly buffer MesoElements { MesoElement meso_elements[]; };
+layout(scalar, binding = 9) readonly buffer MesoElements { MesoElement meso_elements[]; };
 #endif
 
 layout(push_constant, scalar) uniform Parameters {
@@ -80,82 +83,126 @@ bool visible(vec3 p, vec3 n, uint element, uint slot, Source s) {
     return apart <= REACH * footprint && depth <= apart * sine + HEIGHT_EPSILON;
 }
 
-// Form factor (see FLUX) from p (normal n) to the whole source, as if nothing stood between.
-FLUX form_factor(vec3 p, vec3 n, uint element, Source s) {
+// Four words that all lanes of the subgroup want, from `first` on. Each lane loads one of them: a load costs a software device
+// as much as some ten operations for each lane, wherever it points. All lanes must be active.
+#define LOAD4(words, first) share4(words[(first) + (gl_SubgroupInvocationID & 3)])
+
+vec4 share4(uint word) {
+    float value = uintBitsToFloat(word);
+    return vec4(subgroupBroadcast(value, 0), subgroupBroadcast(value, 1), subgroupBroadcast(value, 2),
+                subgroupBroadcast(value, 3));
+}
+
+const uint SOURCE_WORDS = 28;
+const uint TRIANGLE_WORDS = 16;
+
+Source load_source(uint index) {
+    vec4 word[SOURCE_WORDS / 4];
+    for (uint i = 0; i < SOURCE_WORDS / 4; i++) {
+        word[i] = LOAD4(source_words, index * SOURCE_WORDS + 4 * i);
+    }
+    return Source(word[0].xyz, word[0].w, word[1].xyz, word[1].w, word[2].xyz, word[2].w, word[3].xyz, word[3].w,
+                  word[4].xyz, floatBitsToUint(word[4].w), floatBitsToUint(word[5].x), floatBitsToUint(word[5].y),
+                  floatBitsToUint(word[5].z), floatBitsToUint(word[5].w), floatBitsToUint(word[6].x), word[6].yzw);
+}
+
+Triangle load_triangle(uint index) {
+    vec4 word[TRIANGLE_WORDS / 4];
+    for (uint i = 0; i < TRIANGLE_WORDS / 4; i++) {
+        word[i] = LOAD4(triangle_words, index * TRIANGLE_WORDS + 4 * i);
+    }
+    return Triangle(word[0].xyz, word[0].w, word[1].xyz, word[1].w, word[2].xyz, word[2].w, word[3].xyz, word[3].w);
+}
+
+vec3 own_corner(uint element, uint corner) {
+    uint at = element * TRIANGLE_WORDS + 4 * corner;
+    return uintBitsToFloat(uvec3(triangle_words[at], triangle_words[at + 1], triangle_words[at + 2]));
+}
+
+// Form factor (see FLUX) from p (normal n) to the whole source where `wanted`, as if nothing stood between. In this and what it
+// calls, lanes go through the same loops together.
+FLUX form_factor(vec3 p, vec3 n, uint element, Source s, bool wanted) {
     if (s.kind == KIND_POINT) {
         vec3 d = s.eye - p;
         float square = dot(d, d);
-        // Each of the two sources of a point light serves its own side; the upper one has the plane between them.
-        bool mine = s.cone_sin == 0.0 ? dot(d, s.normal) <= 0.0 : dot(d, s.normal) < 0.0;
-        return mine ? flux_above(flux(d, n), n) * (inversesqrt(square) / square) : FLUX(0.0);
+        return wanted ? flux_above(flux(d, n), n) * (inversesqrt(square) / square) : FLUX(0.0);
     }
     vec3 d = p - s.eye;
     float height = dot(d, s.normal);
     vec3 from_middle = p - s.middle;
     float square = dot(from_middle, from_middle);
     bool far = s.radius * s.radius <= FAR * FAR * square;
+    // Heights of p over the planes of the members: the cone of normals and the ball bound them.
+    float flat_part = sqrt(max(dot(d, d) - height * height, 0.0));
+    float lowest = height * s.cone_cos - flat_part * s.cone_sin - s.radius;
+    bool whole = s.cone_sin == 0.0 || lowest > 0.0;
     // Of the receiver's cosine and the distances, all that a far source's projected area is multiplied by.
     FLUX far_factor = flux_above(flux(-from_middle, n), n) / (3.14159265 * square * square);
-    if (s.cone_sin == 0.0) {
-        if (height <= HEIGHT_EPSILON * s.radius) {
-            return FLUX(0.0);
-        }
-        if (far) {
-            return far_factor * s.area * height;
-        }
-    } else {
-        // Heights of p over the planes of the members: the cone of normals and the ball bound them.
-        float flat_part = sqrt(max(dot(d, d) - height * height, 0.0));
-        float lowest = height * s.cone_cos - flat_part * s.cone_sin - s.radius;
-        float highest = height * s.cone_cos + flat_part * s.cone_sin + s.radius;
-        if (highest <= 0.0) {
-            return FLUX(0.0);
-        }
-        if (lowest <= 0.0) {
-            // Some members show their backs: each by itself.
-            if (far) {
-                float facing_area = 0.0;
-                for (uint i = 0; i < s.element_count; i++) {
-                    uint member = s.first_element + i;
-                    float facing = dot(planes[member].xyz, from_middle);
-                    facing_area += element_area[member] * max(facing, 0.0);
-                }
-                return far_factor * facing_area;
+    FLUX result = FLUX(0.0);
+
+    // The outline of a near source that shows all of its front.
+    bool near_whole = wanted && whole && !far;
+    if (subgroupAny(near_whole)) {
+        Contour contour = contour_begin();
+        vec3 last = LOAD4(contour_words, 4 * s.first_contour).xyz - p;
+        for (uint i = 1; i < s.contour_count; i++) {
+            vec4 corner = LOAD4(contour_words, 4 * (s.first_contour + i));
+            vec3 next = corner.xyz - p;
+            if (corner.w == 1.0) {
+                contour_close(contour, n);
+            } else {
+                contour_edge(contour, last, next, n);
             }
-            FLUX sum = FLUX(0.0);
-            for (uint i = 0; i < s.element_count; i++) {
-                uint member = s.first_element + i;
-                vec4 plane = planes[member];
-                if (member == element || dot(plane.xyz, p) - plane.w <= 0.0) {
-                    continue;
-                }
-                vec3 a = vertices[corners[3 * member]] - p;
-                vec3 b = vertices[corners[3 * member + 1]] - p;
-                vec3 c = vertices[corners[3 * member + 2]] - p;
+            last = next;
+        }
+        contour_close(contour, n);
+        result = near_whole ? flux_above(contour_form_factor(contour), n) : FLUX(0.0);
+    }
+    if (wanted && far && s.cone_sin == 0.0) {
+        result = far_factor * s.area * height;
+    }
+
+    // A curved source, far off or showing some backs: each member by itself.
+    bool by_member = wanted && s.cone_sin != 0.0 && (far || !whole);
+    if (subgroupAny(by_member)) {
+        FLUX sum = FLUX(0.0);
+        float facing_area = 0.0;
+        bool near_part = by_member && !far;
+        for (uint i = 0; i < s.element_count; i++) {
+            uint member = s.first_element + i;
+            Triangle t = load_triangle(member);
+            facing_area += t.area * max(dot(t.normal, from_middle), 0.0);
+            bool shows = near_part && member != element && dot(t.normal, p) > t.height;
+            if (subgroupAny(shows)) {
+                vec3 a = t.a - p;
+                vec3 b = t.b - p;
+                vec3 c = t.c - p;
                 Contour contour = contour_begin();
                 contour_edge(contour, a, b, n);
                 contour_edge(contour, b, c, n);
                 contour_edge(contour, c, a, n);
                 contour_close(contour, n);
-                sum += flux_above(contour_form_factor(contour), n);
+                sum += shows ? flux_above(contour_form_factor(contour), n) : FLUX(0.0);
             }
-            return sum;
         }
+        result = by_member ? (far ? far_factor * facing_area : sum) : result;
     }
-    Contour contour = contour_begin();
-    vec3 last = contours[s.first_contour].xyz - p;
-    for (uint i = 1; i < s.contour_count; i++) {
-        vec4 corner = contours[s.first_contour + i];
-        vec3 next = corner.xyz - p;
-        if (corner.w == 1.0) {
-            contour_close(contour, n);
-        } else {
-            contour_edge(contour, last, next, n);
-        }
-        last = next;
+    return result;
+}
+
+// Whether a source can show its front at p.
+bool shows_front(Source s, vec3 p) {
+    vec3 d = p - s.eye;
+    float height = dot(d, s.normal);
+    if (s.kind == KIND_POINT) {
+        // Each of the two sources of a point light serves its own side; the upper one has the plane between them.
+        return s.cone_sin == 0.0 ? height >= 0.0 : height > 0.0;
     }
-    contour_close(contour, n);
-    return flux_above(contour_form_factor(contour), n);
+    if (s.cone_sin == 0.0) {
+        return height > HEIGHT_EPSILON * s.radius;
+    }
+    float flat_part = sqrt(max(dot(d, d) - height * height, 0.0));
+    return height * s.cone_cos + flat_part * s.cone_sin + s.radius > 0.0;
 }
 
 // Sample points of a triangle and their weights (centroid; degree 2; Radon's degree 5).
@@ -178,76 +225,66 @@ bool behind(Source s, vec3 middle, vec3 n) {
     return dot(middle - s.eye, n) >= s.radius;
 }
 
-// Mean over the element of form factor (see FLUX) times visibility.
-FLUX gather(uint element, vec4 ball, vec3 n, uint slot, Source s) {
-    vec3 d = ball.xyz - s.eye;
-    float gap = length(d) - s.radius;
+// Mean over the element of form factor (see FLUX) times visibility, where `wanted`.
+FLUX mean_form_factor(uint element, vec4 ball, vec3 n, uint slot, Source s, bool wanted) {
+    float gap = length(ball.xyz - s.eye) - s.radius;
     bool near = gap <= 4.0 * ball.w;
-    uint first = near ? (gap > ball.w ? 1 : 4) : 0;
-    uint end = near ? (gap > ball.w ? 4 : 11) : 1;
+    bool touching = gap <= ball.w;
+    bool any_near = subgroupAny(wanted && near);
     vec3 a = vec3(0.0);
     vec3 ab = vec3(0.0);
     vec3 ac = vec3(0.0);
-    if (near) {
-        a = vertices[corners[3 * element]];
-        ab = vertices[corners[3 * element + 1]] - a;
-        ac = vertices[corners[3 * element + 2]] - a;
+    if (any_near) {
+        a = own_corner(element, 0);
+        ab = own_corner(element, 1) - a;
+        ac = own_corner(element, 2) - a;
     }
     FLUX sum = FLUX(0.0);
-    for (uint i = first; i < end; i++) {
+    for (uint i = 0; i < (any_near ? 11 : 1); i++) {
+        bool mine = wanted && (i == 0 ? !near : i < 4 ? near && !touching : near && touching);
         vec3 point = POINTS[i];
-        vec3 p = near ? a + point.x * ab + point.y * ac : ball.xyz;
-        FLUX f = form_factor(p, n, element, s);
-        if (f != FLUX(0.0) && visible(p, n, element, slot, s)) {
-            sum += point.z * f;
+        vec3 p = i == 0 ? ball.xyz : a + point.x * ab + point.y * ac;
+        mine = mine && shows_front(s, p);
+        if (!subgroupAny(mine)) {
+            continue;
+        }
+        mine = mine && visible(p, n, element, slot, s);
+        if (subgroupAny(mine)) {
+            sum += point.z * form_factor(p, n, element, s, mine);
         }
     }
     return sum;
 }
 
-shared uint any_seen;
-
 void main() {
     uint slot = gl_WorkGroupID.y;
-    Slot shot = slots[slot];
-    if (shot.source == NONE) {
+    uint source = slots[slot].source;
+    if (source == NONE) {
         return;
     }
-    if (gl_LocalInvocationID.x == 0) {
-        any_seen = 0;
-    }
-    barrier();
-    uint i = gl_GlobalInvocationID.x;
+    // The lanes past the last element do as that does.
+    uint i = min(gl_GlobalInvocationID.x, element_count - 1);
     uint e = first_element + i;
-    if (i < element_count) {
-        Source s = sources[shot.source];
-        vec4 ball = balls[e];
-        vec3 n = planes[e].xyz;
-        FLUX f = FLUX(0.0);
-        if (!behind(s, ball.xyz, n)) {
-            f = gather(e, ball, n, slot, s);
-        }
-#ifdef VECTOR_FLUX
-        MesoElement meso = meso_elements[i];
-        vec3 local = vec3(dot(meso.tangent, f), dot(meso.bitangent, f), dot(n, f));
-        float strength = as_kept(length(local));
-        if (strength > 0.0) {
-            any_seen = 1;
-            local = strength * kept_direction(direction_code(local / strength));
-        } else {
-            local = vec3(0.0);
-        }
-        fresh[slot * element_count + i] = local;
-#else
-        f = as_kept(f);
-        if (f > 0.0) {
-            any_seen = 1;
-        }
-        fresh[slot * element_count + i] = f;
-#endif
+    Source s = load_source(source);
+    vec4 ball = balls[e];
+    vec3 n = planes[e].xyz;
+    bool wanted = !behind(s, ball.xyz, n);
+    FLUX f = FLUX(0.0);
+    if (subgroupAny(wanted)) {
+        f = mean_form_factor(e, ball, n, slot, s, wanted);
     }
-    barrier();
-    if (gl_LocalInvocationID.x == 0) {
-        occupied[slot * block_count + first_block + gl_WorkGroupID.x] = any_seen;
+#ifdef VECTOR_FLUX
+    MesoElement meso = meso_elements[i];
+    vec3 local = vec3(dot(meso.tangent, f), dot(meso.bitangent, f), dot(n, f));
+    float strength = as_kept(length(local));
+    f = strength > 0.0 ? strength * kept_direction(direction_code(local / strength)) : vec3(0.0);
+    bool lit = strength > 0.0;
+#else
+    f = as_kept(f);
+    bool lit = f > 0.0;
+#endif
+    fresh[slot * element_count + i] = f;
+    if (subgroupAny(lit) && subgroupElect()) {
+        atomicOr(occupied[slot * block_count + first_block + gl_WorkGroupID.x], 1);
     }
 }

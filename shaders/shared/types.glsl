@@ -23,6 +23,18 @@ struct Source {
     vec3 middle;       // centroid of the area
 };
 
+// An element as it is gathered from, for loading by fours.
+struct Triangle {
+    vec3 a;
+    float area;
+    vec3 b;
+    float height;      // normal · x on its plane
+    vec3 c;
+    float unused_c;
+    vec3 normal;
+    float unused;
+};
+
 // Up to MESHLET_TRIANGLES consecutive elements.
 struct Meshlet {
     vec3 centre;

@@ -62,6 +62,10 @@ pub struct SolveOptions {
     /// Stop after this many shots
     #[arg(long, value_name = "N")]
     shots: Option<u32>,
+    /// MiB on the device for the form factors of sources that have been drawn, which then need no drawing for their further
+    /// shots; 0 draws for every shot [default: 768, or a third of the device's memory]
+    #[arg(long, value_name = "MIB")]
+    visibility_memory: Option<u64>,
     /// Turns the hemicubes about their axes: another seed, other aliasing
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
@@ -121,6 +125,12 @@ impl SolveOptions {
             budget: self.budget()?,
             shots: self.shots,
             seed: self.seed,
+            visibility_memory: match self.visibility_memory {
+                Some(mib) => Some(mib.checked_mul(1 << 20).ok_or_else(|| {
+                    Error::Usage(format!("--visibility-memory {mib}: too large"))
+                })?),
+                None => None,
+            },
             relief: meso::Options {
                 transport: match self.transport {
                     TransportName::Physical => Transport::Physical,

@@ -6,7 +6,7 @@ use bytemuck::Pod;
 use glam::Vec3;
 
 use super::types::{
-    Component, Draw, KeptRow, Meshlet, Progress, Slot, Source, View, contour_corners,
+    Component, Draw, KeptRow, Meshlet, Progress, Slot, Source, Triangle, View, contour_corners,
 };
 use crate::charts::Connections;
 use crate::constants::{FACES, NONE};
@@ -28,6 +28,7 @@ pub struct SceneBuffers {
     pub vertices: Buffer,
     /// Three a element, `[element][corner]`.
     pub corners: Buffer,
+    pub triangles: Buffer,
     /// Normal and n · x.
     pub planes: Buffer,
     /// Centroid and radius.
@@ -64,6 +65,21 @@ impl SceneBuffers {
                     .to_array()
             })
             .collect();
+        let triangles: Vec<Triangle> = (0..elements.len())
+            .map(|e| {
+                let [a, b, c] = elements.triangle(e).map(|v| v.as_vec3());
+                Triangle {
+                    a,
+                    area: elements.area[e] as f32,
+                    b,
+                    height: planes[e][3],
+                    c,
+                    unused_c: 0.0,
+                    normal: elements.normal[e].as_vec3(),
+                    unused: 0.0,
+                }
+            })
+            .collect();
         let areas: Vec<f32> = elements.area.iter().map(|&a| a as f32).collect();
         let mut contours = Vec::new();
         let mut gpu_sources = Vec::with_capacity(sources.list.len());
@@ -86,6 +102,7 @@ impl SceneBuffers {
             meshlet_count: meshlets.len() as u32,
             vertices: upload(device, "vertices", &vertices, BufferUse::Geometry)?,
             corners: upload(device, "corners", &elements.corners, BufferUse::Geometry)?,
+            triangles: upload(device, "triangles", &triangles, BufferUse::Storage)?,
             planes: upload(device, "planes", &planes, BufferUse::Storage)?,
             balls: upload(device, "balls", &balls, BufferUse::Storage)?,
             areas: upload(device, "areas", &areas, BufferUse::Storage)?,

@@ -68,7 +68,7 @@ impl FactorBuffers {
             meso_count,
             fresh: storage("form factors", 4 * slots * u64::from(plain_count))?,
             fresh_meso: storage("form factors to relief", 12 * slots * u64::from(meso_count))?,
-            occupied: storage("occupied blocks", 4 * slots * blocks)?,
+            occupied: filled(device, "occupied blocks", 4 * slots * blocks, 0)?,
             table: upload(
                 device,
                 "chunks of form factors",

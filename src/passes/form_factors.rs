@@ -35,7 +35,7 @@ struct Parameters {
 }
 
 /// Place of the item buffer among the bindings.
-const ITEMS: usize = 10;
+const ITEMS: usize = 8;
 
 fn pipeline(
     device: &Arc<Device>,
@@ -46,7 +46,7 @@ fn pipeline(
     let mut kinds = vec![Binding::Storage; bindings];
     kinds[ITEMS] = Binding::Sampled;
     let push = size_of::<Parameters>();
-    ComputePipeline::new(device, name, spirv, &kinds, push, &[], false)
+    ComputePipeline::new(device, name, spirv, &kinds, push, &[], true)
 }
 
 impl FormFactors {
@@ -74,11 +74,9 @@ impl FormFactors {
                 &batch.slots,
                 &scene.sources,
                 &scene.contours,
-                &scene.corners,
-                &scene.vertices,
+                &scene.triangles,
                 &scene.planes,
                 &scene.balls,
-                &scene.areas,
                 &factors.occupied,
                 fresh,
             ]

@@ -71,6 +71,21 @@ pub fn contour_corners(source: &sources::Source) -> Vec<[f32; 4]> {
     corners
 }
 
+/// An element as it is gathered from, for loading by fours.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct Triangle {
+    pub a: Vec3,
+    pub area: f32,
+    pub b: Vec3,
+    /// normal · x on its plane.
+    pub height: f32,
+    pub c: Vec3,
+    pub unused_c: f32,
+    pub normal: Vec3,
+    pub unused: f32,
+}
+
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub struct Meshlet {

@@ -176,8 +176,9 @@ impl Instance {
                 self.raw.get_physical_device_features2(raw, &mut features);
             }
             let base_features = features.features;
-            let needed_operations =
-                vk::SubgroupFeatureFlags::BASIC | vk::SubgroupFeatureFlags::BALLOT;
+            let needed_operations = vk::SubgroupFeatureFlags::BASIC
+                | vk::SubgroupFeatureFlags::VOTE
+                | vk::SubgroupFeatureFlags::BALLOT;
             for (has, name) in [
                 (
                     base_features.geometry_shader != 0,
@@ -201,7 +202,7 @@ impl Instance {
                         && subgroup
                             .supported_stages
                             .contains(vk::ShaderStageFlags::COMPUTE),
-                    "subgroup ballot in compute",
+                    "subgroup vote and ballot in compute",
                 ),
                 (
                     graphics_family(&queues).is_some(),
