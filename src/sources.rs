@@ -46,8 +46,12 @@ pub struct Source {
     pub tangent: DVec3,
     pub bitangent: DVec3,
     pub area: f64,
+    /// Area that a far place in the direction of `normal` sees.
+    pub facing: f64,
     /// Of the ball about `eye` that holds the source.
     pub radius: f64,
+    /// Of the largest ball about a member's centroid that holds the member.
+    pub member_radius: f64,
     /// Largest angle between `normal` and a member's normal; exactly 0 where all lie in one plane.
     pub cone: f64,
     /// Radiosity from emission; a point light's radiant intensity over the square of the internal unit.
@@ -201,7 +205,9 @@ fn group(elements: &Elements, connections: &Connections, range: std::ops::Range<
             / area
     };
     let centroid = weigh(&elements.centroid);
-    let mean = weigh(&elements.normal).normalize_or(elements.normal[range.start]);
+    let mean = weigh(&elements.normal);
+    let facing = area * mean.length();
+    let mean = mean.normalize_or(elements.normal[range.start]);
     let corners = || range.clone().flat_map(|e| elements.triangle(e));
     let extent = corners().map(|v| v.distance(centroid)).fold(0.0, f64::max);
     let flat = corners().all(|v| (v - centroid).dot(mean).abs() <= FLAT * extent)
@@ -244,6 +250,11 @@ fn group(elements: &Elements, connections: &Connections, range: std::ops::Range<
         tangent: DVec3::ZERO,
         bitangent: DVec3::ZERO,
         area,
+        facing,
+        member_radius: range
+            .clone()
+            .map(|e| elements.radius(e))
+            .fold(0.0, f64::max),
         radius: corners().map(|v| v.distance(eye)).fold(0.0, f64::max),
         cone,
         emitted: emitted.as_vec3(),
@@ -265,6 +276,8 @@ fn part(elements: &Elements, connections: &Connections, e: usize, triangle: [DVe
         tangent: DVec3::ZERO,
         bitangent: DVec3::ZERO,
         area: triangle_area(triangle),
+        facing: triangle_area(triangle),
+        member_radius: elements.radius(e),
         radius: triangle
             .into_iter()
             .map(|v| v.distance(eye))
@@ -288,6 +301,8 @@ fn point(light: &PointLight, elements: &Elements) -> [Source; 2] {
         tangent: DVec3::ZERO,
         bitangent: DVec3::ZERO,
         area: 0.0,
+        facing: 0.0,
+        member_radius: 0.0,
         radius: 0.0,
         // The shader gives the plane between the halves to the one whose cone is 0.
         cone,

@@ -18,6 +18,8 @@ layout(scalar, binding = 1) readonly buffer Sources { uint source_words[]; };
 layout(scalar, binding = 2) readonly buffer Contours { uint contour_words[]; };
 // Words of struct Triangle.
 layout(scalar, binding = 3) readonly buffer Triangles { uint triangle_words[]; };
+// Centroid and area times normal of each element, two words unused.
+layout(scalar, binding = 9) readonly buffer Members { uint member_words[]; };
 // xyz: unit normal n; w: n · x on the plane.
 layout(scalar, binding = 4) readonly buffer Planes { vec4 planes[]; };
 // xyz: centroid; w: radius of the ball about it that holds the element.
@@ -28,7 +30,7 @@ layout(scalar, binding = 6) buffer Occupied { uint occupied[]; };
 layout(scalar, binding = 7) writeonly buffer Fresh { FLUX fresh[]; };
 layout(binding = 8) uniform usampler2D items;
 #ifdef VECTOR_FLUX
-layout(scalar, binding = 9) readonly buffer MesoElements { MesoElement meso_elements[]; };
+layout(scalar, binding = 10) readonly buffer MesoElements { MesoElement meso_elements[]; };
 #endif
 
 layout(push_constant, scalar) uniform Parameters {
@@ -47,6 +49,10 @@ const float REACH = 1.5;
 // A source is a point where its radius is no more than this share of the distance. A square's error is then at most
 // 2/3 of the square of that: 0.07 %.
 const float FAR = 1.0 / 32.0;
+// Where a source lies this many squared radii off, no edge of it is seen under more than a right angle.
+const float ACUTE = 2.1;
+// Members of a curved source that shows some backs are points from so many of their radii off: 2/3 of 1/256 at most.
+const float POINT_DISTANCE = 16.0;
 
 // Whether p, on an element with normal n, is seen from the source's eye.
 bool visible(vec3 p, vec3 n, uint element, uint slot, Source s) {
@@ -93,7 +99,8 @@ vec4 share4(uint word) {
                 subgroupBroadcast(value, 3));
 }
 
-const uint SOURCE_WORDS = 28;
+const uint SOURCE_WORDS = 32;
+const uint MEMBER_WORDS = 8;
 const uint TRIANGLE_WORDS = 16;
 
 Source load_source(uint index) {
@@ -103,7 +110,7 @@ Source load_source(uint index) {
     }
     return Source(word[0].xyz, word[0].w, word[1].xyz, word[1].w, word[2].xyz, word[2].w, word[3].xyz, word[3].w,
                   word[4].xyz, floatBitsToUint(word[4].w), floatBitsToUint(word[5].x), floatBitsToUint(word[5].y),
-                  floatBitsToUint(word[5].z), floatBitsToUint(word[5].w), floatBitsToUint(word[6].x), word[6].yzw);
+                  floatBitsToUint(word[5].z), floatBitsToUint(word[5].w), floatBitsToUint(word[6].x), word[6].yzw, word[7].x, word[7].y, 0, 0);
 }
 
 Triangle load_triangle(uint index) {
@@ -119,8 +126,81 @@ vec3 own_corner(uint element, uint corner) {
     return uintBitsToFloat(uvec3(triangle_words[at], triangle_words[at + 1], triangle_words[at + 2]));
 }
 
+// Form factor (see FLUX) of the source's outline, of whose edges none is seen under more than a right angle and none lies below the
+// horizon of n.
+FLUX outline_above(vec3 p, vec3 n, Source s) {
+    FLUX sum = FLUX(0.0);
+    vec3 last = LOAD4(contour_words, 4 * s.first_contour).xyz - p;
+    float inverse_last = inversesqrt(dot(last, last));
+    for (uint i = 1; i < s.contour_count; i++) {
+        vec4 corner = LOAD4(contour_words, 4 * (s.first_contour + i));
+        vec3 next = corner.xyz - p;
+        float inverse_next = inversesqrt(dot(next, next));
+        float scale = corner.w == 1.0 ? 0.0 : inverse_last * inverse_next;
+        // Edge by corner is as far from rounding as the edge is short.
+        sum += flux(cross(last, next - last), n) * scale * acute_angle_over_sine(dot(last, next) * inverse_last * inverse_next);
+        last = next;
+        inverse_last = inverse_next;
+    }
+    return flux_above(-sum * INV_TWO_PI, n);
+}
+
+// The same of any outline, cut at the horizon.
+FLUX outline(vec3 p, vec3 n, Source s) {
+    Contour contour = contour_begin();
+    vec3 last = LOAD4(contour_words, 4 * s.first_contour).xyz - p;
+    for (uint i = 1; i < s.contour_count; i++) {
+        vec4 corner = LOAD4(contour_words, 4 * (s.first_contour + i));
+        vec3 next = corner.xyz - p;
+        if (corner.w == 1.0) {
+            contour_close(contour, n);
+        } else {
+            contour_edge(contour, last, next, n);
+        }
+        last = next;
+    }
+    contour_close(contour, n);
+    return flux_above(contour_form_factor(contour), n);
+}
+
+// Of the members that show p their fronts, each as a point.
+FLUX members_as_points(vec3 p, vec3 n, Source s) {
+    FLUX sum = FLUX(0.0);
+    for (uint i = 0; i < s.element_count; i++) {
+        uint word = (s.first_element + i) * MEMBER_WORDS;
+        vec4 low = LOAD4(member_words, word);
+        vec4 high = LOAD4(member_words, word + 4);
+        vec3 way = low.xyz - p;
+        vec3 vector_area = vec3(low.w, high.xy);
+        float square = dot(way, way);
+        sum += flux_above(flux(way, n), n) * (max(-dot(vector_area, way), 0.0) / (square * square));
+    }
+    return sum * 0.318309886;
+}
+
+// The same, exactly.
+FLUX members(vec3 p, vec3 n, uint element, Source s) {
+    FLUX sum = FLUX(0.0);
+    for (uint i = 0; i < s.element_count; i++) {
+        uint member = s.first_element + i;
+        Triangle t = load_triangle(member);
+        vec3 a = t.a - p;
+        vec3 b = t.b - p;
+        vec3 c = t.c - p;
+        Contour contour = contour_begin();
+        contour_edge(contour, a, b, n);
+        contour_edge(contour, b, c, n);
+        contour_edge(contour, c, a, n);
+        contour_close(contour, n);
+        bool shows = member != element && dot(t.normal, p) > t.height;
+        sum += shows ? flux_above(contour_form_factor(contour), n) : FLUX(0.0);
+    }
+    return sum;
+}
+
 // Form factor (see FLUX) from p (normal n) to the whole source where `wanted`, as if nothing stood between. In this and what it
-// calls, lanes go through the same loops together.
+// calls, lanes go through the same loops together; each kind of lane has a loop of its own, since a software device works
+// through both sides of a branch.
 FLUX form_factor(vec3 p, vec3 n, uint element, Source s, bool wanted) {
     if (s.kind == KIND_POINT) {
         vec3 d = s.eye - p;
@@ -129,63 +209,40 @@ FLUX form_factor(vec3 p, vec3 n, uint element, Source s, bool wanted) {
     }
     vec3 d = p - s.eye;
     float height = dot(d, s.normal);
+    float square = dot(d, d);
     vec3 from_middle = p - s.middle;
-    float square = dot(from_middle, from_middle);
-    bool far = s.radius * s.radius <= FAR * FAR * square;
+    float square_middle = dot(from_middle, from_middle);
     // Heights of p over the planes of the members: the cone of normals and the ball bound them.
-    float flat_part = sqrt(max(dot(d, d) - height * height, 0.0));
-    float lowest = height * s.cone_cos - flat_part * s.cone_sin - s.radius;
-    bool whole = s.cone_sin == 0.0 || lowest > 0.0;
-    // Of the receiver's cosine and the distances, all that a far source's projected area is multiplied by.
-    FLUX far_factor = flux_above(flux(-from_middle, n), n) / (3.14159265 * square * square);
+    float flat_part = sqrt(max(square - height * height, 0.0));
+    bool whole = s.cone_sin == 0.0 || height * s.cone_cos - flat_part * s.cone_sin - s.radius > 0.0;
+    bool far = whole && s.radius * s.radius <= FAR * FAR * square_middle;
+    bool above = dot(d, n) <= -s.radius && square >= ACUTE * s.radius * s.radius;
+    bool points = sqrt(square) - s.radius >= POINT_DISTANCE * s.member_radius;
+
     FLUX result = FLUX(0.0);
-
-    // The outline of a near source that shows all of its front.
-    bool near_whole = wanted && whole && !far;
-    if (subgroupAny(near_whole)) {
-        Contour contour = contour_begin();
-        vec3 last = LOAD4(contour_words, 4 * s.first_contour).xyz - p;
-        for (uint i = 1; i < s.contour_count; i++) {
-            vec4 corner = LOAD4(contour_words, 4 * (s.first_contour + i));
-            vec3 next = corner.xyz - p;
-            if (corner.w == 1.0) {
-                contour_close(contour, n);
-            } else {
-                contour_edge(contour, last, next, n);
-            }
-            last = next;
-        }
-        contour_close(contour, n);
-        result = near_whole ? flux_above(contour_form_factor(contour), n) : FLUX(0.0);
+    if (wanted && far) {
+        float projected = s.facing * dot(s.normal, from_middle);
+        result = flux_above(flux(-from_middle, n), n) * (projected / (3.14159265 * square_middle * square_middle));
     }
-    if (wanted && far && s.cone_sin == 0.0) {
-        result = far_factor * s.area * height;
+    bool mine = wanted && whole && !far && above;
+    if (subgroupAny(mine)) {
+        FLUX f = outline_above(p, n, s);
+        result = mine ? f : result;
     }
-
-    // A curved source, far off or showing some backs: each member by itself.
-    bool by_member = wanted && s.cone_sin != 0.0 && (far || !whole);
-    if (subgroupAny(by_member)) {
-        FLUX sum = FLUX(0.0);
-        float facing_area = 0.0;
-        bool near_part = by_member && !far;
-        for (uint i = 0; i < s.element_count; i++) {
-            uint member = s.first_element + i;
-            Triangle t = load_triangle(member);
-            facing_area += t.area * max(dot(t.normal, from_middle), 0.0);
-            bool shows = near_part && member != element && dot(t.normal, p) > t.height;
-            if (subgroupAny(shows)) {
-                vec3 a = t.a - p;
-                vec3 b = t.b - p;
-                vec3 c = t.c - p;
-                Contour contour = contour_begin();
-                contour_edge(contour, a, b, n);
-                contour_edge(contour, b, c, n);
-                contour_edge(contour, c, a, n);
-                contour_close(contour, n);
-                sum += shows ? flux_above(contour_form_factor(contour), n) : FLUX(0.0);
-            }
-        }
-        result = by_member ? (far ? far_factor * facing_area : sum) : result;
+    mine = wanted && whole && !far && !above;
+    if (subgroupAny(mine)) {
+        FLUX f = outline(p, n, s);
+        result = mine ? f : result;
+    }
+    mine = wanted && !whole && points;
+    if (subgroupAny(mine)) {
+        FLUX f = members_as_points(p, n, s);
+        result = mine ? f : result;
+    }
+    mine = wanted && !whole && !points;
+    if (subgroupAny(mine)) {
+        FLUX f = members(p, n, element, s);
+        result = mine ? f : result;
     }
     return result;
 }

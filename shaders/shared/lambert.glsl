@@ -2,17 +2,20 @@
 
 // θ / sin θ for the angle θ of which x is the cosine, |error| < 3e-7. A polynomial serves x in 0..1, where the function
 // is smooth (its pole is at −1); the other half follows from θ(−x) = π − θ(x).
-float angle_over_sine(float x) {
-    float y = abs(x);
+float acute_angle_over_sine(float x) {
     float g = 1.7478988e-2;
-    g = g * y - 9.7265430e-2;
-    g = g * y + 2.5208697e-1;
-    g = g * y - 4.2358306e-1;
-    g = g * y + 5.5655622e-1;
-    g = g * y - 6.6096932e-1;
-    g = g * y + 7.8488100e-1;
-    g = g * y - 9.9998152e-1;
-    g = g * y + 1.5707963;
+    g = g * x - 9.7265430e-2;
+    g = g * x + 2.5208697e-1;
+    g = g * x - 4.2358306e-1;
+    g = g * x + 5.5655622e-1;
+    g = g * x - 6.6096932e-1;
+    g = g * x + 7.8488100e-1;
+    g = g * x - 9.9998152e-1;
+    return g * x + 1.5707963;
+}
+
+float angle_over_sine(float x) {
+    float g = acute_angle_over_sine(abs(x));
     return x >= 0.0 ? g : 3.14159265 * inversesqrt(max(1.0 - x * x, 1e-14)) - g;
 }
 

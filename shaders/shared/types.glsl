@@ -21,6 +21,10 @@ struct Source {
     uint contour_count;
     uint component;    // the connected component it lies on
     vec3 middle;       // centroid of the area
+    float facing;      // area that a far place in the direction of `normal` sees
+    float member_radius;   // of the largest member's ball
+    uint unused_a;
+    uint unused_b;
 };
 
 // An element as it is gathered from, for loading by fours.

@@ -29,6 +29,8 @@ pub struct SceneBuffers {
     /// Three a element, `[element][corner]`.
     pub corners: Buffer,
     pub triangles: Buffer,
+    /// Centroid and area times normal, eight words an element.
+    pub members: Buffer,
     /// Normal and n · x.
     pub planes: Buffer,
     /// Centroid and radius.
@@ -80,6 +82,13 @@ impl SceneBuffers {
                 }
             })
             .collect();
+        let members: Vec<[f32; 8]> = (0..elements.len())
+            .map(|e| {
+                let [x, y, z] = elements.centroid[e].as_vec3().to_array();
+                let [u, v, w] = (elements.normal[e] * elements.area[e]).as_vec3().to_array();
+                [x, y, z, u, v, w, 0.0, 0.0]
+            })
+            .collect();
         let areas: Vec<f32> = elements.area.iter().map(|&a| a as f32).collect();
         let mut contours = Vec::new();
         let mut gpu_sources = Vec::with_capacity(sources.list.len());
@@ -103,6 +112,7 @@ impl SceneBuffers {
             vertices: upload(device, "vertices", &vertices, BufferUse::Geometry)?,
             corners: upload(device, "corners", &elements.corners, BufferUse::Geometry)?,
             triangles: upload(device, "triangles", &triangles, BufferUse::Storage)?,
+            members: upload(device, "members", &members, BufferUse::Storage)?,
             planes: upload(device, "planes", &planes, BufferUse::Storage)?,
             balls: upload(device, "balls", &balls, BufferUse::Storage)?,
             areas: upload(device, "areas", &areas, BufferUse::Storage)?,

@@ -54,10 +54,10 @@ impl FormFactors {
         let spirv = shaders::FORM_FACTORS_COMP;
         let meso = with_relief.then(|| {
             let spirv = shaders::FORM_FACTORS_RELIEF_COMP;
-            pipeline(device, "form factors to relief", spirv, ITEMS + 2)
+            pipeline(device, "form factors to relief", spirv, ITEMS + 3)
         });
         Ok(Self {
-            plain: pipeline(device, "form factors", spirv, ITEMS + 1)?,
+            plain: pipeline(device, "form factors", spirv, ITEMS + 2)?,
             meso: meso.transpose()?,
         })
     }
@@ -83,6 +83,7 @@ impl FormFactors {
             .map(Bind::Buffer)
             .to_vec();
             binds.push(Bind::Image(&batch.items, &batch.sampler));
+            binds.push(Bind::Buffer(&scene.members));
             binds
         };
         let meso = self.meso.as_ref().zip(relief).map(|(pipeline, relief)| {

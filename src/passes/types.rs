@@ -29,6 +29,12 @@ pub struct Source {
     pub component: u32,
     /// Centroid of the area.
     pub middle: Vec3,
+    /// Area that a far place in the direction of `normal` sees.
+    pub facing: f32,
+    /// Of the largest member's ball.
+    pub member_radius: f32,
+    pub unused_a: u32,
+    pub unused_b: u32,
 }
 
 impl Source {
@@ -52,6 +58,10 @@ impl Source {
             contour_count,
             component: source.component,
             middle: source.centroid.as_vec3(),
+            facing: source.facing as f32,
+            member_radius: (source.member_radius * (1.0 + 1e-6)) as f32,
+            unused_a: 0,
+            unused_b: 0,
         }
     }
 }
