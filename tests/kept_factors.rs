@@ -92,8 +92,12 @@ fn replayed_sources_light_as_drawn_ones_do() {
                 let moments = |light: &mesolux::solver::ReliefLight| -> Vec<Vec3> {
                     light.moments.iter().flatten().copied().collect()
                 };
-                let difference = largest_difference(&moments(a), &moments(b));
-                println!("moments: {difference:.1e}");
+                // Plain sums in f32: the strongest slot's rounding counts.
+                let (a, b) = (moments(a), moments(b));
+                let largest = a.iter().map(|v| v.abs().max_element()).fold(0.0, f32::max);
+                let apart = a.iter().zip(&b).map(|(a, b)| (a - b).abs().max_element());
+                let difference = apart.fold(0.0, f32::max) / largest;
+                println!("moments: {difference:.1e} of the largest");
                 assert!(difference <= TOLERANCE);
             }
         }

@@ -104,6 +104,7 @@ fn rust_and_glsl_agree() {
     check!(true, View: eye x y w);
     check!(true, Draw: index_count instance_count first_index vertex_offset first_instance);
     check!(true, KeptRow: chunk first);
+    check!(true, ReceiverList: groups_x groups_y groups_z count);
     check!(true, MesoElement: tangent response bitangent scale);
     check!(true, Reflected: sum error);
     check!(true, Prism: low_a low_b low_c high_a high_b high_c uv_a uv_b uv_c light_a light_b light_c surface

@@ -64,6 +64,14 @@ struct Slot {
     vec3 reflected;
 };
 
+// VkDispatchIndirectCommand of a list of receivers, and how many they are.
+struct ReceiverList {
+    uint groups_x;
+    uint groups_y;
+    uint groups_z;
+    uint count;
+};
+
 // Where the kept form factors of a source start: first the table of its blocks, in words from here.
 struct KeptRow {
     uint chunk;        // NONE: they are not kept

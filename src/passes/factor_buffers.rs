@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::buffers::{SceneBuffers, filled, upload};
 use super::groups;
 use super::relief_buffers::ReliefBuffers;
-use super::types::KeptState;
-use crate::constants::GROUP;
+use super::types::{KeptState, ReceiverList};
+use crate::constants::{GROUP, RECEIVE_KINDS};
 use crate::error::Result;
 use crate::vk::{Buffer, BufferUse, Device};
 
@@ -19,6 +19,9 @@ pub struct FactorBuffers {
     pub fresh: Buffer,
     /// `[slot][meso element]`, vectors in its frame.
     pub fresh_meso: Buffer,
+    /// Elements that see each source of the batch, by how their form factor is found.
+    pub plain_lists: ReceiverLists,
+    pub meso_lists: ReceiverLists,
     /// Whether a block sees anything, `[slot][block]`.
     pub occupied: Buffer,
     /// Addresses of the chunks.
@@ -26,6 +29,37 @@ pub struct FactorBuffers {
     pub state: Buffer,
     pub chunk_words: u32,
     chunks: Vec<Buffer>,
+}
+
+/// Lists of elements, `[slot][kind]`.
+pub struct ReceiverLists {
+    /// [`ReceiverList`], `[slot][kind]`.
+    pub counts: Buffer,
+    /// `[slot][kind][element]`.
+    pub listed: Buffer,
+    /// What `counts` starts from.
+    pub empty: Buffer,
+}
+
+impl ReceiverLists {
+    fn new(device: &Arc<Device>, slots: u32, elements: u32) -> Result<Self> {
+        let lists = slots * RECEIVE_KINDS;
+        let empty = vec![
+            ReceiverList {
+                groups_x: 0,
+                groups_y: 1,
+                groups_z: 1,
+                count: 0,
+            };
+            lists as usize
+        ];
+        let bytes = 4 * u64::from(lists) * u64::from(elements);
+        Ok(Self {
+            counts: upload(device, "receiver counts", &empty, BufferUse::Geometry)?,
+            listed: Buffer::new(device, "listed receivers", bytes, BufferUse::Storage)?,
+            empty: upload(device, "empty receiver counts", &empty, BufferUse::Storage)?,
+        })
+    }
 }
 
 /// Bytes of a chunk at most.
@@ -61,11 +95,15 @@ impl FactorBuffers {
             }
         }
         let addresses: Vec<u64> = chunks.iter().map(Buffer::address).collect();
+        let lists = |elements| ReceiverLists::new(device, slots, elements);
+        let (plain_lists, meso_lists) = (lists(plain_count)?, lists(meso_count)?);
         let slots = u64::from(slots);
         let storage = |name, bytes| Buffer::new(device, name, bytes, BufferUse::Storage);
         Ok(Self {
             plain_count,
             meso_count,
+            plain_lists,
+            meso_lists,
             fresh: storage("form factors", 4 * slots * u64::from(plain_count))?,
             fresh_meso: storage("form factors to relief", 12 * slots * u64::from(meso_count))?,
             occupied: filled(device, "occupied blocks", 4 * slots * blocks, 0)?,

@@ -1,27 +1,41 @@
-//! The `receiver` estimator: the form factor from every element to every source of a batch. Shaders: `form_factors.comp`, and
-//! where a scene has relief `form_factors_relief.comp`; twin: [`crate::reference::form_factors`].
+//! The `receiver` estimator: the form factor from every element to every source of a batch. Elements that see a source are
+//! listed by how it is found, then found. Shaders: `sort_receivers.comp`, `form_factors.comp`, and where a scene has relief
+//! `form_factors_relief.comp`; twin: [`crate::reference::form_factors`].
 
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
 use super::buffers::{Batch, SceneBuffers};
-use super::factor_buffers::FactorBuffers;
+use super::factor_buffers::{FactorBuffers, ReceiverLists};
 use super::relief_buffers::ReliefBuffers;
+use super::types::ReceiverList;
 use super::{groups, shaders};
+use crate::constants::RECEIVE_KINDS;
 use crate::error::Result;
-use crate::vk::{Bind, Binding, Commands, ComputePipeline, DescriptorSet, Device};
+use crate::vk::{Bind, Binding, Buffer, Commands, ComputePipeline, DescriptorSet, Device, Stage};
 
 pub struct FormFactors {
-    plain: ComputePipeline,
+    sort: ComputePipeline,
+    /// One a kind.
+    plain: Vec<ComputePipeline>,
     /// For elements with relief, in scenes that have some.
-    meso: Option<ComputePipeline>,
+    meso: Vec<ComputePipeline>,
 }
 
 /// Sets of [`FormFactors`].
 pub struct Sets {
-    plain: DescriptorSet,
-    meso: Option<DescriptorSet>,
+    plain: Range,
+    meso: Option<Range>,
+}
+
+/// The elements of a dispatch.
+struct Range {
+    first_element: u32,
+    element_count: u32,
+    first_block: u32,
+    sort: DescriptorSet,
+    kinds: Vec<DescriptorSet>,
 }
 
 #[repr(C)]
@@ -32,33 +46,51 @@ struct Parameters {
     face_size: u32,
     first_block: u32,
     block_count: u32,
+    slot: u32,
 }
 
-/// Place of the item buffer among the bindings.
-const ITEMS: usize = 8;
+/// Place of the item buffer among the bindings, and how many there are for sorting and in all.
+const ITEMS: usize = 6;
+const SORT: usize = 7;
+const PLAIN: usize = 12;
 
 fn pipeline(
     device: &Arc<Device>,
-    name: &str,
-    spirv: &[u32],
+    (name, spirv): (&str, &[u32]),
     bindings: usize,
+    constants: &[u32],
 ) -> Result<ComputePipeline> {
     let mut kinds = vec![Binding::Storage; bindings];
     kinds[ITEMS] = Binding::Sampled;
-    let push = size_of::<Parameters>();
-    ComputePipeline::new(device, name, spirv, &kinds, push, &[], true)
+    ComputePipeline::new(
+        device,
+        name,
+        spirv,
+        &kinds,
+        size_of::<Parameters>(),
+        constants,
+        true,
+    )
 }
 
 impl FormFactors {
     pub fn new(device: &Arc<Device>, with_relief: bool) -> Result<Self> {
-        let spirv = shaders::FORM_FACTORS_COMP;
-        let meso = with_relief.then(|| {
-            let spirv = shaders::FORM_FACTORS_RELIEF_COMP;
-            pipeline(device, "form factors to relief", spirv, ITEMS + 3)
-        });
+        let kinds = |shader, bindings| -> Result<Vec<_>> {
+            (0..RECEIVE_KINDS)
+                .map(|kind| pipeline(device, shader, bindings, &[kind]))
+                .collect()
+        };
+        let sort = ("sort receivers", shaders::SORT_RECEIVERS_COMP);
+        let plain = ("form factors", shaders::FORM_FACTORS_COMP);
+        let meso = ("form factors to relief", shaders::FORM_FACTORS_RELIEF_COMP);
         Ok(Self {
-            plain: pipeline(device, "form factors", spirv, ITEMS + 2)?,
-            meso: meso.transpose()?,
+            sort: pipeline(device, sort, SORT, &[])?,
+            plain: kinds(plain, PLAIN)?,
+            meso: if with_relief {
+                kinds(meso, PLAIN + 1)?
+            } else {
+                Vec::new()
+            },
         })
     }
 
@@ -69,54 +101,95 @@ impl FormFactors {
         factors: &FactorBuffers,
         relief: Option<&ReliefBuffers>,
     ) -> Result<Sets> {
-        let binds = |fresh| {
-            let mut binds: Vec<_> = [
-                &batch.slots,
-                &scene.sources,
-                &scene.contours,
-                &scene.triangles,
-                &scene.planes,
-                &scene.balls,
-                &factors.occupied,
-                fresh,
-            ]
-            .map(Bind::Buffer)
-            .to_vec();
-            binds.push(Bind::Image(&batch.items, &batch.sampler));
-            binds.push(Bind::Buffer(&scene.members));
-            binds
+        let bind =
+            |pipelines: &[ComputePipeline], lists: &ReceiverLists, fresh, more: Option<&Buffer>| {
+                let mut binds: Vec<_> = [
+                    &batch.slots,
+                    &scene.sources,
+                    &scene.planes,
+                    &scene.balls,
+                    &lists.counts,
+                    &lists.listed,
+                ]
+                .map(Bind::Buffer)
+                .to_vec();
+                binds.push(Bind::Image(&batch.items, &batch.sampler));
+                let sort = self.sort.bind("sort receivers", &binds)?;
+                let rest = [
+                    &scene.contours,
+                    &scene.triangles,
+                    &scene.members,
+                    &factors.occupied,
+                    fresh,
+                ];
+                binds.extend(rest.map(Bind::Buffer));
+                binds.extend(more.map(Bind::Buffer));
+                let kinds = pipelines.iter().map(|p| p.bind("form factors", &binds));
+                Ok::<_, crate::error::Error>((sort, kinds.collect::<Result<Vec<_>>>()?))
+            };
+        let (sort, kinds) = bind(&self.plain, &factors.plain_lists, &factors.fresh, None)?;
+        let plain = Range {
+            first_element: 0,
+            element_count: factors.plain_count,
+            first_block: 0,
+            sort,
+            kinds,
         };
-        let meso = self.meso.as_ref().zip(relief).map(|(pipeline, relief)| {
-            let mut binds = binds(&factors.fresh_meso);
-            binds.push(Bind::Buffer(&relief.elements));
-            pipeline.bind("form factors to relief", &binds)
+        let meso = relief.map(|relief| {
+            let (lists, fresh) = (&factors.meso_lists, &factors.fresh_meso);
+            let (sort, kinds) = bind(&self.meso, lists, fresh, Some(&relief.elements))?;
+            Ok::<_, crate::error::Error>(Range {
+                first_element: factors.plain_count,
+                element_count: factors.meso_count,
+                first_block: factors.plain_blocks(),
+                sort,
+                kinds,
+            })
         });
         Ok(Sets {
-            plain: self.plain.bind("form factors", &binds(&factors.fresh))?,
+            plain,
             meso: meso.transpose()?,
         })
     }
 
-    /// The two dispatches write to different elements.
     pub fn record(&self, cmd: &Commands, sets: &Sets, batch: &Batch, factors: &FactorBuffers) {
-        let dispatch = |pipeline, set, first_element, element_count, first_block| {
-            let parameters = Parameters {
-                first_element,
-                element_count,
-                face_size: batch.face_size,
-                first_block,
-                block_count: factors.blocks(),
-            };
-            if element_count > 0 {
-                let size = [groups(element_count), batch.slot_count, 1];
-                cmd.dispatch(pipeline, set, &parameters, size);
-            }
+        let meso = sets.meso.as_ref();
+        let of_meso = meso.map(|m| (m, &self.meso, &factors.meso_lists, &factors.fresh_meso));
+        let of_plain = (
+            &sets.plain,
+            &self.plain,
+            &factors.plain_lists,
+            &factors.fresh,
+        );
+        let ranges = || std::iter::once(of_plain).chain(of_meso);
+        for (.., lists, fresh) in ranges() {
+            cmd.copy(&lists.empty, 0, &lists.counts, 0, lists.empty.bytes());
+            cmd.fill(fresh, 0);
+        }
+        cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
+        let parameters = |range: &Range, slot| Parameters {
+            first_element: range.first_element,
+            element_count: range.element_count,
+            face_size: batch.face_size,
+            first_block: range.first_block,
+            block_count: factors.blocks(),
+            slot,
         };
-        let plain = factors.plain_count;
-        dispatch(&self.plain, &sets.plain, 0, plain, 0);
-        if let (Some(pipeline), Some(set)) = (&self.meso, &sets.meso) {
-            let (count, block) = (factors.meso_count, factors.plain_blocks());
-            dispatch(pipeline, set, plain, count, block);
+        for (range, ..) in ranges() {
+            let size = [groups(range.element_count), batch.slot_count, 1];
+            cmd.dispatch(&self.sort, &range.sort, &parameters(range, 0), size);
+        }
+        cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+        // Every element is in one list of a slot at most.
+        for (range, pipelines, lists, _) in ranges() {
+            for slot in 0..batch.slot_count {
+                for (kind, (pipeline, set)) in pipelines.iter().zip(&range.kinds).enumerate() {
+                    let push = parameters(range, slot);
+                    let list = u64::from(slot * RECEIVE_KINDS) + kind as u64;
+                    let at = size_of::<ReceiverList>() as u64 * list;
+                    cmd.dispatch_indirect(pipeline, set, &push, (&lists.counts, at));
+                }
+            }
         }
     }
 }

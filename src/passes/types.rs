@@ -138,6 +138,16 @@ pub struct Slot {
     pub reflected: Vec3,
 }
 
+/// The command for a list of receivers, and how many they are.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct ReceiverList {
+    pub groups_x: u32,
+    pub groups_y: u32,
+    pub groups_z: u32,
+    pub count: u32,
+}
+
 /// Where the kept form factors of a source start; `chunk` is `NONE` where they are not kept.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]

@@ -5,7 +5,7 @@ use ash::vk;
 /// A kind of work on the device. A barrier orders everything of one kind before everything of another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
-    /// Compute shaders reading and writing buffers and images.
+    /// Compute shaders reading and writing buffers and images, and fetching how many they are.
     Compute,
     /// Fetching draw commands, indices and vertices, and shaders of a draw reading buffers.
     Draw,
@@ -22,8 +22,11 @@ impl Stage {
         use vk::{AccessFlags2 as A, PipelineStageFlags2 as S};
         match self {
             Self::Compute => (
-                S::COMPUTE_SHADER,
-                A::SHADER_STORAGE_READ | A::SHADER_STORAGE_WRITE | A::SHADER_SAMPLED_READ,
+                S::COMPUTE_SHADER | S::DRAW_INDIRECT,
+                A::SHADER_STORAGE_READ
+                    | A::SHADER_STORAGE_WRITE
+                    | A::SHADER_SAMPLED_READ
+                    | A::INDIRECT_COMMAND_READ,
             ),
             Self::Draw => (
                 S::DRAW_INDIRECT

@@ -169,6 +169,33 @@ impl Commands {
         if groups.contains(&0) {
             return;
         }
+        self.bind_compute(pipeline, set, push);
+        // SAFETY: a pipeline with its set and constants is bound.
+        unsafe {
+            self.device
+                .raw
+                .cmd_dispatch(self.raw, groups[0], groups[1], groups[2]);
+        }
+    }
+
+    /// A dispatch of as many groups as the device has written at byte `offset` of `counts`.
+    pub fn dispatch_indirect<T: Pod>(
+        &self,
+        pipeline: &ComputePipeline,
+        set: &DescriptorSet,
+        push: &T,
+        (counts, offset): (&Buffer, u64),
+    ) {
+        self.bind_compute(pipeline, set, push);
+        // SAFETY: as above; the command lies within the buffer and was written by a pass of this crate.
+        unsafe {
+            self.device
+                .raw
+                .cmd_dispatch_indirect(self.raw, counts.raw, offset);
+        }
+    }
+
+    fn bind_compute<T: Pod>(&self, pipeline: &ComputePipeline, set: &DescriptorSet, push: &T) {
         let bytes = bytemuck::bytes_of(push);
         assert_eq!(
             bytes.len(),
@@ -196,7 +223,6 @@ impl Commands {
                     bytes,
                 );
             }
-            raw.cmd_dispatch(self.raw, groups[0], groups[1], groups[2]);
         }
     }
 

@@ -1,0 +1,125 @@
+// A receiving element and a source: what both steps of the receiver estimator know of them.
+
+#extension GL_KHR_shader_subgroup_basic : require
+#extension GL_KHR_shader_subgroup_vote : require
+#extension GL_KHR_shader_subgroup_ballot : require
+#include "shared/types.glsl"
+#include "shared/hemicube.glsl"
+
+layout(local_size_x = GROUP) in;
+
+layout(scalar, binding = 0) readonly buffer Slots { Slot slots[]; };
+// Words of struct Source.
+layout(scalar, binding = 1) readonly buffer Sources { uint source_words[]; };
+// xyz: unit normal n; w: n · x on the plane.
+layout(scalar, binding = 2) readonly buffer Planes { vec4 planes[]; };
+// xyz: centroid; w: radius of the ball about it that holds the element.
+layout(scalar, binding = 3) readonly buffer Balls { vec4 balls[]; };
+// How many elements each list holds, [slot][kind].
+layout(scalar, binding = 4) buffer Counts { ReceiverList lists[]; };
+// The elements, counted from the first of the dispatch, [slot][kind][element].
+layout(scalar, binding = 5) buffer Listed { uint listed[]; };
+layout(binding = 6) uniform usampler2D items;
+
+layout(push_constant, scalar) uniform Parameters {
+    uint first_element;
+    uint element_count;
+    uint face_size;
+    // Of form_factors.comp alone:
+    uint first_block;
+    uint block_count;    // of all elements
+    uint list_slot;
+};
+
+// Rounding of a plane's height at a point: a few steps of f32 at coordinates up to 1.
+const float HEIGHT_EPSILON = 1e-6;
+// How many pixels' footprints two points of one surface may lie apart and still be taken for one another.
+const float REACH = 1.5;
+
+// Where a source lies this many squared radii off, no edge of it is seen under more than a right angle.
+const float ACUTE = 2.1;
+// Members of a curved source that shows some backs are points from so many of their radii off. The error of a square is then 2/3
+// of the square of that at most: 0.07 %.
+const float POINT_DISTANCE = 32.0;
+// An element no further than so many of its radii from a source takes several samples.
+const float NEAR = 4.0;
+
+// Whether p, on an element with normal n, is seen from the source's eye.
+bool visible(vec3 p, vec3 n, uint element, uint slot, Source s) {
+    vec3 d = p - s.eye;
+    vec3 local = vec3(dot(d, s.tangent), dot(d, s.bitangent), dot(d, s.normal));
+    vec2 texel = hemicube_texel(local, face_size);
+    ivec2 pixel = hemicube_pixel(texel, face_size);
+    uint item = texelFetch(items, ivec2(slot * face_size, 0) + pixel, 0).r;
+    if (item == NONE || item == element) {
+        return true;
+    }
+    vec4 plane = planes[item];
+    float eye_height = dot(plane.xyz, s.eye) - plane.w;
+    float height = dot(plane.xyz, p) - plane.w;
+    float depth = eye_height >= 0.0 ? -height : height;
+    if (depth <= HEIGHT_EPSILON) {
+        return true;
+    }
+    // The item's plane lies in front of p. It is still the same surface, seen a pixel aside, where the two planes'
+    // angle and the distance between the points explain the height.
+    vec3 ray = hemicube_direction(pixel, face_size);
+    vec3 world = ray.x * s.tangent + ray.y * s.bitangent + ray.z * s.normal;
+    float along = -eye_height / dot(plane.xyz, world);
+    vec3 seen = s.eye + along * world;
+    float distance_p = length(d);
+    if (dot(seen - s.eye, d) > distance_p * distance_p) {
+        // The item itself is farther off than p.
+        return true;
+    }
+    float apart = length(p - seen);
+    float grazing = min(abs(dot(n, d)), abs(dot(plane.xyz, d))) / distance_p;
+    float footprint = distance_p * 2.0 / float(face_size) / max(grazing, 0.05);
+    float sine = length(cross(n, plane.xyz));
+    return apart <= REACH * footprint && depth <= apart * sine + HEIGHT_EPSILON;
+}
+
+// Four words that all lanes of the subgroup want, from `first` on. Each lane loads one of them: a load costs a software device
+// as much as some ten operations for each lane, wherever it points. All lanes must be active.
+#define LOAD4(words, first) share4(words[(first) + (gl_SubgroupInvocationID & 3)])
+
+vec4 share4(uint word) {
+    float value = uintBitsToFloat(word);
+    return vec4(subgroupBroadcast(value, 0), subgroupBroadcast(value, 1), subgroupBroadcast(value, 2),
+                subgroupBroadcast(value, 3));
+}
+
+const uint SOURCE_WORDS = 32;
+
+Source load_source(uint index) {
+    vec4 word[SOURCE_WORDS / 4];
+    for (uint i = 0; i < SOURCE_WORDS / 4; i++) {
+        word[i] = LOAD4(source_words, index * SOURCE_WORDS + 4 * i);
+    }
+    return Source(word[0].xyz, word[0].w, word[1].xyz, word[1].w, word[2].xyz, word[2].w, word[3].xyz, word[3].w,
+                  word[4].xyz, floatBitsToUint(word[4].w), floatBitsToUint(word[5].x), floatBitsToUint(word[5].y),
+                  floatBitsToUint(word[5].z), floatBitsToUint(word[5].w), floatBitsToUint(word[6].x), word[6].yzw, word[7].x, word[7].y, 0, 0);
+}
+
+// Whether every member shows p its front: the cone of normals and the ball bound their heights.
+bool shows_whole_front(Source s, vec3 p) {
+    vec3 d = p - s.eye;
+    float height = dot(d, s.normal);
+    float flat_part = sqrt(max(dot(d, d) - height * height, 0.0));
+    return s.cone_sin == 0.0 || height * s.cone_cos - flat_part * s.cone_sin - s.radius > 0.0;
+}
+
+// Whether a source can show its front at p.
+bool shows_front(Source s, vec3 p) {
+    vec3 d = p - s.eye;
+    float height = dot(d, s.normal);
+    if (s.kind == KIND_POINT) {
+        // Each of the two sources of a point light serves its own side; the upper one has the plane between them.
+        return s.cone_sin == 0.0 ? height >= 0.0 : height > 0.0;
+    }
+    if (s.cone_sin == 0.0) {
+        return height > HEIGHT_EPSILON * s.radius;
+    }
+    float flat_part = sqrt(max(dot(d, d) - height * height, 0.0));
+    return height * s.cone_cos + flat_part * s.cone_sin + s.radius > 0.0;
+}

@@ -1,0 +1,49 @@
+// Lists the elements that see each source of the batch, by how their form factor is found: by the outline of the source, by its
+// members as points, or, near it, with more care. Elements that it lies behind, turns its back to or is hidden from are in no
+// list, and their form factor is 0.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "shared/receivers.glsl"
+
+void append(uint slot, uint kind, bool mine, uint i) {
+    uvec4 lanes = subgroupBallot(mine);
+    uint count = subgroupBallotBitCount(lanes);
+    uint list = slot * RECEIVE_KINDS + kind;
+    uint first = 0;
+    if (count > 0 && subgroupElect()) {
+        first = atomicAdd(lists[list].count, count);
+        atomicMax(lists[list].groups_x, (first + count + GROUP - 1) / GROUP);
+    }
+    first = subgroupBroadcastFirst(first);
+    if (mine) {
+        listed[list * element_count + first + subgroupBallotExclusiveBitCount(lanes)] = i;
+    }
+}
+
+void main() {
+    uint slot = gl_WorkGroupID.y;
+    uint source = slots[slot].source;
+    if (source == NONE) {
+        return;
+    }
+    bool inside = gl_GlobalInvocationID.x < element_count;
+    uint i = min(gl_GlobalInvocationID.x, element_count - 1);
+    uint e = first_element + i;
+    Source s = load_source(source);
+    vec4 ball = balls[e];
+    vec3 n = planes[e].xyz;
+    vec3 d = ball.xyz - s.eye;
+    float distance_eye = length(d);
+    float across = dot(d, n);
+    bool near = distance_eye - s.radius <= NEAR * ball.w;
+    bool above = across <= -s.radius && distance_eye * distance_eye >= ACUTE * s.radius * s.radius;
+    bool whole = shows_whole_front(s, ball.xyz);
+    bool points = distance_eye - s.radius >= POINT_DISTANCE * s.member_radius;
+    bool seen = shows_front(s, ball.xyz) && visible(ball.xyz, n, e, slot, s);
+    bool mine = inside && across < s.radius && (near || seen);
+    bool by_outline = !near && (s.kind == KIND_POINT || whole && above);
+    bool by_points = !near && !by_outline && !whole && points;
+    append(slot, RECEIVE_OUTLINE, mine && by_outline, i);
+    append(slot, RECEIVE_POINTS, mine && by_points, i);
+    append(slot, RECEIVE_NEAR, mine && !by_outline && !by_points, i);
+}
