@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::meso::Relief;
 use crate::scene::Scene;
 use crate::solution::Solution;
-use crate::solver::{Settings, Solver, Update};
+use crate::solver::{Settings, Solver, Update, Visibility};
 use crate::vk::Device;
 
 /// Bakes a scene. `go_on` sees every step and may stop it; what has been solved by then is a valid solution.
@@ -17,9 +17,35 @@ pub fn bake(
     settings: &Settings,
     go_on: impl FnMut(&Update) -> bool,
 ) -> Result<Solution> {
+    solution(scene, &solve(device, scene, settings, None, go_on)?)
+}
+
+/// The solver of [`bake`] when it is done. With `kept`, what was drawn when the scene was lit otherwise is not drawn again.
+///
+/// # Errors
+/// `kept` is of another scene or other settings.
+pub fn solve(
+    device: &Arc<Device>,
+    scene: &Scene,
+    settings: &Settings,
+    kept: Option<&Visibility>,
+    go_on: impl FnMut(&Update) -> bool,
+) -> Result<Solver> {
     let elements = elements(device, scene, settings)?;
-    let mut solver = Solver::new(device, elements, &scene.point_lights, settings)?;
+    let lights = &scene.point_lights;
+    let mut solver = match kept {
+        None => Solver::new(device, elements, lights, settings)?,
+        Some(kept) => {
+            kept.check(scene, settings)?;
+            Solver::relit(device, elements, lights, settings, kept)?
+        }
+    };
     solver.run(go_on)?;
+    Ok(solver)
+}
+
+/// What a solver has found of a scene.
+pub fn solution(scene: &Scene, solver: &Solver) -> Result<Solution> {
     let mut report = solver.report().clone();
     report.skipped.degenerate_triangles = scene.dropped_degenerate as u64;
     Ok(Solution::new(

@@ -95,6 +95,15 @@ impl Elements {
         self.corners.len()
     }
 
+    /// Gives the elements of each material another emitted radiosity; returns what they had, `[material]`.
+    pub fn emitted_by_material(&mut self, emitted: &[Vec3]) -> Vec<Vec3> {
+        let mut before = vec![Vec3::ZERO; emitted.len()];
+        for (mine, &material) in self.emitted.iter_mut().zip(&self.material) {
+            before[material as usize] = std::mem::replace(mine, emitted[material as usize]);
+        }
+        before
+    }
+
     pub fn is_empty(&self) -> bool {
         self.corners.is_empty()
     }

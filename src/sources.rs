@@ -10,6 +10,7 @@ use crate::charts::{Connections, charts, morton_order};
 use crate::constants::{KIND_POINT, KIND_SURFACE, NONE};
 use crate::contour::{Loop, contour};
 use crate::elements::Elements;
+use crate::error::{Error, Result};
 use crate::scene::PointLight;
 
 /// Where groups are cut.
@@ -83,6 +84,43 @@ pub struct Sources {
     pub chart: Vec<u32>,
     /// Those whose elements have a relief: a range of the list.
     pub relief: std::ops::Range<usize>,
+}
+
+impl Sources {
+    /// Lights the groups anew: by the emission that their elements have now, and by other point lights. What was cut by the old
+    /// emission stays as it is.
+    ///
+    /// # Errors
+    /// An element emits that belongs to no source, since it was black.
+    pub fn relight(&mut self, elements: &Elements, lights: &[PointLight], seed: u64) -> Result<()> {
+        self.list.retain(|s| s.kind != KIND_POINT);
+        let mut covered = vec![false; elements.len()];
+        for source in &mut self.list {
+            let first = source.first_element as usize;
+            let members = first..first + source.element_count as usize;
+            let area: f64 = members.clone().map(|e| elements.area[e]).sum();
+            let emitted = members
+                .clone()
+                .map(|e| elements.emitted[e].as_dvec3() * elements.area[e]);
+            source.emitted = (emitted.sum::<DVec3>() / area).as_vec3();
+            covered[members].fill(true);
+        }
+        if let Some(e) =
+            (0..elements.len()).find(|&e| !covered[e] && elements.emitted[e] != Vec3::ZERO)
+        {
+            return Err(Error::Usage(format!(
+                "triangle {} emits now, and neither emitted nor reflected when visibility was kept: bake anew",
+                elements.input_index[e]
+            )));
+        }
+        for light in lights {
+            self.list.extend(point(light, elements));
+        }
+        for (i, source) in self.list.iter_mut().enumerate() {
+            (source.tangent, source.bitangent) = turned_frame(source.normal, seed, i as u64);
+        }
+        Ok(())
+    }
 }
 
 /// Orders the elements and groups them. `seed` turns each hemicube about its axis by an angle of its own, which keeps the

@@ -6,7 +6,7 @@ use common::{Build, assert_silent, device};
 use glam::{DVec3, Vec3};
 use mesolux::directions::Directions;
 use mesolux::meso::{Options, Transport};
-use mesolux::solver::{Light, Report, Settings, Solver};
+use mesolux::solver::{Light, Report, Settings, Solver, Visibility};
 
 /// Unshot light that each solution leaves, as a share of all. It lands on elements as large as any other, and half of it and
 /// the rounding of sums in another order are what two solutions differ by.
@@ -113,5 +113,141 @@ fn a_run_with_kept_sources_repeats_to_the_bit() {
     assert_eq!(first.shots, second.shots);
     assert_eq!(a.irradiance, b.irradiance);
     assert_eq!(a.radiosity, b.radiosity);
+    assert_silent();
+}
+
+/// The scene with another lamp, another point light, and a wall that glows.
+fn relit_scene() -> Build {
+    let mut build = scene(true);
+    let lamp = build.scene.materials.len() - 1;
+    build.scene.materials[lamp].ke = [0.5, 4.0, 1.0];
+    build.scene.materials[0].ke = [0.1, 0.0, 0.0];
+    build.scene.point_lights.clear();
+    build.point_light(DVec3::new(0.8, 0.3, 0.2), 0.5);
+    build
+}
+
+fn settings() -> Settings {
+    Settings {
+        hemicube: 32,
+        batch: 6,
+        residual: RESIDUAL,
+        relief: Options {
+            transport: Transport::Physical,
+            directions: Directions::new(32).expect("a number of the paper"),
+            cache: None,
+        },
+        ..Settings::default()
+    }
+}
+
+#[test]
+fn relighting_equals_a_bake_of_the_same_groups_and_draws_point_lights_alone() {
+    let device = device();
+    let first = scene(true).scene;
+    let relit = relit_scene().scene;
+    let folder = tempfile::tempdir().expect("a folder for the test");
+    let path = folder.path().join("room.visibility");
+    let solve = |scene, kept: Option<&Visibility>| {
+        mesolux::bake::solve(&device, scene, &settings(), kept, |_| true)
+            .expect("the scene is solved")
+    };
+    let dark = {
+        let solver = solve(&first, None);
+        let kept = solver
+            .visibility(&first)
+            .expect("it comes back")
+            .expect("it is kept");
+        kept.save(&path).expect("it is written");
+        solver.light().expect("the light comes back")
+    };
+    let kept = Visibility::load(&path).expect("it is read");
+    let solver = solve(&relit, Some(&kept));
+    assert_eq!(
+        solver.report().hemicubes,
+        2,
+        "the two halves of the point light"
+    );
+    let light = solver.light().expect("the light comes back");
+    assert!(largest_difference(&light.irradiance, &dark.irradiance) > 0.1);
+
+    // The new emitters are weak enough to be cut into the same groups.
+    let anew = solve(&relit, None).light().expect("the light comes back");
+    let sum = |light: &Light| light.irradiance.iter().map(|e| e.as_dvec3()).sum::<DVec3>();
+    let off = (sum(&light) / sum(&anew) - 1.0).abs().max_element();
+    println!("relit over baked anew: {off:.1e}");
+    assert!(off <= f64::from(TOLERANCE));
+
+    // Back to the first lights: the same as at first, to rounding.
+    let back = solve(&first, Some(&kept))
+        .light()
+        .expect("the light comes back");
+    let off = largest_difference(&back.irradiance, &dark.irradiance);
+    println!("lit as at first: {off:.1e}");
+    assert!(off <= TOLERANCE);
+    assert_silent();
+}
+
+#[test]
+fn kept_form_factors_of_something_else_are_refused() {
+    let device = device();
+    let scene = scene(false).scene;
+    let solve = |scene: &mesolux::scene::Scene, settings: &Settings, kept: Option<&Visibility>| {
+        mesolux::bake::solve(&device, scene, settings, kept, |_| true)
+    };
+    let quick = Settings {
+        residual: 0.1,
+        ..settings()
+    };
+    let solver = solve(&scene, &quick, None).expect("the scene is solved");
+    let kept = solver
+        .visibility(&scene)
+        .expect("it comes back")
+        .expect("it is kept");
+    let refused = |scene: &mesolux::scene::Scene, settings: &Settings| {
+        let error = solve(scene, settings, Some(&kept))
+            .err()
+            .expect("it is refused");
+        println!("{error}");
+        assert!(error.to_string().contains("--keep-visibility"));
+    };
+    let mut moved = scene.clone();
+    moved.vertices[0].x -= 0.1;
+    refused(&moved, &quick);
+    let mut painted = scene.clone();
+    painted.materials[0].kd = [0.1; 3];
+    refused(&painted, &quick);
+    let finer = Settings {
+        hemicube: 64,
+        ..quick.clone()
+    };
+    refused(&scene, &finer);
+
+    let folder = tempfile::tempdir().expect("a folder for the test");
+    let path = folder.path().join("room.visibility");
+    kept.save(&path).expect("it is written");
+    let whole = std::fs::read(&path).expect("it is read");
+    let mut turned = whole.clone();
+    turned[whole.len() - 9] ^= 1;
+    for (bytes, told) in [
+        (&turned[..], "damaged"),
+        (&whole[..whole.len() - 4], "length"),
+        (&whole[..30], "header"),
+        (
+            &b"nothing of the kind, but long enough"[..],
+            "not a file of kept form factors",
+        ),
+    ] {
+        std::fs::write(&path, bytes).expect("it is written");
+        let error = Visibility::load(&path)
+            .err()
+            .expect("it is refused")
+            .to_string();
+        println!("{error}");
+        assert!(
+            error.contains(told) && error.contains("room.visibility"),
+            "{error}"
+        );
+    }
     assert_silent();
 }

@@ -1,6 +1,6 @@
 //! `mesolux bake`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -14,7 +14,7 @@ use mesolux::error::{Error, Result};
 use mesolux::meso::{self, Transport};
 use mesolux::scene::Scene;
 use mesolux::solution::{Origin, Solution};
-use mesolux::solver::{Estimator, Report, Settings, Update};
+use mesolux::solver::{Estimator, Report, Settings, Solver, Update, Visibility};
 use mesolux::vk::Device;
 
 /// Solve a scene and write the light on every element
@@ -30,6 +30,12 @@ pub struct Options {
     /// The file to write
     #[arg(short, long, value_name = "OUT.safetensors")]
     output: PathBuf,
+    /// Keep the form factors beside the bake, as OUT.visibility: some hundred MiB that --relight needs
+    #[arg(long)]
+    keep_visibility: bool,
+    /// Light SCENE, of which emission and point lights may have changed, by the form factors that were kept with this bake
+    #[arg(long, value_name = "BAKE.safetensors", conflicts_with = "estimator")]
+    relight: Option<PathBuf>,
     #[command(flatten)]
     solve: SolveOptions,
     #[command(flatten)]
@@ -183,9 +189,22 @@ pub fn run(options: &Options) -> Result<()> {
     writable(&options.output)?;
     let scene = options.builtin.load(&options.scene)?;
     let read_seconds = start.elapsed().as_secs_f64();
+    let kept = options
+        .relight
+        .as_ref()
+        .map(|bake| kept_with(bake))
+        .transpose()?;
     let device = options.device.open()?;
-    let solution = bake_visibly(&device, &scene, &settings)?;
+    let solver = solve_visibly(&device, &scene, &settings, kept.as_ref())?;
+    let solution = mesolux::bake::solution(&scene, &solver)?;
     options.device.check()?;
+    if options.keep_visibility {
+        let path = beside(&options.output);
+        match solver.visibility(&scene)? {
+            Some(visibility) => visibility.save(&path)?,
+            None => tracing::warn!("no form factors are kept: --keep-visibility writes nothing"),
+        }
+    }
     let origin = origin(&options.scene, &options.builtin, scene.hash());
     solution.save(&options.output, &origin, &options.solve)?;
     let report = &solution.report;
@@ -225,20 +244,47 @@ pub fn run(options: &Options) -> Result<()> {
 
 /// Bakes with progress on stderr; Ctrl-C stops the bake and keeps what it has.
 pub fn bake_visibly(device: &Arc<Device>, scene: &Scene, settings: &Settings) -> Result<Solution> {
+    mesolux::bake::solution(scene, &solve_visibly(device, scene, settings, None)?)
+}
+
+fn solve_visibly(
+    device: &Arc<Device>,
+    scene: &Scene,
+    settings: &Settings,
+    kept: Option<&Visibility>,
+) -> Result<Solver> {
     catch_interrupts();
     let bar = Bar::new();
-    let solution = mesolux::bake::bake(device, scene, settings, |update| {
+    let solver = mesolux::bake::solve(device, scene, settings, kept, |update| {
         bar.show(progress(update));
         !interrupted()
     });
     bar.finish();
-    solution
+    solver
+}
+
+/// Where the form factors of a bake are kept.
+fn beside(bake: &Path) -> PathBuf {
+    bake.with_extension("visibility")
+}
+
+fn kept_with(bake: &Path) -> Result<Visibility> {
+    let path = beside(bake);
+    if bake.is_file() && !path.is_file() {
+        return Err(Error::file(
+            bake,
+            format!(
+                "has no {}: bake with --keep-visibility first",
+                path.display()
+            ),
+        ));
+    }
+    Visibility::load(&path)
 }
 
 /// Where the scene came from, for the bake's metadata; paths are made absolute.
 fn origin(scene: &str, builtin: &Builtin, hash: String) -> Origin {
-    let absolute =
-        |path: &std::path::Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     let named = mesolux::scene::builtin::NAMES.contains(&scene);
     Origin {
         scene: if named {

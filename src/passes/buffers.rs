@@ -195,6 +195,13 @@ impl State {
     }
 }
 
+impl State {
+    /// Says where the form factors of the first sources lie.
+    pub fn keep_rows(&self, device: &Arc<Device>, rows: &[KeptRow]) -> Result<()> {
+        write(device, &self.kept_rows, rows)
+    }
+}
+
 /// A batch of sources with their hemicubes.
 pub struct Batch {
     /// Sources that are drawn.
@@ -324,17 +331,23 @@ pub fn upload<T: Pod>(
     data: &[T],
     usage: BufferUse,
 ) -> Result<Buffer> {
+    let buffer = Buffer::new(device, name, size_of_val(data) as u64, usage)?;
+    write(device, &buffer, data)?;
+    Ok(buffer)
+}
+
+/// Fills the beginning of a device buffer.
+pub fn write<T: Pod>(device: &Arc<Device>, buffer: &Buffer, data: &[T]) -> Result<()> {
     let bytes = size_of_val(data) as u64;
-    let buffer = Buffer::new(device, name, bytes, usage)?;
     if bytes > 0 {
         let mut staging = Buffer::new(device, "staging", bytes, BufferUse::Upload)?;
         staging.write(0, data);
-        Commands::run(device, name, |cmd| {
-            cmd.copy(&staging, 0, &buffer, 0, bytes);
+        Commands::run(device, "write", |cmd| {
+            cmd.copy(&staging, 0, buffer, 0, bytes);
             Ok(())
         })?;
     }
-    Ok(buffer)
+    Ok(())
 }
 
 /// The first `count` values of a device buffer; everything submitted before is done first.

@@ -1,8 +1,9 @@
 //! Form factors on the device: those of the batch, and those that are kept so that a source is drawn once.
 
+use std::cmp::Ordering;
 use std::sync::Arc;
 
-use super::buffers::{SceneBuffers, filled, upload};
+use super::buffers::{SceneBuffers, download, filled, upload, write};
 use super::groups;
 use super::relief_buffers::ReliefBuffers;
 use super::types::{KeptState, ReceiverList};
@@ -66,13 +67,14 @@ impl ReceiverLists {
 const CHUNK: u64 = 256 << 20;
 
 impl FactorBuffers {
-    /// Keeps rows in `memory` bytes at most, and no more than all sources need. A device that has less keeps fewer.
+    /// Keeps rows in `memory` bytes at most, and no more than all sources need. A device that has less keeps fewer. Where form factors
+    /// are to be restored, the words of a chunk and how many chunks there were come with the memory, and are made anyway.
     pub fn new(
         device: &Arc<Device>,
         scene: &SceneBuffers,
         relief: Option<&ReliefBuffers>,
         slots: u32,
-        memory: u64,
+        (memory, chunks_of): (u64, Option<(u32, usize)>),
     ) -> Result<Self> {
         let meso_count = relief.map_or(0, |r| r.element_count);
         let plain_count = scene.element_count - meso_count;
@@ -82,12 +84,18 @@ impl FactorBuffers {
                 * (2 * u64::from(groups(plain_count)) + 6 * u64::from(groups(meso_count)));
         let most = memory.min(row * u64::from(scene.source_count));
         // Rows lie in one chunk each, so that a chunk may end with most of a row unused.
-        let chunk = most.min(CHUNK).next_multiple_of(4);
+        let chunk = match chunks_of {
+            Some((words, _)) => 4 * u64::from(words),
+            None => most.min(CHUNK).next_multiple_of(4),
+        };
         let count = if row > chunk { 0 } else { most.div_ceil(chunk) };
+        let least = chunks_of.map_or(0, |(_, count)| count as u64);
+        let count = count.max(least);
         let mut chunks = Vec::new();
         for _ in 0..count {
             match Buffer::new(device, "kept form factors", chunk, BufferUse::Addressed) {
                 Ok(buffer) => chunks.push(buffer),
+                Err(e) if (chunks.len() as u64) < least => return Err(e),
                 Err(e) => {
                     tracing::warn!("{e}: keeping fewer form factors");
                     break;
@@ -117,6 +125,34 @@ impl FactorBuffers {
             chunk_words: (chunk / 4) as u32,
             chunks,
         })
+    }
+
+    /// How far the chunks are filled, and what they hold.
+    pub fn download(&self, device: &Arc<Device>) -> Result<(KeptState, Vec<Vec<u32>>)> {
+        let state = download::<KeptState>(device, &self.state, 1)?[0];
+        let full = self.chunks.iter().enumerate().map(|(i, chunk)| {
+            let words = match (i as u32).cmp(&state.chunk) {
+                Ordering::Less => self.chunk_words,
+                Ordering::Equal => state.used,
+                Ordering::Greater => 0,
+            };
+            download(device, chunk, words as usize)
+        });
+        Ok((state, full.collect::<Result<_>>()?))
+    }
+
+    /// The inverse of [`Self::download`].
+    pub fn restore(
+        &self,
+        device: &Arc<Device>,
+        chunks: &[Vec<u32>],
+        [chunk, used, rows]: [u32; 3],
+    ) -> Result<()> {
+        write(device, &self.state, &[KeptState { chunk, used, rows }])?;
+        for (buffer, words) in self.chunks.iter().zip(chunks) {
+            write(device, buffer, words)?;
+        }
+        Ok(())
     }
 
     pub fn plain_blocks(&self) -> u32 {

@@ -7,6 +7,7 @@ mod batch;
 mod relief_light;
 mod report;
 mod self_test;
+mod visibility;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -24,7 +25,7 @@ use crate::passes::factor_buffers::FactorBuffers;
 use crate::passes::item_buffer::ItemBuffer;
 use crate::passes::relief_buffers::ReliefBuffers;
 use crate::passes::types::{KeptState, Progress, Reflected, Slot};
-use crate::scene::PointLight;
+use crate::scene::{PointLight, Scene};
 use crate::sources::{self, Grouping, Sources};
 use crate::vk::Device;
 
@@ -32,6 +33,7 @@ use batch::{BatchLoop, OnDevice};
 pub use relief_light::ReliefLight;
 pub use report::{Report, Seconds, Skipped, StopReason};
 pub use self_test::{ids_come_back_right, open_device};
+pub use visibility::Visibility;
 
 /// How form factors are taken from the item buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -157,9 +159,34 @@ impl Solver {
     /// Groups the elements into sources and brings everything to the device.
     pub fn new(
         device: &Arc<Device>,
+        elements: Elements,
+        lights: &[PointLight],
+        settings: &Settings,
+    ) -> Result<Self> {
+        Self::with_kept(device, elements, lights, settings, None)
+    }
+
+    /// As [`Self::new`], for the `elements` of a scene whose form factors were kept when it was lit otherwise. The sources are cut
+    /// as they were then; point lights are drawn anew. See [`Visibility::check`].
+    ///
+    /// # Errors
+    /// Emission of elements that neither emitted nor reflected then.
+    pub fn relit(
+        device: &Arc<Device>,
+        elements: Elements,
+        lights: &[PointLight],
+        settings: &Settings,
+        kept: &Visibility,
+    ) -> Result<Self> {
+        Self::with_kept(device, elements, lights, settings, Some(kept))
+    }
+
+    fn with_kept(
+        device: &Arc<Device>,
         mut elements: Elements,
         lights: &[PointLight],
         settings: &Settings,
+        kept: Option<&Visibility>,
     ) -> Result<Self> {
         settings.check()?;
         if settings.estimator == Estimator::Pixel && elements.relief.is_some() {
@@ -168,8 +195,18 @@ impl Solver {
             ));
         }
         let start = Instant::now();
-        let (sources, connections) =
-            sources::build(&mut elements, lights, &settings.grouping, settings.seed);
+        let (grouping, seed) = (&settings.grouping, settings.seed);
+        let (sources, connections) = match kept {
+            None => sources::build(&mut elements, lights, grouping, seed),
+            Some(kept) => {
+                let now = elements.emitted_by_material(&kept.emitted());
+                let (mut sources, connections) =
+                    sources::build(&mut elements, &kept.lights(), grouping, seed);
+                elements.emitted_by_material(&now);
+                sources.relight(&elements, lights, seed)?;
+                (sources, connections)
+            }
+        };
         let scene = SceneBuffers::new(device, &elements, &sources, &connections)?;
         let state = State::new(device, &scene)?;
         let item_buffer = ItemBuffer::new(device)?;
@@ -197,7 +234,7 @@ impl Solver {
                 &scene,
                 relief.as_ref(),
                 slots.0,
-                memory,
+                (memory, kept.map(|k| (k.header.chunk_words, k.chunks.len()))),
             )?),
             Estimator::Pixel => None,
         };
@@ -206,6 +243,11 @@ impl Solver {
             .iter()
             .map(sources::Source::emitted_power)
             .sum();
+        if let (Some(kept), Some(factors)) = (kept, &factors) {
+            let lasting = scene.source_count as usize - 2 * lights.len();
+            state.keep_rows(device, &kept.rows[..lasting.min(kept.rows.len())])?;
+            factors.restore(device, &kept.chunks, kept.header.state)?;
+        }
         let bound_factor = bound_factor(&elements);
         // The bound is bound_factor · unshot / emitted; never stop on more unshot than the residual itself.
         let stop_power = settings.residual * emitted_power / bound_factor.unwrap_or(1e3).max(1.0);
@@ -348,6 +390,23 @@ impl Solver {
             radiosity,
             relief,
         })
+    }
+
+    /// The form factors that the device keeps of `scene`, whose elements these are; none where nothing is kept.
+    pub fn visibility(&self, scene: &Scene) -> Result<Option<Visibility>> {
+        let Some(factors) = self.factors.as_ref().filter(|f| f.keeps()) else {
+            return Ok(None);
+        };
+        let count = self.scene.source_count as usize;
+        let rows = download(&self.device, &self.state.kept_rows, count)?;
+        let (state, chunks) = factors.download(&self.device)?;
+        let state = (state, factors.chunk_words);
+        Ok(Some(Visibility::new(
+            scene,
+            &self.settings,
+            (rows, chunks),
+            state,
+        )))
     }
 
     pub fn report(&self) -> &Report {
