@@ -105,7 +105,8 @@ void main() {
                 }
             }
             top = max(top, power);
-            if (power * float(DRAW_SHARE) < kept_power) {
+            // Replaying costs next to nothing: as long as a kept source has more to send, nothing is drawn.
+            if (power < kept_power) {
                 winner = NONE;
                 wanted = slot;
             }

@@ -1,5 +1,5 @@
 // Lists the elements that see each source of the batch, by how their form factor is found: by the outline of the source, by its
-// members as points, or, near it, with more care. Elements that it lies behind, turns its back to or is hidden from are in no
+// parts as points, or, near it, with more care. Elements that it lies behind, turns its back to or is hidden from are in no
 // list, and their form factor is 0.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -38,7 +38,7 @@ void main() {
     bool near = distance_eye - s.radius <= NEAR * ball.w;
     bool above = across <= -s.radius && distance_eye * distance_eye >= ACUTE * s.radius * s.radius;
     bool whole = shows_whole_front(s, ball.xyz);
-    bool points = distance_eye - s.radius >= POINT_DISTANCE * s.member_radius;
+    bool points = distance_eye - s.radius >= POINT_DISTANCE * s.part_radius;
     bool seen = shows_front(s, ball.xyz) && visible(ball.xyz, n, e, slot, s);
     bool mine = inside && across < s.radius && (near || seen);
     bool by_outline = !near && (s.kind == KIND_POINT || whole && above);

@@ -31,8 +31,6 @@ shared! {
     REPLAYS = 496;
     /// A kept source is shot again once it has this share (one over it) of the power of the strongest source.
     REPLAY_SHARE = 16;
-    /// A source is not drawn while a kept one has this many times its power: drawing takes as long as some hundred replays.
-    DRAW_SHARE = 256;
     /// Binary digits behind the point of a form factor summed by integer atomics. A hemicube's whole sum is 1, so that
     /// 64 bits hold it eight times over, and the rounding of a pixel is 2⁻⁶² of it.
     FIXED_POINT_BITS = 61;

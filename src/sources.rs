@@ -51,8 +51,8 @@ pub struct Source {
     pub facing: f64,
     /// Of the ball about `eye` that holds the source.
     pub radius: f64,
-    /// Of the largest ball about a member's centroid that holds the member.
-    pub member_radius: f64,
+    /// Of a curved source: neighbouring members put together, each of which is a point from afar.
+    pub parts: Vec<Part>,
     /// Largest angle between `normal` and a member's normal; exactly 0 where all lie in one plane.
     pub cone: f64,
     /// Radiosity from emission; a point light's radiant intensity over the square of the internal unit.
@@ -63,6 +63,16 @@ pub struct Source {
     /// Outline, counter-clockwise seen from the front.
     pub contour: Vec<Loop>,
     pub component: u32,
+}
+
+/// A few members of a curved source.
+#[derive(Debug, Clone, Copy)]
+pub struct Part {
+    pub centroid: DVec3,
+    /// Sum of area times normal.
+    pub vector_area: DVec3,
+    /// Of the ball about `centroid` that holds the part.
+    pub radius: f64,
 }
 
 impl Source {
@@ -289,10 +299,11 @@ fn group(elements: &Elements, connections: &Connections, range: std::ops::Range<
         bitangent: DVec3::ZERO,
         area,
         facing,
-        member_radius: range
-            .clone()
-            .map(|e| elements.radius(e))
-            .fold(0.0, f64::max),
+        parts: if flat {
+            Vec::new()
+        } else {
+            parts(elements, range.clone())
+        },
         radius: corners().map(|v| v.distance(eye)).fold(0.0, f64::max),
         cone,
         emitted: emitted.as_vec3(),
@@ -301,6 +312,36 @@ fn group(elements: &Elements, connections: &Connections, range: std::ops::Range<
         contour: contour(elements, range.clone()),
         component: connections.component[range.start],
     }
+}
+
+/// Most members of a part.
+const PART: usize = 6;
+
+fn parts(elements: &Elements, range: std::ops::Range<usize>) -> Vec<Part> {
+    let mut parts = Vec::new();
+    let mut stack = vec![range.map(|e| e as u32).collect::<Vec<_>>()];
+    while let Some(mut members) = stack.pop() {
+        if members.len() > PART {
+            let at = bisect(elements, &mut members);
+            stack.push(members.split_off(at));
+            stack.push(members);
+            continue;
+        }
+        let of = |e: &u32| *e as usize;
+        let area: f64 = members.iter().map(|e| elements.area[of(e)]).sum();
+        let weigh = |values: &[DVec3]| -> DVec3 {
+            let sum = members.iter().map(|e| values[of(e)] * elements.area[of(e)]);
+            sum.sum()
+        };
+        let centroid = weigh(&elements.centroid) / area;
+        let corners = members.iter().flat_map(|e| elements.triangle(of(e)));
+        parts.push(Part {
+            centroid,
+            vector_area: weigh(&elements.normal),
+            radius: corners.map(|v| v.distance(centroid)).fold(0.0, f64::max),
+        });
+    }
+    parts
 }
 
 /// An element, or a piece of one.
@@ -315,7 +356,7 @@ fn part(elements: &Elements, connections: &Connections, e: usize, triangle: [DVe
         bitangent: DVec3::ZERO,
         area: triangle_area(triangle),
         facing: triangle_area(triangle),
-        member_radius: elements.radius(e),
+        parts: Vec::new(),
         radius: triangle
             .into_iter()
             .map(|v| v.distance(eye))
@@ -340,7 +381,7 @@ fn point(light: &PointLight, elements: &Elements) -> [Source; 2] {
         bitangent: DVec3::ZERO,
         area: 0.0,
         facing: 0.0,
-        member_radius: 0.0,
+        parts: Vec::new(),
         radius: 0.0,
         // The shader gives the plane between the halves to the one whose cone is 0.
         cone,

@@ -97,7 +97,7 @@ macro_rules! check {
 #[test]
 fn rust_and_glsl_agree() {
     check!(true, Source: eye area normal radius tangent cone_sin bitangent cone_cos emitted kind
-        first_element element_count first_contour contour_count component middle facing member_radius unused_a unused_b);
+        first_element element_count first_contour contour_count component middle facing part_radius first_part part_count);
     check!(true, Meshlet: centre radius axis cutoff first count component);
     check!(true, Component: low closed high);
     check!(true, Slot: emitted source reflected);

@@ -13,8 +13,8 @@ layout(constant_id = 0) const uint KIND = RECEIVE_OUTLINE;
 layout(scalar, binding = 7) readonly buffer Contours { uint contour_words[]; };
 // Words of struct Triangle.
 layout(scalar, binding = 8) readonly buffer Triangles { uint triangle_words[]; };
-// Centroid and area times normal of each element, two words unused.
-layout(scalar, binding = 9) readonly buffer Members { uint member_words[]; };
+// Of curved sources: centroid and sum of area times normal, two words unused.
+layout(scalar, binding = 9) readonly buffer Parts { uint part_words[]; };
 // 1 where any element of a block of GROUP sees the source, [slot][block]. Whoever reads it sets it to 0 again.
 layout(scalar, binding = 10) writeonly buffer Occupied { uint occupied[]; };
 // [slot][element of this dispatch]
@@ -23,7 +23,7 @@ layout(scalar, binding = 11) writeonly buffer Fresh { FLUX fresh[]; };
 layout(scalar, binding = 12) readonly buffer MesoElements { MesoElement meso_elements[]; };
 #endif
 
-const uint MEMBER_WORDS = 8;
+const uint PART_WORDS = 8;
 const uint TRIANGLE_WORDS = 16;
 
 Triangle load_triangle(uint index) {
@@ -76,13 +76,13 @@ FLUX outline(vec3 p, vec3 n, Source s) {
     return flux_above(contour_form_factor(contour), n);
 }
 
-// Of the members that show p their fronts, each as a point.
-FLUX members_as_points(vec3 p, vec3 n, Source s) {
+// Of the parts that show p their fronts, each as a point.
+FLUX parts_as_points(vec3 p, vec3 n, Source s) {
     FLUX sum = FLUX(0.0);
-    for (uint i = 0; i < s.element_count; i++) {
-        uint word = (s.first_element + i) * MEMBER_WORDS;
-        vec4 low = LOAD4(member_words, word);
-        vec4 high = LOAD4(member_words, word + 4);
+    for (uint i = 0; i < s.part_count; i++) {
+        uint word = (s.first_part + i) * PART_WORDS;
+        vec4 low = LOAD4(part_words, word);
+        vec4 high = LOAD4(part_words, word + 4);
         vec3 way = low.xyz - p;
         vec3 vector_area = vec3(low.w, high.xy);
         float square = dot(way, way);
@@ -91,7 +91,7 @@ FLUX members_as_points(vec3 p, vec3 n, Source s) {
     return sum * 0.318309886;
 }
 
-// The same, exactly.
+// Of the members that show p their fronts, exactly.
 FLUX members(vec3 p, vec3 n, uint element, Source s) {
     FLUX sum = FLUX(0.0);
     for (uint i = 0; i < s.element_count; i++) {
@@ -122,7 +122,7 @@ FLUX form_factor(vec3 p, vec3 n, uint element, Source s) {
         return outline_above(p, n, s);
     }
     if (KIND == RECEIVE_POINTS) {
-        return members_as_points(p, n, s);
+        return parts_as_points(p, n, s);
     }
     bool whole = shows_whole_front(s, p);
     FLUX f = FLUX(0.0);

@@ -38,9 +38,9 @@ const float REACH = 1.5;
 
 // Where a source lies this many squared radii off, no edge of it is seen under more than a right angle.
 const float ACUTE = 2.1;
-// Members of a curved source that shows some backs are points from so many of their radii off. The error of a square is then 2/3
-// of the square of that at most: 0.07 %.
-const float POINT_DISTANCE = 32.0;
+// Parts of a curved source that shows some backs are points from so many of their radii off. The error of a square is then 2/3
+// of the square of that at most, 0.26 %, and half as often one way as the other.
+const float POINT_DISTANCE = 16.0;
 // An element no further than so many of its radii from a source takes several samples.
 const float NEAR = 4.0;
 
@@ -98,7 +98,8 @@ Source load_source(uint index) {
     }
     return Source(word[0].xyz, word[0].w, word[1].xyz, word[1].w, word[2].xyz, word[2].w, word[3].xyz, word[3].w,
                   word[4].xyz, floatBitsToUint(word[4].w), floatBitsToUint(word[5].x), floatBitsToUint(word[5].y),
-                  floatBitsToUint(word[5].z), floatBitsToUint(word[5].w), floatBitsToUint(word[6].x), word[6].yzw, word[7].x, word[7].y, 0, 0);
+                  floatBitsToUint(word[5].z), floatBitsToUint(word[5].w), floatBitsToUint(word[6].x), word[6].yzw, word[7].x, word[7].y, floatBitsToUint(word[7].z),
+                  floatBitsToUint(word[7].w));
 }
 
 // Whether every member shows p its front: the cone of normals and the ball bound their heights.

@@ -22,9 +22,9 @@ struct Source {
     uint component;    // the connected component it lies on
     vec3 middle;       // centroid of the area
     float facing;      // area that a far place in the direction of `normal` sees
-    float member_radius;   // of the largest member's ball
-    uint unused_a;
-    uint unused_b;
+    float part_radius; // of the largest part's ball
+    uint first_part;   // a curved source's members, a few put together
+    uint part_count;
 };
 
 // An element as it is gathered from, for loading by fours.

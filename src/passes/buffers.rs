@@ -29,8 +29,8 @@ pub struct SceneBuffers {
     /// Three a element, `[element][corner]`.
     pub corners: Buffer,
     pub triangles: Buffer,
-    /// Centroid and area times normal, eight words an element.
-    pub members: Buffer,
+    /// Of curved sources: centroid and sum of area times normal, eight words a part.
+    pub parts: Buffer,
     /// Normal and n · x.
     pub planes: Buffer,
     /// Centroid and radius.
@@ -82,24 +82,20 @@ impl SceneBuffers {
                 }
             })
             .collect();
-        let members: Vec<[f32; 8]> = (0..elements.len())
-            .map(|e| {
-                let [x, y, z] = elements.centroid[e].as_vec3().to_array();
-                let [u, v, w] = (elements.normal[e] * elements.area[e]).as_vec3().to_array();
-                [x, y, z, u, v, w, 0.0, 0.0]
-            })
-            .collect();
         let areas: Vec<f32> = elements.area.iter().map(|&a| a as f32).collect();
         let mut contours = Vec::new();
+        let mut parts: Vec<[f32; 8]> = Vec::new();
         let mut gpu_sources = Vec::with_capacity(sources.list.len());
         for source in &sources.list {
             let corners = contour_corners(source);
-            gpu_sources.push(Source::new(
-                source,
-                contours.len() as u32,
-                corners.len() as u32,
-            ));
+            let outline = (contours.len() as u32, corners.len() as u32);
+            gpu_sources.push(Source::new(source, outline, parts.len() as u32));
             contours.extend(corners);
+            parts.extend(source.parts.iter().map(|part| {
+                let [x, y, z] = part.centroid.as_vec3().to_array();
+                let [u, v, w] = part.vector_area.as_vec3().to_array();
+                [x, y, z, u, v, w, 0.0, 0.0]
+            }));
         }
         let meshlets: Vec<Meshlet> = meshlets::build(elements, connections, &sources.chart)
             .iter()
@@ -112,7 +108,7 @@ impl SceneBuffers {
             vertices: upload(device, "vertices", &vertices, BufferUse::Geometry)?,
             corners: upload(device, "corners", &elements.corners, BufferUse::Geometry)?,
             triangles: upload(device, "triangles", &triangles, BufferUse::Storage)?,
-            members: upload(device, "members", &members, BufferUse::Storage)?,
+            parts: upload(device, "parts", &parts, BufferUse::Storage)?,
             planes: upload(device, "planes", &planes, BufferUse::Storage)?,
             balls: upload(device, "balls", &balls, BufferUse::Storage)?,
             areas: upload(device, "areas", &areas, BufferUse::Storage)?,

@@ -118,7 +118,7 @@ impl FormFactors {
                 let rest = [
                     &scene.contours,
                     &scene.triangles,
-                    &scene.members,
+                    &scene.parts,
                     &factors.occupied,
                     fresh,
                 ];

@@ -31,15 +31,20 @@ pub struct Source {
     pub middle: Vec3,
     /// Area that a far place in the direction of `normal` sees.
     pub facing: f32,
-    /// Of the largest member's ball.
-    pub member_radius: f32,
-    pub unused_a: u32,
-    pub unused_b: u32,
+    /// Of the largest part's ball; parts are counted in the buffer of all.
+    pub part_radius: f32,
+    pub first_part: u32,
+    pub part_count: u32,
 }
 
 impl Source {
     /// `first_contour` and `contour_count` count the corners of [`contour_corners`].
-    pub fn new(source: &sources::Source, first_contour: u32, contour_count: u32) -> Self {
+    pub fn new(
+        source: &sources::Source,
+        (first_contour, contour_count): (u32, u32),
+        first_part: u32,
+    ) -> Self {
+        let part_radius = source.parts.iter().map(|p| p.radius).fold(0.0, f64::max);
         Self {
             eye: source.eye.as_vec3(),
             area: source.area as f32,
@@ -59,9 +64,9 @@ impl Source {
             component: source.component,
             middle: source.centroid.as_vec3(),
             facing: source.facing as f32,
-            member_radius: (source.member_radius * (1.0 + 1e-6)) as f32,
-            unused_a: 0,
-            unused_b: 0,
+            part_radius: (part_radius * (1.0 + 1e-6)) as f32,
+            first_part,
+            part_count: source.parts.len() as u32,
         }
     }
 }
