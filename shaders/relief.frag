@@ -33,6 +33,8 @@ layout(scalar, binding = 7) readonly buffer Exits { vec3 exits[]; };
 layout(scalar, binding = 8) readonly buffer LightPoints { LightPoint light_points[]; };
 // Share of the light of light_points that reaches the vertex, [light vertex].
 layout(scalar, binding = 9) readonly buffer Shares { vec3 light_shares[]; };
+// By prism, where it is lit so.
+layout(scalar, binding = 10) readonly buffer ParallelLights { ParallelLight parallel_lights[]; };
 
 layout(push_constant, scalar) uniform Parameters {
     vec3 x;
@@ -249,6 +251,8 @@ vec3 sharp(Prism p, ReliefSurface surface, Place place, vec3 at) {
                 + place.share.z * light_shares[p.light_c]);
 }
 
+#include "shared/clusters.glsl"
+
 // E by the factors of the cell at a place, for the light of the three vertices.
 vec3 factored(Prism p, ReliefSurface surface, Place place) {
     vec2 size = vec2(surface.columns, surface.rows);
@@ -330,14 +334,14 @@ void main() {
         shown = vec3((place.height - surface.lowest) / (surface.top - surface.lowest));
         break;
     case VIEW_IRRADIANCE:
-        shown = (factored(p, surface, place) + sharp(p, surface, place, at)) / PI;
+        shown = (factored(p, surface, place) + sharp(p, surface, place, at) + clustered(p, surface, place)) / PI;
         break;
     default:
         shown = emitted;
         if (wide) {
             shown += mean_sent(p, place.share, -normalize(along)) / PI;
         } else {
-            shown += rho * (factored(p, surface, place) + sharp(p, surface, place, at)) / PI;
+            shown += rho * (factored(p, surface, place) + sharp(p, surface, place, at) + clustered(p, surface, place)) / PI;
         }
     }
     radiance = vec4(shown, metered);

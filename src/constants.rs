@@ -27,6 +27,8 @@ shared! {
     FIXED_POINT_BITS = 61;
     /// Most directions of a meso element.
     MOST_DIRECTIONS = 64;
+    /// Most parallel lights that the light on a face is drawn by.
+    MOST_CLUSTERS = 64;
     /// Azimuths in which the horizon of a relief's facet is kept.
     AZIMUTHS = 128;
     /// A side of the grid of rays from each facet of a relief to the facets that it sees; RAY_STRATA² rays.

@@ -133,6 +133,16 @@ struct Prism {
     float texel;        // internal units
     vec3 bitangent;
     vec3 normal;
+    uint first_cluster; // parallel lights on it
+    uint cluster_count; // 0: lit by the light vertices alone
+};
+
+// A parallel light on a face, in place of the light from near-parallel directions.
+struct ParallelLight {
+    vec3 towards;       // unit, along the world's axes
+    vec3 fluence_a;     // at the corners of the prism, W·m⁻²
+    vec3 fluence_b;
+    vec3 fluence_c;
 };
 
 // A place that shines on relief: a part of an emitter, or a point light.

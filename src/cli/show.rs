@@ -51,6 +51,9 @@ enum LightName {
 enum ShadingName {
     /// Relief mapping, lit by the factors of the relief's response
     Factored,
+    /// Relief mapping, lit as in the paper by a few parallel lights a triangle, each shadowed at each pixel; slower the more
+    /// directions there are, and --direct does nothing
+    Clusters,
     /// Flat and lit by the relief's response
     Normal,
     /// The same, its texture shifted by the height
@@ -98,6 +101,7 @@ impl ShowOptions {
             part,
             shading: match self.shading {
                 ShadingName::Factored => ReliefShading::Factored,
+                ShadingName::Clusters => ReliefShading::Clusters,
                 ShadingName::Normal => ReliefShading::Normal,
                 ShadingName::Parallax => ReliefShading::Parallax,
                 ShadingName::None => ReliefShading::None,

@@ -2,9 +2,10 @@
 //!
 //! ```text
 //! height map ─► height field ─► visibility (GPU, cached) ─► response ─► relief of the elements
-//! solution ─► vertices
+//! solution ─► vertices ─► clusters
 //! ```
 
+mod clusters;
 mod exchange;
 mod factors;
 mod height_field;
@@ -16,6 +17,7 @@ mod transfer;
 mod vertices;
 mod visibility;
 
+pub use clusters::{Cluster, FaceClusters, NEAR_PARALLEL_COS, clusters};
 pub use factors::{CORNERS, Factors, RANK_STEP};
 pub use height_field::{Facet, HeightField};
 pub use height_pyramid::HeightPyramid;

@@ -10,7 +10,7 @@ use glam::{Vec3, Vec4};
 use super::buffers::upload;
 use super::shade::Shade;
 use super::shaders;
-use super::types::{HeightTile, LightPoint, Prism, ReliefSurface};
+use super::types::{HeightTile, LightPoint, ParallelLight, Prism, ReliefSurface};
 use crate::constants::KIND_SURFACE;
 use crate::error::Result;
 use crate::vk::{
@@ -61,11 +61,13 @@ pub struct Parts<'a> {
     pub light_points: &'a [LightPoint],
     /// Share of their light that arrives, `[light vertex]`.
     pub light_shares: &'a [Vec3],
+    /// As the prisms count them.
+    pub parallel_lights: &'a [ParallelLight],
 }
 
 /// [`Parts`] on the device.
 pub struct Buffers {
-    parts: [Buffer; 9],
+    parts: [Buffer; 10],
     light_count: u32,
     emitter_points: u32,
     vertices: Buffer,
@@ -101,7 +103,7 @@ impl Relief {
             format,
             offset: offset as u32,
         };
-        let mut bindings = [Binding::Storage; 10];
+        let mut bindings = [Binding::Storage; 11];
         bindings[0] = Binding::Sampled;
         Ok(Self {
             pipeline: GraphicsPipeline::new(
@@ -132,7 +134,7 @@ impl Relief {
         sampler: &Sampler,
         buffers: &Buffers,
     ) -> Result<DescriptorSet> {
-        let [a, b, c, d, e, f, g, h, i] = &buffers.parts;
+        let [a, b, c, d, e, f, g, h, i, j] = &buffers.parts;
         let buffer = Bind::Buffer;
         self.pipeline.bind(
             "relief",
@@ -147,6 +149,7 @@ impl Relief {
                 buffer(g),
                 buffer(h),
                 buffer(i),
+                buffer(j),
             ],
         )
     }
@@ -205,6 +208,7 @@ impl Buffers {
                 upload(device, "relief exits", parts.exits, storage)?,
                 upload(device, "relief light points", parts.light_points, storage)?,
                 upload(device, "relief light shares", parts.light_shares, storage)?,
+                upload(device, "relief clusters", parts.parallel_lights, storage)?,
             ],
             light_count: parts.light_points.len() as u32,
             emitter_points: parts

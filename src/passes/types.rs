@@ -231,6 +231,18 @@ pub struct Prism {
     pub texel: f32,
     pub bitangent: Vec3,
     pub normal: Vec3,
+    pub first_cluster: u32,
+    pub cluster_count: u32,
+}
+
+/// A parallel light on a face; see `shaders/shared/types.glsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct ParallelLight {
+    pub towards: Vec3,
+    pub fluence_a: Vec3,
+    pub fluence_b: Vec3,
+    pub fluence_c: Vec3,
 }
 
 /// A place that shines on relief: a part of an emitter, or a point light.

@@ -49,6 +49,9 @@ pub enum ReliefShading {
     /// Relief mapping, lit by the factors of the relief's response.
     #[default]
     Factored,
+    /// Relief mapping, lit as in the paper: by parallel lights, the clusters of near-parallel slots, each shadowed at each pixel;
+    /// light inside the relief by the factors. Light straight from emitters is in the slots, whatever [`Direct`] says.
+    Clusters,
     /// Flat, lit by the relief's response: normal mapping, with its shadows and inner light.
     Normal,
     /// The same, with its texture shifted by its height.
@@ -60,11 +63,16 @@ pub enum ReliefShading {
 impl ReliefShading {
     pub(super) fn code(self) -> Option<u32> {
         match self {
-            Self::Factored => Some(SHADING_RELIEF),
+            Self::Factored | Self::Clusters => Some(SHADING_RELIEF),
             Self::Normal => Some(SHADING_NORMAL),
             Self::Parallax => Some(SHADING_PARALLAX),
             Self::None => None,
         }
+    }
+
+    /// By rays through the height map.
+    pub(super) fn is_displaced(self) -> bool {
+        self.code() == Some(SHADING_RELIEF)
     }
 }
 

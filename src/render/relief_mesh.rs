@@ -12,9 +12,11 @@ use crate::constants::{MOST_RANK, WIDEST_SAMPLE};
 use crate::directions::Directions;
 use crate::elements::Elements;
 use crate::error::Result;
-use crate::meso::{Factors, HeightPyramid, MesoVertices, Tile, tiles, visibility};
+use crate::meso::{
+    Cluster, FaceClusters, Factors, HeightPyramid, MesoVertices, Tile, tiles, visibility,
+};
 use crate::passes::relief::{Buffers, Parts};
-use crate::passes::types::{HeightTile, Prism, ReliefSurface};
+use crate::passes::types::{HeightTile, ParallelLight, Prism, ReliefSurface};
 use crate::scene::{HeightMap, Material, Scene, relief_normals};
 use crate::solution::DirectionalLight;
 use crate::vk::Device;
@@ -105,12 +107,14 @@ impl ReliefMesh {
             (Light::Direct, false) => Some(&direct),
             (Light::Direct, true) => None,
         };
+        let clustered = arriving.filter(|_| lighting.shading == ReliefShading::Clusters);
+        let arriving = arriving.filter(|_| clustered.is_none());
         let points = if sharp { shining(scene) } else { Vec::new() };
         let exits = vertices.mean(&lighting.exits(scene, light), directions.count());
         let mut lit = LightVertices::default();
         let normals = relief_normals(scene);
         let widest = f64::from(WIDEST_SAMPLE) / f64::from(projection.sample_angle(samples));
-        let averaged = lighting.shading == ReliefShading::Factored && lighting.show == Show::Shaded;
+        let averaged = lighting.shading.is_displaced() && lighting.show == Show::Shaded;
         let mut rest = FlatRelief {
             prism: vec![false; scene.triangles.len()],
             away: HashMap::new(),
@@ -161,16 +165,28 @@ impl ReliefMesh {
             order.push(m);
         }
         order.sort_by_key(|&m| scene.triangles[light.elements[m] as usize].material);
+        let corners_by_vertex = |m: usize| {
+            let mut corners = [0, 1, 2];
+            let triangle = &scene.triangles[light.elements[m] as usize];
+            corners.sort_by_key(|&k| triangle.vertices[k]);
+            corners
+        };
+        let faces: Vec<_> = order
+            .iter()
+            .map(|&m| (m as u32, corners_by_vertex(m)))
+            .collect();
+        let clusters =
+            clustered.map(|moments| FaceClusters::new(&vertices, &directions, moments, &faces));
         let mut prisms = Vec::with_capacity(order.len());
         let mut mirrored = Vec::with_capacity(order.len());
-        for &m in &order {
+        for (at, &(m, corners)) in faces.iter().enumerate() {
+            let m = m as usize;
             let e = light.elements[m] as usize;
             let triangle = &scene.triangles[e];
             let surface = surface_of[e];
             let tile = &tiles[surface as usize];
             let range = &surfaces.ranges[surface as usize];
-            let mut corners = [0, 1, 2];
-            corners.sort_by_key(|&k| triangle.vertices[k]);
+            let (first_cluster, cluster_count) = clusters.as_ref().map_or((0, 0), |c| c.ranges[at]);
             let place = |k: usize, height: f64| {
                 let vertex = triangle.vertices[corners[k]] as usize;
                 let at = scene.vertices[vertex] + normals[vertex] * range.above(height);
@@ -218,6 +234,8 @@ impl ReliefMesh {
                 texel: (texel.min_element() / projection.unit) as f32,
                 bitangent,
                 normal,
+                first_cluster,
+                cluster_count,
             });
             mirrored.push(matches!(corners, [0, 2, 1] | [1, 0, 2] | [2, 1, 0]));
         }
@@ -242,6 +260,7 @@ impl ReliefMesh {
                 .map(|p| p.seen_from(projection))
                 .collect::<Vec<_>>(),
             light_shares: &spread(lit.shares, &corners_of(&prisms)),
+            parallel_lights: &clusters.as_ref().map_or_else(Vec::new, parallel_lights),
         };
         Ok(Self {
             buffers: Buffers::new(device, &parts, &mirrored)?,
@@ -250,6 +269,17 @@ impl ReliefMesh {
             rest,
         })
     }
+}
+
+/// The clusters as the device has them.
+fn parallel_lights(clusters: &FaceClusters) -> Vec<ParallelLight> {
+    let light = |c: &Cluster| ParallelLight {
+        towards: c.towards,
+        fluence_a: c.fluence[0],
+        fluence_b: c.fluence[1],
+        fluence_c: c.fluence[2],
+    };
+    clusters.list.iter().map(light).collect()
 }
 
 /// The light vertices of the prisms.
