@@ -84,7 +84,8 @@ impl Bars<'_> {
             chart.draw_series(bars().map(|b| {
                 let top = b.spread.map_or(b.value, |s| s.1.max(b.value));
                 let place = (left(b), top + 0.035 * highest);
-                Text::new(format!("{:.0}", b.value), place, ("sans-serif", 13))
+                let digits = usize::from(b.value < 10.0);
+                Text::new(format!("{:.digits$}", b.value), place, ("sans-serif", 13))
             }))?;
         }
         chart

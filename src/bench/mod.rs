@@ -6,6 +6,7 @@ pub mod frame;
 pub mod hemicube;
 pub mod irradiance;
 pub mod table1;
+mod table1_output;
 
 pub use difference::{Difference, plain_pairs};
 
