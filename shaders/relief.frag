@@ -52,6 +52,8 @@ layout(push_constant, scalar) uniform Parameters {
     uint emitter_points;
 };
 
+uint march_steps = 0;
+#define ALL_STEPS march_steps
 #include "shared/height_march.glsl"
 
 const float PI = 3.14159265358979;
@@ -289,7 +291,7 @@ vec3 mean_sent(Prism p, vec3 share, vec3 to_eye) {
     return sum;
 }
 
-void main() {
+void draw() {
     // Nothing lies at the depth of 0, so that this is drawn nowhere.
     radiance = vec4(0.0);
     gl_FragDepth = 0.0;
@@ -336,6 +338,9 @@ void main() {
     case VIEW_IRRADIANCE:
         shown = (factored(p, surface, place) + sharp(p, surface, place, at) + clustered(p, surface, place)) / PI;
         break;
+    case VIEW_SLOTS:
+        shown = p.slots;
+        break;
     default:
         shown = emitted;
         if (wide) {
@@ -345,4 +350,12 @@ void main() {
         }
     }
     radiance = vec4(shown, metered);
+}
+
+void main() {
+    draw();
+    // Every fragment is shaded, hidden or not, for its depth is its own; the pipeline adds them up.
+    if (view == VIEW_OVERDRAW && !gl_FrontFacing) {
+        radiance = vec4(1.0, float(march_steps), 0.0, 0.0);
+    }
 }

@@ -51,4 +51,6 @@ shared! {
     VIEW_NORMAL = 2;
     VIEW_HEIGHT = 3;
     VIEW_IRRADIANCE = 4;
+    VIEW_SLOTS = 5;
+    VIEW_OVERDRAW = 6;
 }

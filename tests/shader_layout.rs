@@ -106,7 +106,7 @@ fn rust_and_glsl_agree() {
     check!(true, MesoElement: tangent response bitangent scale);
     check!(true, Reflected: sum error);
     check!(true, Prism: low_a low_b low_c high_a high_b high_c uv_a uv_b uv_c light_a light_b light_c surface
-        tangent texel bitangent normal first_cluster cluster_count);
+        tangent texel bitangent normal first_cluster cluster_count slots);
     check!(true, ParallelLight: towards fluence_a fluence_b fluence_c);
     check!(true, LightPoint: position kind normal strength);
     check!(true, ReliefSurface: lowest top mean columns rows rank first_factor slope);

@@ -135,6 +135,7 @@ struct Prism {
     vec3 normal;
     uint first_cluster; // parallel lights on it
     uint cluster_count; // 0: lit by the light vertices alone
+    vec3 slots;         // false colour of its light by direction
 };
 
 // A parallel light on a face, in place of the light from near-parallel directions.

@@ -26,7 +26,8 @@ pub struct Options<'a> {
     pub sizes: Vec<(u32, u32)>,
     /// Rounds; in each, every kind of frame is drawn once.
     pub rounds: usize,
-    /// Shots of the bakes: a frame takes as long whatever the light is.
+    /// Shots of the bakes. A frame takes as long whatever the light is but for clusters, of which there are as many as slots
+    /// with light.
     pub shots: u32,
     pub cache: Option<&'a Path>,
 }

@@ -123,7 +123,7 @@ fn run_frame(options: &FrameOptions) -> Result<()> {
     let wanted = frame::Options {
         sizes: options.size.clone(),
         rounds: options.rounds.max(1),
-        shots: 256,
+        shots: 1024,
         cache: cache.as_deref(),
     };
     println!("{}", device.name());

@@ -82,6 +82,11 @@ enum ViewName {
     Height,
     /// Irradiance over pi, as on a white surface
     Irradiance,
+    /// Each triangle's strongest slot: hue, its direction about the normal (red along u, yellow-green along v); bright,
+    /// near the normal; coloured, most of the light, and grey, light from everywhere
+    Slots,
+    /// Fragments of prisms that a sample shades, hidden ones too; dark: none, the bar below: from 0 to the printed number
+    Overdraw,
 }
 
 impl ShowOptions {
@@ -116,6 +121,8 @@ impl ShowOptions {
                 ViewName::Normal => Show::Normal,
                 ViewName::Height => Show::Height,
                 ViewName::Irradiance => Show::Irradiance,
+                ViewName::Slots => Show::Slots,
+                ViewName::Overdraw => Show::Overdraw,
             },
             ..lighting
         }

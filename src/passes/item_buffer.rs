@@ -53,6 +53,7 @@ impl ItemBuffer {
                     format: Format::R32G32B32_SFLOAT,
                     offset: 0,
                 }],
+                sums: false,
             },
         )?;
         Ok(Self { pass, pipeline })

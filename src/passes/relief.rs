@@ -97,8 +97,8 @@ const HULL: [u32; 24] = [
 ];
 
 impl Relief {
-    /// Draws into the targets of `shade`.
-    pub fn new(device: &Arc<Device>, shade: &Shade) -> Result<Self> {
+    /// Draws into the targets of `shade`; with `counts`, for VIEW_OVERDRAW alone, sums over all fragments, hidden or not.
+    pub fn new(device: &Arc<Device>, shade: &Shade, counts: bool) -> Result<Self> {
         let attribute = |format, offset: usize| VertexAttribute {
             format,
             offset: offset as u32,
@@ -123,6 +123,7 @@ impl Relief {
                         ),
                         attribute(Format::R32_UINT, std::mem::offset_of!(Vertex, prism)),
                     ],
+                    sums: counts,
                 },
             )?,
         })

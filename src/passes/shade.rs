@@ -99,6 +99,7 @@ impl Shade {
                     ),
                     attribute(Format::R32G32_SFLOAT, std::mem::offset_of!(Vertex, uv)),
                 ],
+                sums: false,
             },
         )?;
         Ok(Self { pass, pipeline })

@@ -233,6 +233,7 @@ pub struct Prism {
     pub normal: Vec3,
     pub first_cluster: u32,
     pub cluster_count: u32,
+    pub slots: Vec3,
 }
 
 /// A parallel light on a face; see `shaders/shared/types.glsl`.

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::constants::{
     SHADING_NORMAL, SHADING_PARALLAX, SHADING_RELIEF, VIEW_ALBEDO, VIEW_HEIGHT, VIEW_IRRADIANCE,
-    VIEW_NORMAL, VIEW_SHADED,
+    VIEW_NORMAL, VIEW_OVERDRAW, VIEW_SHADED, VIEW_SLOTS,
 };
 use crate::scene::Scene;
 use crate::solution::{Bake, DirectionalLight, Solution};
@@ -99,6 +99,10 @@ pub enum Show {
     Height,
     /// E/π, as on a white surface.
     Irradiance,
+    /// The strongest slot of each triangle, see [`super::slot_colour`].
+    Slots,
+    /// How many fragments of prisms are shaded, see [`super::Overdraw`]; plain triangles are left out.
+    Overdraw,
 }
 
 impl Show {
@@ -109,6 +113,8 @@ impl Show {
             Self::Normal => VIEW_NORMAL,
             Self::Height => VIEW_HEIGHT,
             Self::Irradiance => VIEW_IRRADIANCE,
+            Self::Slots => VIEW_SLOTS,
+            Self::Overdraw => VIEW_OVERDRAW,
         }
     }
 }

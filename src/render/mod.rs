@@ -13,11 +13,13 @@ mod gathered;
 mod lighting;
 mod lights;
 mod mesh;
+mod overdraw;
 mod picture;
 mod projection;
 mod relief;
 mod relief_mesh;
 mod renderer;
+mod slots;
 mod smooth;
 mod textures;
 pub mod tone;
@@ -26,9 +28,11 @@ use std::sync::Arc;
 
 pub use compare::{Comparison, side_by_side};
 pub use lighting::{Direct, Light, Lighting, ReliefShading, Show};
+pub use overdraw::Overdraw;
 pub use picture::{FileKind, Picture, SAMPLES};
 pub(crate) use projection::Projection;
 pub use renderer::Renderer;
+pub use slots::slot_colour;
 pub use smooth::corner_irradiance;
 
 use crate::error::{Error, Result};

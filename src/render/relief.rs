@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use super::Lighting;
 use super::mesh::parameters;
 use super::projection::{Projection, Tile};
 use super::relief_mesh::ReliefMesh;
 use super::textures::Textures;
+use super::{Lighting, Show};
 use crate::error::Result;
 use crate::passes;
 use crate::passes::shade::Shade;
@@ -36,7 +36,7 @@ impl Relief {
         let Some((light, shading)) = lighting.relief() else {
             return Ok(None);
         };
-        let pass = passes::relief::Relief::new(device, shade)?;
+        let pass = passes::relief::Relief::new(device, shade, lighting.show == Show::Overdraw)?;
         let mesh = ReliefMesh::new(device, scene, lighting, light, (projection, samples))?;
         let sampler = Sampler::new(device, "relief albedo", true)?;
         let sets = mesh

@@ -7,6 +7,7 @@ use glam::{DVec2, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::lights::{share, shining, spread};
+use super::slots::slot_colour;
 use super::{Direct, Light, Lighting, Projection, ReliefShading, Show};
 use crate::constants::{MOST_RANK, WIDEST_SAMPLE};
 use crate::directions::Directions;
@@ -110,6 +111,11 @@ impl ReliefMesh {
         let clustered = arriving.filter(|_| lighting.shading == ReliefShading::Clusters);
         let arriving = arriving.filter(|_| clustered.is_none());
         let points = if sharp { shining(scene) } else { Vec::new() };
+        let shown = lighting.part.of(
+            &light.incident_moment,
+            &light.incident_moment_direct,
+            |all, direct| [0, 1, 2].map(|c| all[c] - direct[c]),
+        );
         let exits = vertices.mean(&lighting.exits(scene, light), directions.count());
         let mut lit = LightVertices::default();
         let normals = relief_normals(scene);
@@ -236,6 +242,10 @@ impl ReliefMesh {
                 normal,
                 first_cluster,
                 cluster_count,
+                slots: slot_colour(
+                    &directions,
+                    &shown[m * directions.count()..][..directions.count()],
+                ),
             });
             mirrored.push(matches!(corners, [0, 2, 1] | [1, 0, 2] | [2, 1, 0]));
         }

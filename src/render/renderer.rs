@@ -8,7 +8,7 @@ use super::picture::{Picture, SAMPLES};
 use super::projection::{Projection, Tile};
 use super::relief::Relief;
 use super::textures::Textures;
-use super::{Lighting, View};
+use super::{Lighting, Overdraw, Show, View};
 use crate::error::Result;
 use crate::passes::shade::{Shade, Target};
 use crate::scene::Scene;
@@ -72,6 +72,26 @@ impl<'a> Renderer<'a> {
 
     /// SAMPLES × SAMPLES samples a pixel, tile by tile.
     pub fn picture(&self) -> Result<Picture> {
+        match self.lighting.show {
+            Show::Overdraw => Ok(self.overdraw()?.picture()),
+            _ => self.gathered(),
+        }
+    }
+
+    /// What [`Show::Overdraw`] counts.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn overdraw(&self) -> Result<Overdraw> {
+        assert_eq!(
+            self.lighting.show,
+            Show::Overdraw,
+            "what is drawn must be counts"
+        );
+        Ok(Overdraw::new(&self.gathered()?))
+    }
+
+    fn gathered(&self) -> Result<Picture> {
         let view = &self.view;
         let (width, height) = (view.width.min(TILE), view.height.min(TILE));
         let target = Target::new(
@@ -166,10 +186,12 @@ impl<'a> Renderer<'a> {
             target,
             (tile.width * samples, tile.height * samples),
             (&self.mesh.vertices, &self.mesh.indices),
-            plain.map(|mut draw| {
-                draw.parameters.metered = mark.unwrap_or(draw.parameters.metered);
-                draw
-            }),
+            plain
+                .filter(|_| self.lighting.show != Show::Overdraw)
+                .map(|mut draw| {
+                    draw.parameters.metered = mark.unwrap_or(draw.parameters.metered);
+                    draw
+                }),
             || {
                 if let Some(relief) = &self.relief {
                     let place = (tile, samples);
