@@ -74,6 +74,11 @@ impl<'a> Renderer<'a> {
     pub fn picture(&self) -> Result<Picture> {
         match self.lighting.show {
             Show::Overdraw => Ok(self.overdraw()?.picture()),
+            // Colours that are looked up in a legend are not exposed.
+            Show::Slots => Ok(Picture {
+                automatic_exposure: 0.0,
+                ..self.gathered()?
+            }),
             _ => self.gathered(),
         }
     }
