@@ -9,6 +9,7 @@
 //! ```
 
 mod compare;
+mod flip;
 mod gathered;
 mod lighting;
 mod lights;
@@ -25,6 +26,7 @@ pub mod tone;
 use std::sync::Arc;
 
 pub use compare::{Comparison, side_by_side};
+pub use flip::{Flip, PIXELS_PER_DEGREE, ldr};
 pub use lighting::{Direct, Light, Lighting, ReliefShading, Show};
 pub use picture::{FileKind, Picture, SAMPLES};
 pub(crate) use projection::Projection;
