@@ -126,7 +126,8 @@ fn exposures(radiance: &[[f32; 3]]) -> [f32; 2] {
         median(lit)
     };
     match lit.last() {
-        Some(most) => [most, &middle].map(|l| (bright / l).log2()),
+        // Whatever the radiance, the scale is a number.
+        Some(most) => [most, &middle].map(|l| (bright / l).log2().clamp(-126.0, 126.0)),
         None => [0.0; 2],
     }
 }
