@@ -2,6 +2,7 @@
 
 mod bake;
 mod bench;
+mod bench_pictures;
 mod camera;
 mod compare;
 mod info;
