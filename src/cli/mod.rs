@@ -10,6 +10,7 @@ mod progress;
 mod reference;
 mod render;
 mod scene;
+mod series;
 mod show;
 
 use std::path::{Path, PathBuf};

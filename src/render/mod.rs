@@ -18,6 +18,7 @@ mod picture;
 mod projection;
 mod relief;
 mod relief_mesh;
+mod relief_scene;
 mod renderer;
 mod smooth;
 mod textures;
