@@ -189,7 +189,7 @@ fn series_are_numbered_and_do_not_flicker() {
         "--size",
         "24x18",
         "--fov",
-        "20",
+        "8",
     ];
     let series = [
         "render",
@@ -212,7 +212,7 @@ fn series_are_numbered_and_do_not_flicker() {
     let own = Camera {
         position: DVec3::new(0.5, 0.4, 0.1),
         look_at: DVec3::new(0.5, 0.1, 0.6),
-        fov_y: 20.0,
+        fov_y: 8.0,
         ..scene.cameras[0].clone()
     };
     let cameras = camera_path::turntable(&own, 360.0, 3).expect("a path");
