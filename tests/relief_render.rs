@@ -11,7 +11,7 @@ use std::time::Instant;
 use common::{Build, assert_silent, device};
 use glam::{DVec3, Vec3};
 use mesolux::bake::bake;
-use mesolux::bench::pictures::Reference;
+use mesolux::bench::pictures::{self, Reference};
 use mesolux::bench::relief_room::{CASES, REPEAT, TEXELS, bumps, camera, noise, room, smooth_step};
 use mesolux::directions::Directions;
 use mesolux::meso::{Options, Transport};
@@ -548,4 +548,41 @@ fn comparisons_have_closed_forms() {
             "{message}"
         );
     }
+}
+
+/// A row and a picture for each view and part of the light, and the same rows in both files; no row for what is not there.
+#[test]
+fn bench_writes_rows_and_pictures() {
+    let folder = tempfile::tempdir().expect("a folder for the test");
+    let run = |material| {
+        let options = pictures::Options {
+            side: 8,
+            paths: 4,
+            material: Some(material),
+            lighting: Lighting {
+                cache: Some(folder.path()),
+                ..Lighting::from(&[][..])
+            },
+        };
+        pictures::run(&device(), &options, folder.path(), || true)
+    };
+    let rows = run("bumps").expect("rows");
+    assert_eq!(rows.len(), 9);
+    for row in &rows {
+        let name = format!("{}-{}-{}.png", row.material, row.angle, row.light);
+        let picture = image::open(folder.path().join(&name)).expect("a picture");
+        assert_eq!((picture.width(), picture.height()), (24, 8), "{name}");
+        assert!(row.noise > 0.0 && (0.0..1.0).contains(&row.flip), "{row:?}");
+    }
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect("read");
+    assert_eq!(read("pictures.csv").lines().count(), 10);
+    let json: serde_json::Value = serde_json::from_str(&read("pictures.json")).expect("JSON");
+    assert_eq!(json[8]["light"], "global");
+    assert_eq!(json[8]["rel_mse"].as_f64(), Some(rows[8].rel_mse));
+    let error = run("nosuch").expect_err("no such material").to_string();
+    assert!(
+        error.contains("nosuch") && error.contains("bricks"),
+        "{error}"
+    );
+    assert_silent();
 }
