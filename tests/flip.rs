@@ -161,7 +161,7 @@ fn pictures_at_the_edge_are_compared() {
     let one = |v| Picture::new((1, 1), vec![[v; 3]], &[true]);
     let found = Flip::new(&one(1.0), &one(2.0)).expect("alike in size");
     assert!(found.error[0] > 0.0);
-    let error = Flip::new(&one(1.0), &black).err().expect("sizes differ");
+    let error = Flip::new(&one(1.0), &black).expect_err("sizes differ");
     assert!(error.to_string().contains("48x40"), "{error}");
 }
 

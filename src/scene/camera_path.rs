@@ -15,7 +15,7 @@ pub const MOST_FRAMES: u32 = 999_999_999;
 /// No frames, or too many; degrees not in −360..=360.
 pub fn turntable(camera: &Camera, degrees: f64, frames: u32) -> Result<Vec<Camera>> {
     check(frames)?;
-    if !(degrees.abs() <= 360.0) {
+    if !(-360.0..=360.0).contains(&degrees) {
         return Err(Error::Usage(format!(
             "--turn {degrees}: must be in -360 to 360 degrees"
         )));
