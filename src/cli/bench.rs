@@ -24,6 +24,8 @@ enum What {
     Hemicube(HemicubeOptions),
     /// Irradiance of bakes of one scene, on what has no relief, against path traced irradiance with the relief as geometry
     Irradiance(IrradianceOptions),
+    /// Pictures of relief against path traced geometry: relMSE, bias and HDR-FLIP by material, view and part of the light
+    Pictures(super::bench_pictures::Options),
     /// The paper's Table 1, minutes and frames a second: three scenes in 16, 32 and 64 directions, without directions, and with
     /// the relief as geometry
     Table1(Table1Options),
@@ -108,6 +110,7 @@ pub fn run(options: &Options) -> Result<()> {
         What::Hemicube(options) => run_hemicube(options),
         What::Frame(options) => run_frame(options),
         What::Irradiance(options) => run_irradiance(options),
+        What::Pictures(options) => super::bench_pictures::run(options),
         What::Table1(options) => run_table1(options),
     }
 }

@@ -9,6 +9,7 @@
 //! ```
 
 mod compare;
+mod flip;
 mod gathered;
 mod lighting;
 mod lights;
@@ -18,6 +19,7 @@ mod picture;
 mod projection;
 mod relief;
 mod relief_mesh;
+mod relief_scene;
 mod renderer;
 mod slots;
 mod smooth;
@@ -27,6 +29,7 @@ pub mod tone;
 use std::sync::Arc;
 
 pub use compare::{Comparison, side_by_side};
+pub use flip::{Flip, PIXELS_PER_DEGREE, ldr};
 pub use lighting::{Direct, Light, Lighting, ReliefShading, Show};
 pub use overdraw::Overdraw;
 pub use picture::{FileKind, Picture, SAMPLES};

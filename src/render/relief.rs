@@ -2,20 +2,20 @@
 
 use std::sync::Arc;
 
+use super::Lighting;
 use super::mesh::parameters;
 use super::projection::{Projection, Tile};
 use super::relief_mesh::ReliefMesh;
+use super::relief_scene::ReliefScene;
 use super::textures::Textures;
-use super::{Lighting, Show};
 use crate::error::Result;
 use crate::passes;
-use crate::passes::shade::Shade;
 use crate::scene::Scene;
 use crate::vk::{Commands, DescriptorSet, Device, Sampler};
 
 /// The relief of a picture, ready to be drawn.
 pub struct Relief {
-    pass: passes::relief::Relief,
+    pass: Arc<passes::relief::Relief>,
     pub mesh: ReliefMesh,
     /// One for each range of the mesh.
     sets: Vec<DescriptorSet>,
@@ -27,17 +27,23 @@ impl Relief {
     /// None where nothing with relief is drawn as such.
     pub fn new(
         device: &Arc<Device>,
-        shade: &Shade,
+        kept: Option<&ReliefScene>,
         scene: &Scene,
         lighting: &Lighting<'_>,
         textures: &Textures,
         (projection, samples): (&Projection, u32),
     ) -> Result<Option<Self>> {
-        let Some((light, shading)) = lighting.relief() else {
+        let Some(((light, shading), kept)) = lighting.relief().zip(kept) else {
             return Ok(None);
         };
-        let pass = passes::relief::Relief::new(device, shade, lighting.show == Show::Overdraw)?;
-        let mesh = ReliefMesh::new(device, scene, lighting, light, (projection, samples))?;
+        let pass = Arc::clone(&kept.pass);
+        let mesh = ReliefMesh::new(
+            device,
+            scene,
+            lighting,
+            (light, kept),
+            (projection, samples),
+        )?;
         let sampler = Sampler::new(device, "relief albedo", true)?;
         let sets = mesh
             .ranges

@@ -7,23 +7,19 @@ use glam::{DVec2, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::lights::{share, shining, spread};
+use super::relief_scene::ReliefScene;
 use super::slots::slot_colour;
 use super::{Direct, Light, Lighting, Projection, ReliefShading, Show};
 use crate::constants::{MOST_RANK, WIDEST_SAMPLE};
 use crate::directions::Directions;
-use crate::elements::Elements;
 use crate::error::Result;
-use crate::meso::{
-    Cluster, FaceClusters, Factors, HeightPyramid, MesoVertices, Tile, tiles, visibility,
-};
+use crate::meso::{Cluster, FaceClusters, Factors, HeightPyramid, Tile};
 use crate::passes::relief::{Buffers, Parts};
 use crate::passes::types::{HeightTile, ParallelLight, Prism, ReliefSurface};
 use crate::scene::{HeightMap, Material, Scene, relief_normals};
 use crate::solution::DirectionalLight;
 use crate::vk::Device;
 
-/// What the factors may leave out of the light, see [`Factors::error`].
-const FACTOR_ERROR: f64 = 0.01;
 /// Prisms reach this share of the relief's range beyond it, so that a ray begins above it for certain.
 const MARGIN: f64 = 1e-3;
 
@@ -62,50 +58,34 @@ impl ReliefMesh {
         device: &Arc<Device>,
         scene: &Scene,
         lighting: &Lighting<'_>,
-        light: &DirectionalLight,
+        (light, kept): (&DirectionalLight, &ReliefScene),
         (projection, samples): (&Projection, u32),
     ) -> Result<Self> {
-        let directions = Directions::new(light.directions.len() as u32)?;
-        let elements = Elements::new(scene);
-        let (tiles, _) = tiles(scene, &elements)?;
-        let mut surface_of = vec![u32::MAX; scene.triangles.len()];
-        for (surface, tile) in (0..).zip(&tiles) {
-            for &e in &tile.members {
-                surface_of[elements.input_index[e] as usize] = surface;
-            }
-        }
-        let mut marcher = None;
-        let mut factors = Vec::with_capacity(tiles.len());
-        for tile in &tiles {
-            let (visibility, _) = visibility(device, &tile.field, lighting.cache, &mut marcher)?;
-            factors.push(Factors::new(
-                &directions,
-                &tile.field,
-                &visibility,
-                &tile.shading,
-                FACTOR_ERROR,
-            ));
-        }
-        let surfaces = Surfaces::new(scene, &tiles, &factors);
-
-        let vertices = MesoVertices::new(scene, light);
-        let gather = |moments| vertices.gather(&directions, light, moments);
-        let all = gather(&light.incident_moment);
-        let direct = gather(&light.incident_moment_direct);
+        let ReliefScene {
+            tiles,
+            surface_of,
+            factors,
+            surfaces,
+            vertices,
+            all,
+            direct,
+            ..
+        } = kept;
+        let directions = kept.directions;
         let indirect: Vec<[Vec3; 3]> = all
             .iter()
-            .zip(&direct)
+            .zip(direct)
             .map(|(all, direct)| [0, 1, 2].map(|c| all[c] - direct[c]))
             .collect();
         // Light that has bounced inside the relief is indirect, wherever it came from.
         let sharp = lighting.direct == Direct::Sharp
             && lighting.shading == ReliefShading::Factored
             && lighting.part != Light::Indirect;
-        let inside = (lighting.part != Light::Direct).then_some(&all);
+        let inside = (lighting.part != Light::Direct).then_some(all);
         let arriving = match (lighting.part, sharp) {
-            (Light::Global, false) => Some(&all),
+            (Light::Global, false) => Some(all),
             (Light::Global, true) | (Light::Indirect, _) => Some(&indirect),
-            (Light::Direct, false) => Some(&direct),
+            (Light::Direct, false) => Some(direct),
             (Light::Direct, true) => None,
         };
         let clustered = arriving.filter(|_| lighting.shading == ReliefShading::Clusters);
@@ -336,7 +316,7 @@ impl Range {
 
 /// What the surfaces share buffers for, `[surface]`.
 #[derive(Default)]
-struct Surfaces {
+pub struct Surfaces {
     list: Vec<ReliefSurface>,
     tiles: Vec<HeightTile>,
     ranges: Vec<Range>,
@@ -347,7 +327,7 @@ struct Surfaces {
 }
 
 impl Surfaces {
-    fn new(scene: &Scene, tiles: &[Tile], factors: &[Factors]) -> Self {
+    pub fn new(scene: &Scene, tiles: &[Tile], factors: &[Factors]) -> Self {
         let mut all = Self::default();
         let mut pyramids: HashMap<u32, HeightTile> = HashMap::new();
         for (tile, factors) in tiles.iter().zip(factors) {

@@ -1,4 +1,4 @@
-//! A scene on the device, ready to be drawn from one camera.
+//! A scene on the device, ready to be drawn from one camera after the other.
 
 use std::sync::Arc;
 
@@ -7,6 +7,7 @@ use super::mesh::Mesh;
 use super::picture::{Picture, SAMPLES};
 use super::projection::{Projection, Tile};
 use super::relief::Relief;
+use super::relief_scene::ReliefScene;
 use super::textures::Textures;
 use super::{Lighting, Overdraw, Show, View};
 use crate::error::Result;
@@ -20,7 +21,7 @@ const TILE: u32 = 2048 / SAMPLES;
 /// Marks a pixel of a plain triangle where relief is counted.
 const NOT_RELIEF: f32 = 2.0;
 
-/// Draws one view of a scene, as a picture or again and again.
+/// Draws a view of a scene, as a picture or again and again.
 pub struct Renderer<'a> {
     device: Arc<Device>,
     scene: &'a Scene,
@@ -29,6 +30,8 @@ pub struct Renderer<'a> {
     projection: Projection,
     shade: Shade,
     textures: Textures,
+    kept: Option<ReliefScene>,
+    samples: u32,
     mesh: Mesh,
     relief: Option<Relief>,
 }
@@ -54,8 +57,9 @@ impl<'a> Renderer<'a> {
         let projection = Projection::new(scene, view)?;
         let shade = Shade::new(device)?;
         let textures = Textures::new(device, &shade, scene)?;
+        let kept = ReliefScene::new(device, &shade, scene, &lighting)?;
         let seen = (&projection, samples);
-        let relief = Relief::new(device, &shade, scene, &lighting, &textures, seen)?;
+        let relief = Relief::new(device, kept.as_ref(), scene, &lighting, &textures, seen)?;
         let rest = relief.as_ref().map(|r| &r.mesh.rest);
         Ok(Self {
             mesh: Mesh::new(device, scene, &lighting, &projection, rest)?,
@@ -67,7 +71,28 @@ impl<'a> Renderer<'a> {
             projection,
             shade,
             textures,
+            kept,
+            samples,
         })
+    }
+
+    /// Turns to another view, keeping pipelines, textures and what of the relief and its light does not depend on the view.
+    ///
+    /// # Errors
+    /// As [`super::render`]; what was seen before stays then.
+    pub fn look(&mut self, view: &View<'a>) -> Result<()> {
+        view.check()?;
+        let (device, scene) = (&self.device, self.scene);
+        let (lighting, kept) = (&self.lighting, self.kept.as_ref());
+        let projection = Projection::new(scene, view)?;
+        let seen = (&projection, self.samples);
+        let relief = Relief::new(device, kept, scene, lighting, &self.textures, seen)?;
+        let rest = relief.as_ref().map(|r| &r.mesh.rest);
+        self.mesh = Mesh::new(device, scene, lighting, &projection, rest)?;
+        self.relief = relief;
+        self.projection = projection;
+        self.view = *view;
+        Ok(())
     }
 
     /// SAMPLES × SAMPLES samples a pixel, tile by tile.
