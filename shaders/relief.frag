@@ -31,8 +31,8 @@ layout(scalar, binding = 6) readonly buffer Coefficients { Coefficient coefficie
 layout(scalar, binding = 7) readonly buffer Exits { vec3 exits[]; };
 
 layout(scalar, binding = 8) readonly buffer LightPoints { LightPoint light_points[]; };
-// Share of the light of light_points that reaches the vertex, [light vertex].
-layout(scalar, binding = 9) readonly buffer Shares { vec3 light_shares[]; };
+layout(scalar, binding = 9) readonly buffer Nodes { ShadowNode shadow_nodes[]; };
+layout(scalar, binding = 10) readonly buffer Triangles { ShadowTriangle shadow_triangles[]; };
 
 layout(push_constant, scalar) uniform Parameters {
     vec3 x;
@@ -42,15 +42,17 @@ layout(push_constant, scalar) uniform Parameters {
     vec3 reflectance;
     vec3 emitted;        // Le, W·m⁻²·sr⁻¹
     float metered;
+    uint light_count;    // of light_points; those of emitters come first
+    uint emitter_points;
     uint shading;
     uint view;
     float pixel;         // angle of a sample
     uvec2 cells;         // of the directions
-    uint light_count;    // of light_points; those of emitters come first
-    uint emitter_points;
 };
 
 #include "shared/height_march.glsl"
+#include "shared/light_points.glsl"
+#include "shared/shadow_rays.glsl"
 
 const float PI = 3.14159265358979;
 // Rays to lights begin so much of the relief's range above it.
@@ -217,36 +219,33 @@ vec3 facet_normal(Place place) {
     return normalize(place.slopes * vec3(-place.gradient, 1.0));
 }
 
-// Light straight from emitters and point lights on the surface at a place, by its own normal and shadowed by the relief.
+// Light straight from emitters and point lights on the surface at a place, by its own normal, shadowed by the relief and by
+// the rest of the scene.
 vec3 sharp(Prism p, ReliefSurface surface, Place place, vec3 at) {
     vec3 facet = facet_normal(place);
     float rise = surface.top - surface.lowest;
     float height = place.height + LIFT * rise;
-    uvec2 pixel_at = uvec2(gl_FragCoord.xy) % 4;
-    uint turn = pixel_at.y * 4 + pixel_at.x;
     vec3 sum = vec3(0.0);
-    uint emitters = emitter_points / LIGHT_TURNS;
-    for (uint i = 0; i < emitters + light_count - emitter_points; i++) {
-        bool emitter = i < emitters;
-        LightPoint light = light_points[emitter ? i * LIGHT_TURNS + turn : emitter_points + i - emitters];
+    uint samples = light_samples();
+    for (uint i = 0; i < samples; i++) {
+        LightPoint light = light_of_sample(i);
         vec3 way = light.position - at;
         float square = dot(way, way);
         vec3 towards = way * inversesqrt(square);
         vec3 local = towards * place.slopes;
-        float cosine = dot(facet, towards);
-        float sent = emitter ? float(LIGHT_TURNS) * max(-dot(light.normal, towards), 0.0) : 1.0;
-        if (local.z <= 0.0 || cosine <= 0.0 || sent == 0.0) {
+        float arrives = arriving(light, towards, dot(facet, towards), square);
+        if (local.z <= 0.0 || arrives <= 0.0) {
             continue;
         }
+        float leaves = (surface.top - height) / local.z;
         vec3 from = vec3(place.uv, height);
-        vec3 to = vec3(place.uv + local.xy / local.z * (surface.top - height), surface.top);
+        vec3 to = vec3(place.uv + local.xy * leaves, surface.top);
         HeightHit hit;
-        if (!march(tiles[p.surface], from, to, hit)) {
-            sum += light.strength * (sent * cosine / square);
+        if (!march(tiles[p.surface], from, to, hit) && !blocked(at, end_of_way(light), leaves * inversesqrt(square))) {
+            sum += light.strength * arrives;
         }
     }
-    return sum * (place.share.x * light_shares[p.light_a] + place.share.y * light_shares[p.light_b]
-                + place.share.z * light_shares[p.light_c]);
+    return sum;
 }
 
 // E by the factors of the cell at a place, for the light of the three vertices.

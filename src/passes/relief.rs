@@ -10,8 +10,8 @@ use glam::{Vec3, Vec4};
 use super::buffers::upload;
 use super::shade::Shade;
 use super::shaders;
-use super::types::{HeightTile, LightPoint, Prism, ReliefSurface};
-use crate::constants::KIND_SURFACE;
+use super::shadow_rays::LightBuffers;
+use super::types::{HeightTile, Prism, ReliefSurface};
 use crate::error::Result;
 use crate::vk::{
     Bind, Binding, Buffer, BufferUse, Commands, DescriptorSet, Device, Format, GraphicsPipeline,
@@ -40,9 +40,6 @@ pub struct Parameters {
     pub pixel: f32,
     /// Columns and rows of the directions.
     pub cells: [u32; 2],
-    /// Of the light points; those of emitters come first.
-    pub light_count: u32,
-    pub emitter_points: u32,
 }
 
 /// What a picture's relief is made of, `[prism]` and `[surface]`.
@@ -57,17 +54,11 @@ pub struct Parts<'a> {
     pub coefficients: &'a [[Vec3; 2]],
     /// `[light vertex][direction]`
     pub exits: &'a [Vec3],
-    /// Those of emitters first, LIGHT_POINTS or none.
-    pub light_points: &'a [LightPoint],
-    /// Share of their light that arrives, `[light vertex]`.
-    pub light_shares: &'a [Vec3],
 }
 
 /// [`Parts`] on the device.
 pub struct Buffers {
-    parts: [Buffer; 9],
-    light_count: u32,
-    emitter_points: u32,
+    parts: [Buffer; 7],
     vertices: Buffer,
     indices: Buffer,
 }
@@ -101,7 +92,7 @@ impl Relief {
             format,
             offset: offset as u32,
         };
-        let mut bindings = [Binding::Storage; 10];
+        let mut bindings = [Binding::Storage; 11];
         bindings[0] = Binding::Sampled;
         Ok(Self {
             pipeline: GraphicsPipeline::new(
@@ -131,8 +122,9 @@ impl Relief {
         albedo: &Image,
         sampler: &Sampler,
         buffers: &Buffers,
+        lights: &LightBuffers,
     ) -> Result<DescriptorSet> {
-        let [a, b, c, d, e, f, g, h, i] = &buffers.parts;
+        let [a, b, c, d, e, f, g] = &buffers.parts;
         let buffer = Bind::Buffer;
         self.pipeline.bind(
             "relief",
@@ -145,8 +137,9 @@ impl Relief {
                 buffer(e),
                 buffer(f),
                 buffer(g),
-                buffer(h),
-                buffer(i),
+                buffer(&lights.points),
+                buffer(&lights.nodes),
+                buffer(&lights.triangles),
             ],
         )
     }
@@ -169,11 +162,6 @@ impl Relief {
 }
 
 impl Buffers {
-    /// All light points, and those of emitters.
-    pub fn light_counts(&self) -> [u32; 2] {
-        [self.light_count, self.emitter_points]
-    }
-
     /// `mirrored` tells of each prism whether its a, b, c turn to the right seen from above.
     pub fn new(device: &Arc<Device>, parts: &Parts<'_>, mirrored: &[bool]) -> Result<Self> {
         let vertices: Vec<Vertex> = (0..)
@@ -203,15 +191,7 @@ impl Buffers {
                 upload(device, "relief factors", parts.factors, storage)?,
                 upload(device, "relief coefficients", parts.coefficients, storage)?,
                 upload(device, "relief exits", parts.exits, storage)?,
-                upload(device, "relief light points", parts.light_points, storage)?,
-                upload(device, "relief light shares", parts.light_shares, storage)?,
             ],
-            light_count: parts.light_points.len() as u32,
-            emitter_points: parts
-                .light_points
-                .iter()
-                .filter(|p| p.kind == KIND_SURFACE)
-                .count() as u32,
             vertices: upload(device, "relief vertices", &vertices, BufferUse::Geometry)?,
             indices: upload(device, "relief indices", &indices, BufferUse::Geometry)?,
         })

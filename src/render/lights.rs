@@ -1,23 +1,32 @@
-//! Points that emitters and point lights are taken for where their light on relief is drawn sharply.
+//! Points that emitters and point lights are taken for where their light is drawn sharply, and what casts shadows there.
 
-use glam::{DVec3, Vec3};
+use std::sync::Arc;
 
-use super::Projection;
-use crate::constants::{KIND_POINT, KIND_SURFACE, LIGHT_POINTS};
-use crate::passes::types::LightPoint;
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::{Lighting, Projection};
+use crate::constants::{KIND_POINT, KIND_SURFACE, LIGHT_POINTS, LIGHT_SETS};
+use crate::error::Result;
+use crate::passes::shadow_rays::{LightBuffers, ShadowTree};
+use crate::passes::types::{LightPoint, ShadowTriangle};
 use crate::scene::Scene;
 use crate::sources::triangle_area;
+use crate::vk::Device;
 
 /// A light point in scene units.
-pub struct Shining {
+struct Shining {
     position: DVec3,
     /// Of an emitter; none of a point light.
     normal: Option<DVec3>,
+    area: f64,
     strength: DVec3,
 }
 
-/// LIGHT_POINTS points on the emitters, if there are any, by their power, then the point lights.
-pub fn shining(scene: &Scene) -> Vec<Shining> {
+/// LIGHT_SETS sets of LIGHT_POINTS points on the emitters, if there are any, each by their power, then the point lights.
+fn shining(scene: &Scene) -> Vec<Shining> {
+    let mut whole = 0.0;
+    // Each with the power of all up to it.
     let emitters: Vec<(usize, DVec3, f64)> = scene
         .triangles
         .iter()
@@ -25,34 +34,22 @@ pub fn shining(scene: &Scene) -> Vec<Shining> {
         .filter_map(|(e, t)| {
             let emitted = DVec3::from(scene.materials[t.material as usize].ke.map(f64::from));
             let power = emitted.element_sum() * triangle_area(scene.corners(t));
-            (power > 0.0).then_some((e, emitted, power))
+            whole += power;
+            (power > 0.0).then_some((e, emitted, whole))
         })
         .collect();
-    let whole: f64 = emitters.iter().map(|e| e.2).sum();
     let share = whole / f64::from(LIGHT_POINTS);
     let mut points = Vec::new();
-    let mut remaining = emitters.iter();
-    let mut current = remaining.next();
-    let mut passed = 0.0;
-    for i in 0..LIGHT_POINTS {
-        let at = (f64::from(i) + 0.5) * share;
-        while let Some(&(.., power)) = current {
-            if at <= passed + power {
-                break;
-            }
-            match remaining.next() {
-                Some(next) => {
-                    passed += power;
-                    current = Some(next);
-                }
-                None => break,
-            }
-        }
-        let Some(&(e, emitted, _)) = current else {
+    for i in 0..LIGHT_SETS * LIGHT_POINTS {
+        let (set, i_in_set) = (i / LIGHT_POINTS, i % LIGHT_POINTS);
+        let in_share = (f64::from(set) + 0.5) / f64::from(LIGHT_SETS);
+        let at = (f64::from(i_in_set) + in_share) * share;
+        let place = emitters.partition_point(|e| e.2 < at);
+        let Some(&(e, emitted, _)) = emitters.get(place).or(emitters.last()) else {
             break;
         };
         let [a, b, c] = scene.corners(&scene.triangles[e]);
-        // The R2 sequence (Roberts 2018), folded into the triangle.
+        // The R2 sequence (Roberts 2018), folded into the triangle: each run of it is spread evenly.
         let along = |step: f64| (0.5 + step * f64::from(i)).fract();
         let (s, t) = (
             along(0.754_877_666_246_692_8),
@@ -66,19 +63,22 @@ pub fn shining(scene: &Scene) -> Vec<Shining> {
         points.push(Shining {
             position: a + (b - a) * s + (c - a) * t,
             normal: Some((b - a).cross(c - a).normalize_or_zero()),
+            area: share / emitted.element_sum(),
             strength: emitted * (share / emitted.element_sum()),
         });
     }
     points.extend(scene.point_lights.iter().map(|light| Shining {
         position: light.position,
         normal: None,
+        area: 0.0,
         strength: DVec3::from(light.intensity.map(f64::from)),
     }));
     points
 }
 
 impl Shining {
-    pub fn seen_from(&self, projection: &Projection) -> LightPoint {
+    fn seen_from(&self, projection: &Projection) -> LightPoint {
+        let square = projection.unit * projection.unit;
         LightPoint {
             position: ((self.position - projection.eye) / projection.unit).as_vec3(),
             kind: if self.normal.is_some() {
@@ -87,77 +87,57 @@ impl Shining {
                 KIND_POINT
             },
             normal: self.normal.unwrap_or_default().as_vec3(),
-            strength: (self.strength / (projection.unit * projection.unit)).as_vec3(),
+            area: (self.area / square) as f32,
+            strength: (self.strength / square).as_vec3(),
         }
-    }
-
-    /// What would arrive at a place without anything between, as a vector in the frame's coordinates, `[colour]`; none from
-    /// below the frame's horizon.
-    fn arriving(&self, at: DVec3, frame: [DVec3; 3]) -> [DVec3; 3] {
-        let way = self.position - at;
-        let square = way.length_squared();
-        let towards = way / square.sqrt();
-        let sent = self.normal.map_or(1.0, |n| (-n.dot(towards)).max(0.0));
-        let local = DVec3::from(frame.map(|axis| axis.dot(towards)));
-        if local.z <= 0.0 || sent == 0.0 {
-            return [DVec3::ZERO; 3];
-        }
-        (self.strength * (sent / square))
-            .to_array()
-            .map(|s| local * s)
     }
 }
 
-/// The share of the points' light that arrives at a place, by colour: the direct light there, `[slot][colour]` as vectors,
-/// along what would arrive without anything between; none where nothing would.
-pub fn share(
-    points: &[Shining],
-    at: DVec3,
-    frame: [DVec3; 3],
-    direct: &[[Vec3; 3]],
-) -> Option<Vec3> {
-    let mut open = [DVec3::ZERO; 3];
-    for point in points {
-        let arriving = point.arriving(at, frame);
-        (0..3).for_each(|c| open[c] += arriving[c]);
-    }
-    let share = |c: usize| {
-        let found: DVec3 = direct.iter().map(|m| m[c].as_dvec3()).sum();
-        match open[c].length_squared() {
-            0.0 => 0.0,
-            square => (found.dot(open[c]) / square).clamp(0.0, 2.0) as f32,
-        }
+/// The scene's light points and what casts shadows before them; nothing where no light is drawn sharply.
+///
+/// All is taken from the eye, rounded as what is drawn is: a place that is drawn is as near to what casts its shadow as to
+/// itself.
+///
+/// # Errors
+/// A device without the memory.
+pub fn light_buffers(
+    device: &Arc<Device>,
+    scene: &Scene,
+    lighting: &Lighting<'_>,
+    projection: &Projection,
+) -> Result<LightBuffers> {
+    let points: Vec<_> = if lighting.sharp() {
+        shining(scene)
+            .iter()
+            .map(|point| point.seen_from(projection))
+            .collect()
+    } else {
+        Vec::new()
     };
-    let any = open.iter().any(|c| *c != DVec3::ZERO);
-    any.then(|| Vec3::new(share(0), share(1), share(2)))
+    let tree = if points.is_empty() {
+        ShadowTree::default()
+    } else {
+        ShadowTree::new(casters(scene, lighting, projection))
+    };
+    LightBuffers::new(device, &points, &tree)
 }
 
-/// Shares beyond the horizon from those of the neighbours, triangle by triangle: bumps there still rise into the light.
-pub fn spread(shares: Vec<Option<Vec3>>, triangles: &[[u32; 3]]) -> Vec<Vec3> {
-    let mut shares = shares;
-    for _ in 0..ROUNDS {
-        let mut found = vec![(Vec3::ZERO, 0.0_f32); shares.len()];
-        for triangle in triangles {
-            let known = triangle.iter().filter_map(|&v| shares[v as usize]);
-            let (sum, count) = known.fold((Vec3::ZERO, 0.0), |(sum, n), s| (sum + s, n + 1.0));
-            for &v in triangle {
-                if count > 0.0 && shares[v as usize].is_none() {
-                    found[v as usize].0 += sum / count;
-                    found[v as usize].1 += 1.0;
-                }
+/// Every triangle, those with relief at its mean height.
+fn casters(scene: &Scene, lighting: &Lighting<'_>, projection: &Projection) -> Vec<ShadowTriangle> {
+    let relief_is_drawn = lighting.relief().is_some();
+    scene
+        .triangles
+        .par_iter()
+        .map(|t| {
+            let corners = scene.corners(t);
+            let [a, b, c] = corners.map(|p| ((p - projection.eye) / projection.unit).as_vec3());
+            let relief = relief_is_drawn && scene.materials[t.material as usize].has_relief();
+            ShadowTriangle {
+                a,
+                b,
+                c,
+                relief: relief.into(),
             }
-        }
-        if found.iter().all(|f| f.1 == 0.0) {
-            break;
-        }
-        for (share, (sum, count)) in shares.iter_mut().zip(found) {
-            if count > 0.0 {
-                *share = Some(sum / count);
-            }
-        }
-    }
-    shares.into_iter().map(Option::unwrap_or_default).collect()
+        })
+        .collect()
 }
-
-/// Triangles that a share spreads over beyond the horizon.
-const ROUNDS: usize = 8;

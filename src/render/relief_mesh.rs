@@ -6,8 +6,7 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::lights::{share, shining, spread};
-use super::{Direct, Light, Lighting, Projection, ReliefShading, Show};
+use super::{Light, Lighting, Projection, ReliefShading, Show};
 use crate::constants::{MOST_RANK, WIDEST_SAMPLE};
 use crate::directions::Directions;
 use crate::elements::Elements;
@@ -48,7 +47,6 @@ pub struct FlatRelief {
 struct LightVertices {
     coefficients: Vec<[Vec3; 2]>,
     exits: Vec<Vec3>,
-    shares: Vec<Option<Vec3>>,
     /// By vertex and surface.
     known: HashMap<(u32, u32), u32>,
 }
@@ -95,9 +93,7 @@ impl ReliefMesh {
             .map(|(all, direct)| [0, 1, 2].map(|c| all[c] - direct[c]))
             .collect();
         // Light that has bounced inside the relief is indirect, wherever it came from.
-        let sharp = lighting.direct == Direct::Sharp
-            && lighting.shading == ReliefShading::Factored
-            && lighting.part != Light::Indirect;
+        let sharp = lighting.sharp() && lighting.shading == ReliefShading::Factored;
         let inside = (lighting.part != Light::Direct).then_some(&all);
         let arriving = match (lighting.part, sharp) {
             (Light::Global, false) => Some(&all),
@@ -105,7 +101,6 @@ impl ReliefMesh {
             (Light::Direct, false) => Some(&direct),
             (Light::Direct, true) => None,
         };
-        let points = if sharp { shining(scene) } else { Vec::new() };
         let exits = vertices.mean(&lighting.exits(scene, light), directions.count());
         let mut lit = LightVertices::default();
         let normals = relief_normals(scene);
@@ -190,12 +185,6 @@ impl ReliefMesh {
                     };
                     lit.push(&coefficients(inside), &coefficients(arriving));
                     lit.exits.extend_from_slice(&exits[slots.clone()]);
-                    lit.shares.push(share(
-                        &points,
-                        scene.vertices[triangle.vertices[k] as usize],
-                        vertices.frames[vertex as usize].map(|axis| axis.as_dvec3()),
-                        &direct[slots],
-                    ));
                 })
             });
             let [tangent, bitangent, normal] = light.frames[m];
@@ -237,11 +226,6 @@ impl ReliefMesh {
             factors: &surfaces.factors,
             coefficients: &lit.coefficients,
             exits: &lit.exits,
-            light_points: &points
-                .iter()
-                .map(|p| p.seen_from(projection))
-                .collect::<Vec<_>>(),
-            light_shares: &spread(lit.shares, &corners_of(&prisms)),
         };
         Ok(Self {
             buffers: Buffers::new(device, &parts, &mirrored)?,
@@ -250,12 +234,6 @@ impl ReliefMesh {
             rest,
         })
     }
-}
-
-/// The light vertices of the prisms.
-fn corners_of(prisms: &[Prism]) -> Vec<[u32; 3]> {
-    let corners = |p: &Prism| [p.light_a, p.light_b, p.light_c];
-    prisms.iter().map(corners).collect()
 }
 
 impl LightVertices {

@@ -3,14 +3,16 @@
 use std::sync::Arc;
 
 use super::gathered::Gathered;
+use super::lights::light_buffers;
 use super::mesh::Mesh;
 use super::picture::{Picture, SAMPLES};
 use super::projection::{Projection, Tile};
 use super::relief::Relief;
-use super::textures::Textures;
+use super::textures::{Bound, Textures};
 use super::{Lighting, View};
 use crate::error::Result;
 use crate::passes::shade::{Shade, Target};
+use crate::passes::shadow_rays::LightBuffers;
 use crate::scene::Scene;
 use crate::vk::{Commands, Device, Timestamps};
 
@@ -28,9 +30,11 @@ pub struct Renderer<'a> {
     view: View<'a>,
     projection: Projection,
     shade: Shade,
-    textures: Textures,
+    lights: LightBuffers,
+    bound: Bound,
     mesh: Mesh,
     relief: Option<Relief>,
+    _textures: Textures,
 }
 
 impl<'a> Renderer<'a> {
@@ -53,12 +57,17 @@ impl<'a> Renderer<'a> {
         view.check()?;
         let projection = Projection::new(scene, view)?;
         let shade = Shade::new(device)?;
-        let textures = Textures::new(device, &shade, scene)?;
+        let textures = Textures::new(device, scene)?;
+        let lights = light_buffers(device, scene, &lighting, &projection)?;
         let seen = (&projection, samples);
-        let relief = Relief::new(device, &shade, scene, &lighting, &textures, seen)?;
+        let relief = Relief::new(device, &shade, scene, &lighting, (&textures, &lights), seen)?;
         let rest = relief.as_ref().map(|r| &r.mesh.rest);
+        let is_lit = lights.counts[0] > 0;
+        let mesh = Mesh::new(device, scene, &lighting, &projection, (rest, is_lit))?;
         Ok(Self {
-            mesh: Mesh::new(device, scene, &lighting, &projection, rest)?,
+            bound: textures.bind(&shade, &lights, &mesh.lit)?,
+            lights,
+            mesh,
             relief,
             device: Arc::clone(device),
             scene,
@@ -66,7 +75,7 @@ impl<'a> Renderer<'a> {
             view: *view,
             projection,
             shade,
-            textures,
+            _textures: textures,
         })
     }
 
@@ -158,9 +167,9 @@ impl<'a> Renderer<'a> {
         drawn: impl FnOnce(),
     ) {
         let part = self.lighting.part;
-        let plain = self
-            .mesh
-            .draws(self.scene, &self.textures, &self.projection, tile, part);
+        let seen = (&self.projection, tile);
+        let counts = self.lights.counts;
+        let plain = self.mesh.draws(self.scene, &self.bound, seen, part, counts);
         self.shade.record(
             cmd,
             target,
@@ -173,7 +182,8 @@ impl<'a> Renderer<'a> {
             || {
                 if let Some(relief) = &self.relief {
                     let place = (tile, samples);
-                    relief.record(cmd, self.scene, &self.lighting, &self.projection, place);
+                    let seen = (&self.projection, &self.lights);
+                    relief.record(cmd, self.scene, &self.lighting, seen, place);
                 }
                 drawn();
             },
