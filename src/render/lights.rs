@@ -40,28 +40,23 @@ fn shining(scene: &Scene) -> Vec<Shining> {
         .collect();
     let share = whole / f64::from(LIGHT_POINTS);
     let mut points = Vec::new();
+    // Points that each emitter has by now: those of the next set fall between them.
+    let mut taken = vec![0; emitters.len()];
     for i in 0..LIGHT_SETS * LIGHT_POINTS {
         let (set, i_in_set) = (i / LIGHT_POINTS, i % LIGHT_POINTS);
         let in_share = (f64::from(set) + 0.5) / f64::from(LIGHT_SETS);
         let at = (f64::from(i_in_set) + in_share) * share;
         let place = emitters.partition_point(|e| e.2 < at);
-        let Some(&(e, emitted, _)) = emitters.get(place).or(emitters.last()) else {
+        let place = place.min(emitters.len().saturating_sub(1));
+        let Some(&(e, emitted, _)) = emitters.get(place) else {
             break;
         };
-        let [a, b, c] = scene.corners(&scene.triangles[e]);
-        // The R2 sequence (Roberts 2018), folded into the triangle: each run of it is spread evenly.
-        let along = |step: f64| (0.5 + step * f64::from(i)).fract();
-        let (s, t) = (
-            along(0.754_877_666_246_692_8),
-            along(0.569_840_290_998_053_2),
-        );
-        let (s, t) = if s + t > 1.0 {
-            (1.0 - s, 1.0 - t)
-        } else {
-            (s, t)
-        };
+        let corners = scene.corners(&scene.triangles[e]);
+        let [a, b, c] = corners;
+        let position = spread(corners, taken[place]);
+        taken[place] += 1;
         points.push(Shining {
-            position: a + (b - a) * s + (c - a) * t,
+            position,
             normal: Some((b - a).cross(c - a).normalize_or_zero()),
             area: share / emitted.element_sum(),
             strength: emitted * (share / emitted.element_sum()),
@@ -74,6 +69,25 @@ fn shining(scene: &Scene) -> Vec<Shining> {
         strength: DVec3::from(light.intensity.map(f64::from)),
     }));
     points
+}
+
+/// Place i of a sequence in a triangle whose first 4ⁿ places lie in all of the 4ⁿ triangles like it that it is cut into: the
+/// triangular van der Corput sequence of Basu and Owen 2015.
+fn spread(corners: [DVec3; 3], i: u32) -> DVec3 {
+    let [mut a, mut b, mut c] = corners;
+    let mut digits = i;
+    // Digits of any i, and some zeros, which halve a triangle in place.
+    for _ in 0..16 {
+        let (ab, bc, ca) = ((a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0);
+        (a, b, c) = match digits % 4 {
+            0 => (bc, ca, ab),
+            1 => (a, ab, ca),
+            2 => (ab, b, bc),
+            _ => (ca, bc, c),
+        };
+        digits /= 4;
+    }
+    (a + b + c) / 3.0
 }
 
 impl Shining {
@@ -140,4 +154,28 @@ fn casters(scene: &Scene, lighting: &Lighting<'_>, projection: &Projection) -> V
             }
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of 4³ places in a row, one lies in each of the 64 parts; and their mean is the middle, each part's being its own.
+    #[test]
+    fn places_are_spread_evenly() {
+        let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        let mut found = std::collections::HashSet::new();
+        let mut mean = DVec3::ZERO;
+        for i in 64..128 {
+            let place = spread(corners, i);
+            mean += place / 64.0;
+            let (x, y) = (8.0 * place.x, 8.0 * place.y);
+            let upper = x.fract() + y.fract() > 1.0;
+            found.insert((x as u32, y as u32, upper));
+        }
+        assert_eq!(found.len(), 64);
+        // Half of a part, on the side that its own place is shifted to.
+        const SHIFT: f64 = 1.0 / 16.0;
+        assert!((mean - DVec3::new(1.0, 1.0, 0.0) / 3.0).length() < SHIFT);
+    }
 }
