@@ -227,7 +227,8 @@ vec3 facet_normal(Place place) {
 // The surface that a prism stands on, as ways to lights pass over it.
 struct Base {
     mat3 shares;         // slopes of the corners' shares in space, an internal unit
-    mat3 axes;           // the corners' smooth normals
+    mat3 axes;           // the corners' smooth normals, along which the relief rises
+    vec3 axis;           // at the place
     vec3 normal;
     float steepness;     // heights of an internal unit
 };
@@ -244,8 +245,9 @@ Base base_of(Prism p, ReliefSurface surface, Place place) {
     vec3 of_c = cross(normal, b) / square;
     base.shares = mat3(-of_b - of_c, of_b, of_c);
     base.axes = mat3(normalize(p.high_a - p.low_a), normalize(p.high_b - p.low_b), normalize(p.high_c - p.low_c));
+    base.axis = normalize(base.axes * place.share);
     base.normal = normal * inversesqrt(square);
-    base.steepness = length(place.slopes[2]);
+    base.steepness = (surface.top - surface.lowest) / length(p.high_a - p.low_a);
     return base;
 }
 
@@ -256,20 +258,22 @@ Base base_of(Prism p, ReliefSurface surface, Place place) {
 // smooth normals of the triangle tell, by triangles like this one, so that the way's height above it is a parabola: bumps
 // beyond a triangle's horizon still rise into the light, and the next triangle's do not shadow what they cannot.
 bool shadowed_by_relief(Prism p, ReliefSurface surface, Place place, Base base, vec3 towards, out float leaves) {
-    vec3 local = towards * place.slopes;
+    // Slopes over the triangle, not over the tetrahedron of the place, at whose borders they jump.
+    float out_of = dot(base.normal, towards) / dot(base.normal, base.axis);
+    vec3 tangential = towards - base.axis * out_of;
+    vec3 rates = tangential * base.shares;
+    vec3 local = vec3(rates.x * p.uv_a + rates.y * p.uv_b + rates.z * p.uv_c, out_of * base.steepness);
     float rise = surface.top - surface.lowest;
     vec3 from = vec3(place.uv, place.height + LIFT * rise);
     float short_of = surface.top - from.z;
     HeightHit hit;
 
     // Find where the way leaves the triangle, how long it is over it, and how the surface bends along it.
-    vec3 rates = towards * base.shares;
     vec3 ends = place.share / max(abs(rates), vec3(1e-12));
     vec3 after = mix(vec3(NEVER), ends, lessThan(rates, vec3(0.0)));
     vec3 before = mix(vec3(NEVER), ends, greaterThan(rates, vec3(0.0)));
     float edge = max(min(min(after.x, after.y), after.z), 0.0);
     float chord = edge + max(min(min(before.x, before.y), before.z), 0.0);
-    vec3 tangential = towards - base.normal * dot(base.normal, towards);
     float bend = dot(base.axes * rates, tangential) * base.steepness;
 
     leaves = local.z > 0.0 ? short_of / local.z : NEVER;
