@@ -72,14 +72,18 @@ fn shining(scene: &Scene) -> Vec<Shining> {
 }
 
 /// Place i of a sequence in a triangle whose first 4ⁿ places lie in all of the 4ⁿ triangles like it that it is cut into: the
-/// triangular van der Corput sequence of Basu and Owen 2015.
+/// triangular van der Corput sequence of Basu and Owen 2015, its digits turned by those before them: in rows, places
+/// would pass the edge of what casts a shadow many at a time.
 fn spread(corners: [DVec3; 3], i: u32) -> DVec3 {
     let [mut a, mut b, mut c] = corners;
     let mut digits = i;
+    let mut turn = 0_u32;
     // Digits of any i, and some zeros, which halve a triangle in place.
     for _ in 0..16 {
         let (ab, bc, ca) = ((a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0);
-        (a, b, c) = match digits % 4 {
+        let child = (digits % 4 + (turn >> 30)) % 4;
+        turn = (turn ^ (child + 1)).wrapping_mul(0x9e37_79b9);
+        (a, b, c) = match child {
             0 => (bc, ca, ab),
             1 => (a, ab, ca),
             2 => (ab, b, bc),
