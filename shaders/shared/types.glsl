@@ -146,11 +146,12 @@ struct ParallelLight {
     vec3 fluence_c;
 };
 
-// A place that shines on relief: a part of an emitter, or a point light.
+// A place that light comes straight from: a part of an emitter, or a point light.
 struct LightPoint {
     vec3 position;      // from the eye, internal units
     uint kind;          // KIND_SURFACE or KIND_POINT
     vec3 normal;
+    float area;         // of the part of an emitter
     vec3 strength;      // Le times its area, or radiant intensity
 };
 
@@ -164,4 +165,40 @@ struct ReliefSurface {
     uint rank;
     uint first_factor;
     vec2 slope;         // scene heights a texture repeat in u and in v for a unit of height
+};
+
+// A box of the tree of what casts shadows, in depth-first order: the first within it follows it.
+struct ShadowNode {
+    vec3 low;           // from the eye, internal units
+    uint skip;          // the node that follows all that is in this one
+    vec3 high;
+    uint first;         // of its triangles
+    uint count;         // of a leaf's triangles, 0 in others
+};
+
+// What casts a shadow.
+struct ShadowTriangle {
+    vec3 a;
+    vec3 b;
+    vec3 c;
+    uint relief;        // 1: it stands for a relief about it
+};
+
+// A straight way.
+struct ShadowRay {
+    vec3 from;
+    float clear;        // share of the way before which triangles with a relief are passed over
+    vec3 to;
+};
+
+// A plain triangle that is lit straight.
+struct LitTriangle {
+    vec3 a;             // from the eye, internal units
+    vec3 b;
+    vec3 c;
+    vec3 normal_a;      // of the smooth surface at the corners
+    vec3 normal_b;
+    vec3 normal_c;
+    vec3 plane;         // its own normal
+    float above;        // what rays start above it
 };

@@ -17,7 +17,7 @@ pub struct ShowOptions {
         conflicts_with = "reference"
     )]
     shading: ShadingName,
-    /// How light straight from emitters falls on relief
+    /// How light straight from emitters and point lights is drawn
     #[arg(
         long,
         value_enum,
@@ -64,9 +64,9 @@ enum ShadingName {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum DirectName {
-    /// Shadowed by the relief at each pixel
+    /// Shadowed at each pixel by the scene and by the relief itself
     Sharp,
-    /// By the slots, as in the paper
+    /// As it was baked, on relief by the slots, as in the paper; quicker
     Slots,
 }
 

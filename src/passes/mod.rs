@@ -15,6 +15,7 @@ pub mod relief_visibility;
 pub mod select;
 pub mod send_relief;
 pub mod shade;
+pub mod shadow_rays;
 pub mod types;
 
 use crate::constants::GROUP;

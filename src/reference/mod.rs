@@ -10,3 +10,4 @@ pub mod relief_visibility;
 pub mod select;
 pub mod send_relief;
 pub mod shade;
+pub mod shadow_rays;

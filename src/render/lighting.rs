@@ -76,13 +76,13 @@ impl ReliefShading {
     }
 }
 
-/// How light straight from emitters and point lights falls on relief.
+/// How light straight from emitters and point lights falls on surfaces.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Direct {
-    /// From points on them, shadowed by the relief at each pixel; by the rest of the scene at each vertex.
+    /// From points on them, shadowed at each sample by the scene and by the relief itself.
     #[default]
     Sharp,
-    /// By the slots, as in the paper.
+    /// As it was baked: on relief by the slots, as in the paper.
     Slots,
 }
 
@@ -152,6 +152,27 @@ impl<'a> Lighting<'a> {
 
     pub(super) fn relief(&self) -> Option<(&'a DirectionalLight, u32)> {
         self.relief.zip(self.shading.code())
+    }
+
+    /// Whether light straight from emitters and point lights is shown by their points: only where the rest of the light is
+    /// known apart from it.
+    pub(super) fn sharp(&self) -> bool {
+        self.direct == Direct::Sharp
+            && self.part != Light::Indirect
+            && self.irradiance_direct.is_some()
+    }
+
+    /// The part of the irradiance that is shown as it was baked on plain triangles.
+    pub(super) fn baked(&self) -> Vec<Vec3> {
+        match self.irradiance_direct {
+            Some(_) if self.sharp() && self.part == Light::Direct => {
+                vec![Vec3::ZERO; self.irradiance.len()]
+            }
+            Some(direct) if self.sharp() => {
+                Light::Indirect.of(self.irradiance, direct, |all, direct| all - direct)
+            }
+            _ => self.irradiance(),
+        }
     }
 
     /// The part of the irradiance that is shown.

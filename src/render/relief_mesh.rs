@@ -6,10 +6,9 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::lights::{share, shining, spread};
 use super::relief_scene::ReliefScene;
 use super::slots::slot_colour;
-use super::{Direct, Light, Lighting, Projection, ReliefShading, Show};
+use super::{Light, Lighting, Projection, ReliefShading, Show};
 use crate::constants::{MOST_RANK, WIDEST_SAMPLE};
 use crate::directions::Directions;
 use crate::error::Result;
@@ -47,7 +46,6 @@ pub struct FlatRelief {
 struct LightVertices {
     coefficients: Vec<[Vec3; 2]>,
     exits: Vec<Vec3>,
-    shares: Vec<Option<Vec3>>,
     /// By vertex and surface.
     known: HashMap<(u32, u32), u32>,
 }
@@ -78,9 +76,7 @@ impl ReliefMesh {
             .map(|(all, direct)| [0, 1, 2].map(|c| all[c] - direct[c]))
             .collect();
         // Light that has bounced inside the relief is indirect, wherever it came from.
-        let sharp = lighting.direct == Direct::Sharp
-            && lighting.shading == ReliefShading::Factored
-            && lighting.part != Light::Indirect;
+        let sharp = lighting.sharp() && lighting.shading == ReliefShading::Factored;
         let inside = (lighting.part != Light::Direct).then_some(all);
         let arriving = match (lighting.part, sharp) {
             (Light::Global, false) => Some(all),
@@ -90,7 +86,6 @@ impl ReliefMesh {
         };
         let clustered = arriving.filter(|_| lighting.shading == ReliefShading::Clusters);
         let arriving = arriving.filter(|_| clustered.is_none());
-        let points = if sharp { shining(scene) } else { Vec::new() };
         let shown = lighting.part.of(
             &light.incident_moment,
             &light.incident_moment_direct,
@@ -192,12 +187,6 @@ impl ReliefMesh {
                     };
                     lit.push(&coefficients(inside), &coefficients(arriving));
                     lit.exits.extend_from_slice(&exits[slots.clone()]);
-                    lit.shares.push(share(
-                        &points,
-                        scene.vertices[triangle.vertices[k] as usize],
-                        vertices.frames[vertex as usize].map(|axis| axis.as_dvec3()),
-                        &direct[slots],
-                    ));
                 })
             });
             let [tangent, bitangent, normal] = light.frames[m];
@@ -245,11 +234,6 @@ impl ReliefMesh {
             factors: &surfaces.factors,
             coefficients: &lit.coefficients,
             exits: &lit.exits,
-            light_points: &points
-                .iter()
-                .map(|p| p.seen_from(projection))
-                .collect::<Vec<_>>(),
-            light_shares: &spread(lit.shares, &corners_of(&prisms)),
             parallel_lights: &clusters.as_ref().map_or_else(Vec::new, parallel_lights),
         };
         Ok(Self {
@@ -270,12 +254,6 @@ fn parallel_lights(clusters: &FaceClusters) -> Vec<ParallelLight> {
         fluence_c: c.fluence[2],
     };
     clusters.list.iter().map(light).collect()
-}
-
-/// The light vertices of the prisms.
-fn corners_of(prisms: &[Prism]) -> Vec<[u32; 3]> {
-    let corners = |p: &Prism| [p.light_a, p.light_b, p.light_c];
-    prisms.iter().map(corners).collect()
 }
 
 impl LightVertices {

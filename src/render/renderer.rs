@@ -3,15 +3,17 @@
 use std::sync::Arc;
 
 use super::gathered::Gathered;
+use super::lights::light_buffers;
 use super::mesh::Mesh;
 use super::picture::{Picture, SAMPLES};
 use super::projection::{Projection, Tile};
 use super::relief::Relief;
 use super::relief_scene::ReliefScene;
-use super::textures::Textures;
+use super::textures::{Bound, Textures};
 use super::{Lighting, Overdraw, Show, View};
 use crate::error::Result;
 use crate::passes::shade::{Shade, Target};
+use crate::passes::shadow_rays::LightBuffers;
 use crate::scene::Scene;
 use crate::vk::{Commands, Device, Timestamps};
 
@@ -32,6 +34,8 @@ pub struct Renderer<'a> {
     textures: Textures,
     kept: Option<ReliefScene>,
     samples: u32,
+    lights: LightBuffers,
+    bound: Bound,
     mesh: Mesh,
     relief: Option<Relief>,
 }
@@ -56,13 +60,19 @@ impl<'a> Renderer<'a> {
         view.check()?;
         let projection = Projection::new(scene, view)?;
         let shade = Shade::new(device)?;
-        let textures = Textures::new(device, &shade, scene)?;
+        let textures = Textures::new(device, scene)?;
         let kept = ReliefScene::new(device, &shade, scene, &lighting)?;
+        let lights = light_buffers(device, scene, &lighting, &projection)?;
         let seen = (&projection, samples);
-        let relief = Relief::new(device, kept.as_ref(), scene, &lighting, &textures, seen)?;
+        let shared = (&textures, &lights);
+        let relief = Relief::new(device, kept.as_ref(), scene, &lighting, shared, seen)?;
         let rest = relief.as_ref().map(|r| &r.mesh.rest);
+        let is_lit = lights.counts[0] > 0;
+        let mesh = Mesh::new(device, scene, &lighting, &projection, (rest, is_lit))?;
         Ok(Self {
-            mesh: Mesh::new(device, scene, &lighting, &projection, rest)?,
+            bound: textures.bind(&shade, &lights, &mesh.lit)?,
+            lights,
+            mesh,
             relief,
             device: Arc::clone(device),
             scene,
@@ -85,10 +95,16 @@ impl<'a> Renderer<'a> {
         let (device, scene) = (&self.device, self.scene);
         let (lighting, kept) = (&self.lighting, self.kept.as_ref());
         let projection = Projection::new(scene, view)?;
+        let lights = light_buffers(device, scene, lighting, &projection)?;
         let seen = (&projection, self.samples);
-        let relief = Relief::new(device, kept, scene, lighting, &self.textures, seen)?;
+        let shared = (&self.textures, &lights);
+        let relief = Relief::new(device, kept, scene, lighting, shared, seen)?;
         let rest = relief.as_ref().map(|r| &r.mesh.rest);
-        self.mesh = Mesh::new(device, scene, lighting, &projection, rest)?;
+        let is_lit = lights.counts[0] > 0;
+        let mesh = Mesh::new(device, scene, lighting, &projection, (rest, is_lit))?;
+        self.bound = self.textures.bind(&self.shade, &lights, &mesh.lit)?;
+        self.lights = lights;
+        self.mesh = mesh;
         self.relief = relief;
         self.projection = projection;
         self.view = *view;
@@ -208,9 +224,9 @@ impl<'a> Renderer<'a> {
         drawn: impl FnOnce(),
     ) {
         let part = self.lighting.part;
-        let plain = self
-            .mesh
-            .draws(self.scene, &self.textures, &self.projection, tile, part);
+        let seen = (&self.projection, tile);
+        let counts = self.lights.counts;
+        let plain = self.mesh.draws(self.scene, &self.bound, seen, part, counts);
         self.shade.record(
             cmd,
             target,
@@ -225,7 +241,8 @@ impl<'a> Renderer<'a> {
             || {
                 if let Some(relief) = &self.relief {
                     let place = (tile, samples);
-                    relief.record(cmd, self.scene, &self.lighting, &self.projection, place);
+                    let seen = (&self.projection, &self.lights);
+                    relief.record(cmd, self.scene, &self.lighting, seen, place);
                 }
                 drawn();
             },
