@@ -47,7 +47,7 @@ impl Footprints {
             .iter()
             .map(|uv| {
                 let area = area(uv);
-                if !(area < 1.0) {
+                if area >= 1.0 || !area.is_finite() {
                     return NONE;
                 }
                 let home = (middle(uv) + SAME).floor();

@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use bytemuck::Zeroable;
 use glam::{DVec2, Vec3};
 use serde::Serialize;
 
@@ -16,6 +17,7 @@ use crate::directions::Directions;
 use crate::elements::Elements;
 use crate::error::Result;
 use crate::passes::relief_visibility::ReliefVisibility;
+use crate::passes::types::{MesoTexel, TextureFacet};
 use crate::scene::Scene;
 use crate::vk::Device;
 
@@ -69,8 +71,19 @@ pub struct Relief {
     pub scale: Vec<Vec3>,
     pub responses: Vec<Response>,
     pub classes: Vec<Class>,
+    /// Where the elements lie in their textures; `paper` transport alone.
+    pub texels: Option<Texels>,
     /// Most of what reaches any relief, the same light over all of its tile, that leaves it again.
     pub highest_albedo: f32,
+}
+
+/// Normals and reflectance that the pixels of an item buffer look up.
+#[derive(Debug, Clone, Default)]
+pub struct Texels {
+    /// `[element]` in the elements' own order; zero for one without relief.
+    pub elements: Vec<MesoTexel>,
+    /// Those of each tile's height field after those of the last.
+    pub facets: Vec<TextureFacet>,
 }
 
 /// Bytes of all responses at most, unless each tile has but one.
@@ -93,6 +106,38 @@ pub struct Class {
     pub reflectance: [f32; 3],
     pub albedo: [f32; 3],
     pub visibility_from_cache: bool,
+}
+
+impl Texels {
+    /// A tile, whose members have these texture coordinates.
+    fn add(&mut self, directions: &Directions, tile: &Tile, coordinates: &[[DVec2; 3]]) {
+        let first = self.facets.len() as u32;
+        let shading = &tile.shading;
+        let facets = shading.normals.iter().zip(&shading.reflectance);
+        self.facets.extend(facets.map(|(normal, &reflectance)| {
+            let above = (0..directions.count())
+                .filter(|&k| normal.dot(directions.centre(k)) > 0.0)
+                .fold(0_u64, |bits, k| bits | 1 << k);
+            TextureFacet {
+                reflectance,
+                above_low: above as u32,
+                above_high: (above >> 32) as u32,
+            }
+        }));
+        for (&e, uv) in tile.members.iter().zip(coordinates) {
+            // Near the origin, where f32 is finest.
+            let home = uv[0].floor();
+            let [uv_a, uv_b, uv_c] = uv.map(|p| (p - home).as_vec2());
+            self.elements[e] = MesoTexel {
+                uv_a,
+                uv_b,
+                uv_c,
+                first,
+                columns: tile.field.columns,
+                rows: tile.field.rows,
+            };
+        }
+    }
 }
 
 impl Relief {
@@ -120,6 +165,10 @@ impl Relief {
             scale: vec![Vec3::ZERO; count],
             responses: Vec::new(),
             classes: Vec::new(),
+            texels: (options.transport == Transport::Paper).then(|| Texels {
+                elements: vec![MesoTexel::zeroed(); count],
+                facets: Vec::new(),
+            }),
             highest_albedo: 0.0,
         };
         let k = options.directions.count();
@@ -198,6 +247,9 @@ impl Relief {
             }
             let albedo = whole.highest_albedo(&options.directions);
             relief.highest_albedo = relief.highest_albedo.max(highest * albedo);
+            if let Some(texels) = &mut relief.texels {
+                texels.add(&options.directions, tile, &coordinates);
+            }
             relief.classes.push(Class {
                 material: material.name.clone(),
                 tile: tile.size.to_array(),
@@ -235,6 +287,9 @@ impl Relief {
         apply(&mut self.tangent, order);
         apply(&mut self.bitangent, order);
         apply(&mut self.scale, order);
+        if let Some(texels) = &mut self.texels {
+            apply(&mut texels.elements, order);
+        }
     }
 
     pub fn response(&self, element: usize) -> &Response {
