@@ -51,6 +51,7 @@ fn spirv() -> BTreeSet<Vec<u32>> {
         shaders::MEASURE_COMP,
         shaders::BIN_RECEIVERS_COMP,
         shaders::BIN_TO_RELIEF_COMP,
+        shaders::PIXELS_TO_RELIEF_COMP,
         shaders::ITEM_BUFFER_VERT,
         shaders::RELIEF_FRAG,
         shaders::RELIEF_RAYS_COMP,
@@ -107,6 +108,8 @@ fn rust_and_glsl_agree() {
     check!(true, Draw: index_count instance_count first_index vertex_offset first_instance);
     check!(true, MesoElement: tangent response bitangent scale);
     check!(true, Reflected: sum error);
+    check!(true, MesoTexel: uv_a uv_b uv_c first columns rows);
+    check!(true, TextureFacet: reflectance above_low above_high);
     check!(true, Prism: low_a low_b low_c high_a high_b high_c uv_a uv_b uv_c light_a light_b light_c surface
         tangent texel bitangent normal first_cluster cluster_count slots);
     check!(true, ParallelLight: towards fluence_a fluence_b fluence_c);

@@ -81,6 +81,23 @@ struct MesoElement {
     vec3 scale;         // its own reflectance over the tile's mean
 };
 
+// Where an element with a relief lies in its texture.
+struct MesoTexel {
+    vec2 uv_a;
+    vec2 uv_b;
+    vec2 uv_c;
+    uint first;         // facet of the texture among those of all textures
+    uint columns;
+    uint rows;
+};
+
+// A facet of a texture, as the pixel estimator looks it up.
+struct TextureFacet {
+    vec3 reflectance;
+    uint above_low;     // a bit for each of the first 32 directions less than 90° from its normal
+    uint above_high;    // of the others
+};
+
 // Reflected radiosity of an element with a relief, with the rounding error of its last sum.
 struct Reflected {
     vec3 sum;

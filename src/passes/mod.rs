@@ -8,6 +8,7 @@ pub mod cull;
 pub mod item_buffer;
 pub mod measure;
 pub mod measure_relief;
+pub mod pixels_relief;
 pub mod relief;
 pub mod relief_buffers;
 pub mod relief_rays;

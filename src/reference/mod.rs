@@ -5,6 +5,7 @@ pub mod bin_receivers;
 pub mod cull;
 pub mod item_buffer;
 pub mod measure;
+pub mod pixels_relief;
 pub mod relief_rays;
 pub mod relief_visibility;
 pub mod select;

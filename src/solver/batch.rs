@@ -13,6 +13,7 @@ use crate::passes::cull::Cull;
 use crate::passes::item_buffer::ItemBuffer;
 use crate::passes::measure::Measure;
 use crate::passes::measure_relief::MeasureRelief;
+use crate::passes::pixels_relief::{self, PixelsRelief};
 use crate::passes::relief_buffers::ReliefBuffers;
 use crate::passes::select::{Parameters, Select};
 use crate::passes::send_relief::SendRelief;
@@ -78,7 +79,13 @@ enum Bin {
 struct ReliefPasses {
     measure: MeasureRelief,
     send: SendRelief,
-    bin: BinRelief,
+    bin: ReliefBin,
+}
+
+#[allow(clippy::large_enum_variant)] // as `Bin`
+enum ReliefBin {
+    Receivers(BinRelief),
+    Pixels(PixelsRelief),
 }
 
 struct Sets {
@@ -95,9 +102,14 @@ enum BinSets {
     Relief {
         measure: DescriptorSet,
         send: DescriptorSet,
-        bin: ReliefSets,
+        bin: ReliefBinSets,
     },
     Pixels(bin_pixels::Buffers),
+}
+
+enum ReliefBinSets {
+    Receivers(ReliefSets),
+    Pixels(pixels_relief::Buffers),
 }
 
 const STAMPS: u32 = 5;
@@ -122,13 +134,16 @@ impl BatchLoop {
             cull: Cull::new(device, settings.culling)?,
             item_buffer,
             bin: match (settings.estimator, relief) {
-                (Estimator::Receiver, Some(_)) => Bin::Relief(ReliefPasses {
+                (estimator, Some(_)) => Bin::Relief(ReliefPasses {
                     measure: MeasureRelief::new(device)?,
                     send: SendRelief::new(device)?,
-                    bin: BinRelief::new(device)?,
+                    bin: match estimator {
+                        Estimator::Receiver => ReliefBin::Receivers(BinRelief::new(device)?),
+                        Estimator::Pixel => ReliefBin::Pixels(PixelsRelief::new(device)?),
+                    },
                 }),
                 (Estimator::Receiver, None) => Bin::Receivers(BinReceivers::new(device)?),
-                (Estimator::Pixel, _) => Bin::Pixels(BinPixels::new(device)?),
+                (Estimator::Pixel, None) => Bin::Pixels(BinPixels::new(device)?),
             },
         };
         let sets = Sets {
@@ -141,7 +156,14 @@ impl BatchLoop {
                 (Bin::Relief(passes), Some(relief)) => BinSets::Relief {
                     measure: passes.measure.bind(scene, state, relief)?,
                     send: passes.send.bind(scene, &batch, relief)?,
-                    bin: passes.bin.bind(scene, state, &batch, relief)?,
+                    bin: match &passes.bin {
+                        ReliefBin::Receivers(bin) => {
+                            ReliefBinSets::Receivers(bin.bind(scene, state, &batch, relief)?)
+                        }
+                        ReliefBin::Pixels(bin) => {
+                            ReliefBinSets::Pixels(bin.bind(device, scene, state, &batch, relief)?)
+                        }
+                    },
                 },
                 (Bin::Relief(_), None) => unreachable!("made for a scene with relief"),
                 (Bin::Pixels(bin), _) => BinSets::Pixels(bin.bind(device, scene, state, &batch)?),
@@ -196,7 +218,15 @@ impl BatchLoop {
                     }
                     (Bin::Relief(passes), BinSets::Relief { bin, .. }) => {
                         if let Some(relief) = relief {
-                            passes.bin.record(cmd, bin, relief, &batch);
+                            match (&passes.bin, bin) {
+                                (ReliefBin::Receivers(pass), ReliefBinSets::Receivers(sets)) => {
+                                    pass.record(cmd, sets, relief, &batch);
+                                }
+                                (ReliefBin::Pixels(pass), ReliefBinSets::Pixels(buffers)) => {
+                                    pass.record(cmd, buffers, relief, &batch);
+                                }
+                                _ => unreachable!("passes and sets are made of one estimator"),
+                            }
                         }
                     }
                     (Bin::Pixels(bin), BinSets::Pixels(buffers)) => {

@@ -152,11 +152,6 @@ impl Solver {
         settings: &Settings,
     ) -> Result<Self> {
         settings.check()?;
-        if settings.estimator == Estimator::Pixel && elements.relief.is_some() {
-            return Err(Error::Usage(
-                "--estimator pixel knows no directions: use --transport lambert or --estimator receiver".into(),
-            ));
-        }
         let start = Instant::now();
         let (sources, connections) =
             sources::build(&mut elements, lights, &settings.grouping, settings.seed);
@@ -169,7 +164,10 @@ impl Solver {
         let relief = elements
             .relief
             .as_ref()
-            .map(|relief| ReliefBuffers::new(device, &elements, relief, &sources, slots))
+            .map(|relief| {
+                let by_pixel = settings.estimator == Estimator::Pixel && relief.texels.is_some();
+                ReliefBuffers::new(device, &elements, relief, &sources, slots, by_pixel)
+            })
             .transpose()?;
         let emitted_power: f64 = sources
             .list
