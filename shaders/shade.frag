@@ -59,7 +59,7 @@ vec3 straight() {
         float square = dot(way, way);
         vec3 towards = way * inversesqrt(square);
         float arrives = arriving(light, towards, dot(normal, towards), square);
-        if (arrives > 0.0 && !blocked(from, end_of_way(light), 0.0)) {
+        if (arrives > 0.0 && (t.open == 1 || !blocked(from, end_of_way(light), 0.0))) {
             sum += light.strength * arrives;
         }
     }

@@ -117,7 +117,7 @@ fn rust_and_glsl_agree() {
     check!(true, ShadowNode: low skip high first count);
     check!(true, ShadowTriangle: a b c relief);
     check!(true, ShadowRay: from clear to);
-    check!(true, LitTriangle: a b c normal_a normal_b normal_c plane above);
+    check!(true, LitTriangle: a b c normal_a normal_b normal_c plane above open);
     check!(true, ReliefSurface: lowest top mean columns rows rank first_factor slope);
     check!(true, HeightTile: first width height top highest);
     check!(true, HeightRay: from tile to);

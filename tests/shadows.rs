@@ -16,7 +16,10 @@ use mesolux::passes::shadow_rays::{ShadowRays, ShadowTree};
 use mesolux::passes::types::{ShadowRay, ShadowTriangle};
 use mesolux::path_tracer::{PathTracer, Settings as Paths};
 use mesolux::reference;
-use mesolux::render::{Comparison, Direct, Light, Lighting, Picture, View, render, side_by_side};
+use mesolux::render::{
+    Comparison, Direct, Light, Lighting, Picture, ReliefShading, Renderer, SAMPLES, View, render,
+    side_by_side,
+};
 use mesolux::scene::{Camera, Material, PointLight, Scene, displace};
 use mesolux::solution::Solution;
 use mesolux::solver::Settings;
@@ -343,6 +346,61 @@ fn contacts_leak_no_light_and_surfaces_do_not_shadow_themselves() {
     }
     println!("{dark} dark and {lit} lit pixels");
     assert!(dark > 100 && lit > 1000);
+    assert_silent();
+}
+
+/// The least share of open triangles: of a wall's 4 × 4 cells the inner four touch no other wall, which would count as hiding
+/// the lamp; the block's and the ball's shadows take a few of them.
+const OPEN: f64 = 0.15;
+
+/// Ways that nothing stands on are not followed, and the picture is the same to the bit; what the block or a card's shadow
+/// falls on is not open, however many lamps there are.
+#[test]
+fn open_triangles_follow_no_ways() {
+    let camera = camera(DVec3::new(1.9, 1.2, 1.9), DVec3::new(1.0, 0.2, 0.8), 75.0);
+    let mut plain_ball = ball(6);
+    for material in &mut plain_ball.materials {
+        material.map_height = None;
+    }
+    let mut two_lamps = room(false, 0.3);
+    two_lamps.point_lights.push(PointLight {
+        name: "test".into(),
+        position: DVec3::new(1.7, 1.2, 1.6),
+        intensity: [0.3; 3],
+    });
+    for (name, scene) in [
+        ("a lamp", &room(false, 0.3)),
+        ("a point besides", &two_lamps),
+        ("a ball", &plain_ball),
+    ] {
+        let solution = baked(scene);
+        let lighting = Lighting {
+            part: Light::Direct,
+            shading: ReliefShading::None,
+            ..Lighting::from(&solution)
+        };
+        let [with, without] = [true, false].map(|skip_open| {
+            let lighting = Lighting {
+                skip_open,
+                ..lighting
+            };
+            let device = device();
+            let renderer = Renderer::new(&device, scene, lighting, &view(&camera), SAMPLES);
+            let renderer = renderer.expect("a picture");
+            (
+                renderer.picture().expect("a picture"),
+                renderer.open_triangles(),
+            )
+        });
+        let [open, all] = with.1;
+        println!("{name}: {open} of {all} triangles are open");
+        assert!(
+            with.0.radiance == without.0.radiance,
+            "{name}: another picture"
+        );
+        assert!(open as f64 > OPEN * all as f64 && open < all);
+        assert_eq!(without.1, [0, all]);
+    }
     assert_silent();
 }
 

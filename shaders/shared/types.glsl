@@ -218,4 +218,5 @@ struct LitTriangle {
     vec3 normal_c;
     vec3 plane;         // its own normal
     float above;        // what rays start above it
+    uint open;          // 1: nothing stands between it and the lights
 };

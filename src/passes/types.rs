@@ -332,6 +332,8 @@ pub struct LitTriangle {
     pub plane: Vec3,
     /// What rays start above it.
     pub above: f32,
+    /// 1: nothing stands between it and the lights.
+    pub open: u32,
 }
 
 /// A relief as it is drawn.

@@ -132,6 +132,9 @@ pub struct Lighting<'a> {
     pub shading: ReliefShading,
     pub direct: Direct,
     pub show: Show,
+    /// Whether samples of plain triangles that nothing stands between and the lights follow no ways to light points: quicker,
+    /// and the same picture.
+    pub skip_open: bool,
     /// Folder that keeps the visibility of reliefs from run to run.
     pub cache: Option<&'a Path>,
 }
@@ -146,6 +149,7 @@ impl<'a> Lighting<'a> {
             shading: ReliefShading::default(),
             direct: Direct::default(),
             show: Show::default(),
+            skip_open: true,
             cache: None,
         }
     }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::shafts::Shafts;
 use super::{Lighting, Projection};
 use crate::constants::{KIND_POINT, KIND_SURFACE, LIGHT_POINTS, LIGHT_SETS};
 use crate::error::Result;
@@ -111,7 +112,7 @@ impl Shining {
     }
 }
 
-/// The scene's light points and what casts shadows before them; nothing where no light is drawn sharply.
+/// The scene's light points and what casts shadows before them, on the device and, where any light is drawn sharply, as shafts.
 ///
 /// All is taken from the eye, rounded as what is drawn is: a place that is drawn is as near to what casts its shadow as to
 /// itself.
@@ -123,7 +124,7 @@ pub fn light_buffers(
     scene: &Scene,
     lighting: &Lighting<'_>,
     projection: &Projection,
-) -> Result<LightBuffers> {
+) -> Result<(LightBuffers, Option<Shafts>)> {
     let points: Vec<_> = if lighting.sharp() {
         shining(scene)
             .iter()
@@ -132,12 +133,18 @@ pub fn light_buffers(
     } else {
         Vec::new()
     };
-    let tree = if points.is_empty() {
-        ShadowTree::default()
+    if points.is_empty() {
+        let none = LightBuffers::new(device, &points, &ShadowTree::default())?;
+        return Ok((none, None));
+    }
+    let tree = ShadowTree::new(casters(scene, lighting, projection));
+    let buffers = LightBuffers::new(device, &points, &tree)?;
+    let shafts = if lighting.skip_open {
+        Shafts::new(tree, scene, projection)
     } else {
-        ShadowTree::new(casters(scene, lighting, projection))
+        Shafts::closed()
     };
-    LightBuffers::new(device, &points, &tree)
+    Ok((buffers, Some(shafts)))
 }
 
 /// Every triangle, those with relief at its mean height.

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::projection::{self, Projection, Tile};
 use super::relief_mesh::FlatRelief;
+use super::shafts::Shafts;
 use super::textures::Bound;
 use super::{Light, Lighting, corner_irradiance};
 use crate::corners::Corners;
@@ -23,6 +24,8 @@ pub struct Mesh {
     pub indices: Buffer,
     /// As light points light them, `[drawn triangle]`; none where they do not.
     pub lit: Buffer,
+    /// Of the lit triangles those that nothing stands between and the lights, and all.
+    pub open: [usize; 2],
     /// First vertex, count.
     ranges: Vec<(Kind, u32, u32)>,
 }
@@ -36,13 +39,20 @@ enum Kind {
     Back,
 }
 
+impl Kind {
+    /// By light points.
+    fn is_lit(self) -> bool {
+        matches!(self, Self::Front(_))
+    }
+}
+
 impl Mesh {
     pub fn new(
         device: &Arc<Device>,
         scene: &Scene,
         lighting: &Lighting<'_>,
         projection: &Projection,
-        (rest, is_lit): (Option<&FlatRelief>, bool),
+        (rest, shafts): (Option<&FlatRelief>, Option<&Shafts>),
     ) -> Result<Self> {
         let far = |e: usize| rest.and_then(|rest| rest.far.get(&e));
         let smooth = corner_irradiance(scene, &lighting.baked());
@@ -81,16 +91,17 @@ impl Mesh {
             ranges.push((same[0].0, first, count));
             first += count;
         }
-        let lit = if is_lit {
-            lit_triangles(scene, &order, &vertices)
-        } else {
-            Vec::new()
-        };
+        let lit = shafts.map_or_else(Vec::new, |shafts| {
+            lit_triangles(scene, &order, &vertices, shafts)
+        });
+        let fronts = order.iter().filter(|(kind, _)| kind.is_lit()).count();
+        let open = lit.iter().filter(|t| t.open == 1).count();
         let indices: Vec<u32> = (0..vertices.len() as u32).collect();
         Ok(Self {
             vertices: upload(device, "shade vertices", &vertices, BufferUse::Geometry)?,
             indices: upload(device, "shade indices", &indices, BufferUse::Geometry)?,
             lit: upload(device, "lit triangles", &lit, BufferUse::Storage)?,
+            open: [open, if lit.is_empty() { 0 } else { fronts }],
             ranges,
         })
     }
@@ -132,12 +143,17 @@ impl Mesh {
 const ABOVE: f32 = 1.0 / (1 << 18) as f32;
 
 /// `vertices` are those of the triangles of `order`.
-fn lit_triangles(scene: &Scene, order: &[(Kind, usize)], vertices: &[Vertex]) -> Vec<LitTriangle> {
+fn lit_triangles(
+    scene: &Scene,
+    order: &[(Kind, usize)],
+    vertices: &[Vertex],
+    shafts: &Shafts,
+) -> Vec<LitTriangle> {
     let neighbours = Corners::new(scene);
     order
         .par_iter()
         .zip(vertices.par_chunks(3))
-        .map(|(&(_, e), drawn)| {
+        .map(|(&(kind, e), drawn)| {
             let triangle = &scene.triangles[e];
             let plane = neighbours.normals[e];
             let [normal_a, normal_b, normal_c] = triangle.vertices.map(|vertex| {
@@ -147,7 +163,7 @@ fn lit_triangles(scene: &Scene, order: &[(Kind, usize)], vertices: &[Vertex]) ->
             });
             let [a, b, c] = [0, 1, 2].map(|k| drawn[k].position);
             let furthest = a.abs().max(b.abs()).max(c.abs()).max_element();
-            LitTriangle {
+            let mut lit = LitTriangle {
                 a,
                 b,
                 c,
@@ -156,7 +172,10 @@ fn lit_triangles(scene: &Scene, order: &[(Kind, usize)], vertices: &[Vertex]) ->
                 normal_c,
                 plane: plane.as_vec3(),
                 above: ABOVE * furthest,
-            }
+                open: 0,
+            };
+            lit.open = (kind.is_lit() && shafts.is_open(&lit)).into();
+            lit
         })
         .collect()
 }

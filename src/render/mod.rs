@@ -21,6 +21,7 @@ mod relief;
 mod relief_mesh;
 mod relief_scene;
 mod renderer;
+mod shafts;
 mod slots;
 mod smooth;
 mod textures;

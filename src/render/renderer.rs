@@ -62,13 +62,13 @@ impl<'a> Renderer<'a> {
         let shade = Shade::new(device)?;
         let textures = Textures::new(device, scene)?;
         let kept = ReliefScene::new(device, &shade, scene, &lighting)?;
-        let lights = light_buffers(device, scene, &lighting, &projection)?;
+        let (lights, shafts) = light_buffers(device, scene, &lighting, &projection)?;
         let seen = (&projection, samples);
         let shared = (&textures, &lights);
         let relief = Relief::new(device, kept.as_ref(), scene, &lighting, shared, seen)?;
         let rest = relief.as_ref().map(|r| &r.mesh.rest);
-        let is_lit = lights.counts[0] > 0;
-        let mesh = Mesh::new(device, scene, &lighting, &projection, (rest, is_lit))?;
+        let rest = (rest, shafts.as_ref());
+        let mesh = Mesh::new(device, scene, &lighting, &projection, rest)?;
         Ok(Self {
             bound: textures.bind(&shade, &lights, &mesh.lit)?,
             lights,
@@ -95,13 +95,13 @@ impl<'a> Renderer<'a> {
         let (device, scene) = (&self.device, self.scene);
         let (lighting, kept) = (&self.lighting, self.kept.as_ref());
         let projection = Projection::new(scene, view)?;
-        let lights = light_buffers(device, scene, lighting, &projection)?;
+        let (lights, shafts) = light_buffers(device, scene, lighting, &projection)?;
         let seen = (&projection, self.samples);
         let shared = (&self.textures, &lights);
         let relief = Relief::new(device, kept, scene, lighting, shared, seen)?;
         let rest = relief.as_ref().map(|r| &r.mesh.rest);
-        let is_lit = lights.counts[0] > 0;
-        let mesh = Mesh::new(device, scene, lighting, &projection, (rest, is_lit))?;
+        let rest = (rest, shafts.as_ref());
+        let mesh = Mesh::new(device, scene, lighting, &projection, rest)?;
         self.bound = self.textures.bind(&self.shade, &lights, &mesh.lit)?;
         self.lights = lights;
         self.mesh = mesh;
@@ -183,6 +183,12 @@ impl<'a> Renderer<'a> {
                 Ok(stamps.intervals()?[0])
             })
             .collect()
+    }
+
+    /// Of the plain triangles that light points light, those that nothing stands between and the lights, see
+    /// [`Lighting::skip_open`], and all.
+    pub fn open_triangles(&self) -> [usize; 2] {
+        self.mesh.open
     }
 
     /// The share of the pixels of such a frame that show relief by rays.
