@@ -4,35 +4,23 @@ mod common;
 
 use std::path::PathBuf;
 
-use common::{Build, assert_silent, device};
+use common::{Build, assert_silent, device, show};
 use glam::DVec3;
 use mesolux::bake::bake;
+use mesolux::bench::pictures::Reference;
+use mesolux::bench::relief_room::{self, REPEAT, TEXELS, bumps};
 use mesolux::directions::Directions;
 use mesolux::meso::{Options, Transport};
-use mesolux::path_tracer::{PathTracer, Settings as Paths};
-use mesolux::render::{
-    Comparison, Light, Lighting, Picture, ReliefShading, View, render, side_by_side,
-};
+use mesolux::path_tracer::PathTracer;
+use mesolux::render::{Comparison, Light, Lighting, ReliefShading, View, render};
 use mesolux::scene::{Camera, Scene, displace};
 use mesolux::solution::Solution;
 use mesolux::solver::Settings;
 
 /// Pixels a side of the pictures.
 const SIDE: u32 = 48;
-/// Scene units of a repeat of the relief.
-const REPEAT: f64 = 0.25;
-const TEXELS: u32 = 32;
 /// Paths of each pixel. Their noise is known and taken off.
 const PATHS: u32 = 96;
-
-fn bumps(x: f64, y: f64) -> f64 {
-    let apart = |a: f64, c: f64| a - c - (a - c).round();
-    let bump = |cx: f64, cy: f64, r: f64| {
-        let q = apart(x, cx).hypot(apart(y, cy)) / r;
-        (1.0 - q * q).max(0.0).powi(2)
-    };
-    0.12 * (1.2 * bump(0.3, 0.3, 0.3) + bump(0.8, 0.7, 0.22))
-}
 
 /// What was promised of the program's pictures of relief: relMSE less the reference's noise, and bias.
 const PROMISED_REL_MSE: f64 = 5e-3;
@@ -65,7 +53,7 @@ fn room() -> Scene {
     let lamp = build.material(0.0, 10.0);
     let floor = build.material(0.0, 0.0);
     build.scene.materials[floor as usize].kd = [0.3, 0.5, 0.8];
-    build.relief(floor, TEXELS, |x, y| REPEAT * bumps(x, y));
+    build.relief(floor, TEXELS, |x, y| 0.12 * REPEAT * bumps(x, y));
     let sides = build.room(DVec3::ZERO, DVec3::splat(2.0), 16, white);
     build.uv(sides[0].clone(), DVec3::Z * REPEAT, DVec3::X * REPEAT);
     for t in &mut build.scene.triangles[sides[0].clone()] {
@@ -82,19 +70,6 @@ fn room() -> Scene {
     let corner = DVec3::new(1.98, 0.5, 0.7);
     build.quad(corner, DVec3::Z * 0.7, DVec3::Y * 0.7, (3, 3), lamp);
     build.scene
-}
-
-/// Of the floor alone, so many degrees from straight above.
-fn camera(angle: f64, distance: f64, fov_y: f64) -> Camera {
-    let (s, c) = angle.to_radians().sin_cos();
-    let look_at = DVec3::new(1.0, 0.0, 1.0);
-    Camera {
-        name: format!("{angle} degrees"),
-        position: look_at + distance * (s * DVec3::new(0.6, 0.0, 0.8) + c * DVec3::Y),
-        look_at,
-        up: DVec3::Y,
-        fov_y,
-    }
 }
 
 fn view(camera: &Camera) -> View<'_> {
@@ -119,52 +94,22 @@ fn baked(scene: &Scene, k: u32, cache: PathBuf) -> Solution {
     bake(&device(), scene, &settings, |_| true).expect("the device solves the scene")
 }
 
-/// The truth, and what [`Comparison::rel_mse`] tells of a perfect picture for the noise in it.
-fn reference(tracer: &PathTracer<'_>, camera: &Camera, light: Light) -> (Picture, f64) {
-    let settings = Paths {
-        paths: PATHS,
-        light,
-        ..Paths::default()
-    };
-    let film = tracer
-        .render(&view(camera), &settings, |_| true)
-        .expect("a picture");
-    let picture = film.picture();
-    let values = picture.radiance.as_flattened();
-    let mean = values.iter().map(|&v| f64::from(v)).sum::<f64>() / values.len() as f64;
-    let noise = film
-        .standard_error()
-        .iter()
-        .flat_map(|e| (e * e).to_array())
-        .zip(values)
-        .map(|(variance, &b)| variance / (f64::from(b).powi(2) + (0.01 * mean).powi(2)))
-        .sum::<f64>()
-        / values.len() as f64;
-    (picture, noise)
-}
-
-/// Where pictures are written to be looked at, if anywhere.
-fn show(name: &str, ours: &Picture, reference: &Picture) {
-    if let Some(folder) = std::env::var_os("MESOLUX_TEST_PICTURES") {
-        let path = std::path::Path::new(&folder).join(format!("{name}.png"));
-        side_by_side(ours, reference)
-            .and_then(|picture| picture.write(&path, None))
-            .expect("a picture file");
-    }
-}
-
 #[test]
 fn pictures_are_those_of_the_displaced_scene_within_a_slot() {
     let folder = tempfile::tempdir().expect("a folder for the test");
     let scene = room();
     let fine = displace(&scene);
     let tracer = PathTracer::new(&fine).expect("the scene is good");
-    let cameras = [camera(20.0, 1.0, 30.0), camera(70.0, 0.9, 16.0)];
+    // Of the floor alone.
+    let middle = DVec3::new(1.0, 0.0, 1.0);
+    let cameras = [(20.0, 1.0, 30.0), (70.0, 0.9, 16.0)]
+        .map(|(angle, distance, fov_y)| relief_room::camera(middle, angle, distance, fov_y));
     let solutions = [16, 64].map(|k| (k, baked(&scene, k, folder.path().to_owned())));
     let mut failures = Vec::new();
     for camera in &cameras {
         for part in [Light::Global, Light::Direct, Light::Indirect] {
-            let (truth, noise) = reference(&tracer, camera, part);
+            let truth = Reference::new(&tracer, &view(camera), part, PATHS).expect("a picture");
+            let (truth, noise) = (&truth.picture, truth.noise());
             for (k, solution) in &solutions {
                 let lighting = Lighting {
                     part,
@@ -174,7 +119,7 @@ fn pictures_are_those_of_the_displaced_scene_within_a_slot() {
                 };
                 let picture =
                     render(&device(), &scene, lighting, &view(camera)).expect("a picture");
-                let found = Comparison::new(&picture, &truth).expect("alike in size");
+                let found = Comparison::new(&picture, truth).expect("alike in size");
                 let rel_mse = found.rel_mse - noise;
                 let at = format!("K {k} {} {part:?}", camera.name);
                 println!(
@@ -182,7 +127,7 @@ fn pictures_are_those_of_the_displaced_scene_within_a_slot() {
                     100.0 * found.bias,
                     100.0 * found.rms
                 );
-                show(&at, &picture, &truth);
+                show(&at, &picture, truth);
                 let added = if part == Light::Direct {
                     PENUMBRA
                 } else {

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use common::{Build, assert_silent, device};
+use common::{Build, assert_silent, device, show};
 use glam::{DVec3, Vec3};
 use mesolux::bake::bake;
 use mesolux::bench::pictures::{self, Reference};
@@ -17,7 +17,7 @@ use mesolux::directions::Directions;
 use mesolux::meso::{Options, Transport};
 use mesolux::path_tracer::PathTracer;
 use mesolux::render::{
-    Comparison, Light, Lighting, Picture, ReliefShading, SAMPLES, Show, View, render, side_by_side,
+    Comparison, Light, Lighting, Picture, ReliefShading, SAMPLES, Show, View, render,
 };
 use mesolux::scene::{Camera, Scene, Texture, displace};
 use mesolux::solution::{Bake, Origin, Solution};
@@ -112,16 +112,6 @@ fn cover(
         for uv in &mut t.uv {
             *uv = uv.map(|x| x + 0.5 / TEXELS as f32);
         }
-    }
-}
-
-/// Where pictures are written to be looked at, if anywhere.
-fn show(name: &str, ours: &Picture, reference: &Picture) {
-    if let Some(folder) = std::env::var_os("MESOLUX_TEST_PICTURES") {
-        let path = std::path::Path::new(&folder).join(format!("{name}.png"));
-        side_by_side(ours, reference)
-            .and_then(|picture| picture.write(&path, None))
-            .expect("a picture file");
     }
 }
 

@@ -7,9 +7,11 @@ use std::f64::consts::PI;
 use std::path::Path;
 use std::sync::OnceLock;
 
-use common::{Build, assert_silent, device};
+use common::{Build, assert_silent, device, show};
 use glam::{DVec3, Vec3};
 use mesolux::bake::bake;
+use mesolux::bench::pictures::Reference;
+use mesolux::bench::relief_room::{REPEAT, TEXELS, bumps, smooth_step};
 use mesolux::directions::Directions;
 use mesolux::meso::{Options, Transport};
 use mesolux::passes::shadow_rays::{ShadowRays, ShadowTree};
@@ -17,8 +19,7 @@ use mesolux::passes::types::{ShadowRay, ShadowTriangle};
 use mesolux::path_tracer::{PathTracer, Settings as Paths};
 use mesolux::reference;
 use mesolux::render::{
-    Comparison, Direct, Light, Lighting, Picture, ReliefShading, Renderer, SAMPLES, View, render,
-    side_by_side,
+    Comparison, Direct, Light, Lighting, ReliefShading, Renderer, SAMPLES, View, render,
 };
 use mesolux::scene::{Camera, Material, PointLight, Scene, displace};
 use mesolux::solution::Solution;
@@ -26,9 +27,6 @@ use mesolux::solver::Settings;
 
 /// Pixels a side of the pictures.
 const SIDE: u32 = 64;
-/// Scene units of a repeat of the reliefs, and its texels.
-const REPEAT: f64 = 0.25;
-const TEXELS: u32 = 32;
 const PATHS: u32 = 96;
 
 fn view(camera: &Camera) -> View<'_> {
@@ -72,16 +70,6 @@ fn baked(scene: &Scene) -> Solution {
     bake(&device(), scene, &settings, |_| true).expect("the device solves the scene")
 }
 
-/// Two bumps a repeat, in repeats.
-fn bumps(x: f64, y: f64) -> f64 {
-    let apart = |a: f64, c: f64| a - c - (a - c).round();
-    let bump = |cx: f64, cy: f64, r: f64| {
-        let q = apart(x, cx).hypot(apart(y, cy)) / r;
-        (1.0 - q * q).max(0.0).powi(2)
-    };
-    0.12 * (1.2 * bump(0.3, 0.3, 0.3) + bump(0.8, 0.7, 0.22))
-}
-
 /// A room whose floor has triangles of half its width, with a relief or none, a small lamp and a block on the floor.
 fn room(relief: bool, lamp_side: f64) -> Scene {
     let mut build = Build::new();
@@ -89,7 +77,7 @@ fn room(relief: bool, lamp_side: f64) -> Scene {
     let lamp = build.material(0.0, (4.0 / (lamp_side * lamp_side)) as f32);
     let floor = build.material(0.6, 0.0);
     if relief {
-        build.relief(floor, TEXELS, |x, y| REPEAT * bumps(x, y));
+        build.relief(floor, TEXELS, |x, y| 0.12 * REPEAT * bumps(x, y));
     }
     let sides = build.room(DVec3::ZERO, DVec3::splat(2.0), 4, white);
     // Corners of repeats in the middle of texels: `displace` cuts along the cells of the bilinear map.
@@ -145,25 +133,11 @@ fn compare(
     let picture = render(&device(), scene, lighting, &view(camera)).expect("a picture");
     let fine = displace(scene);
     let tracer = PathTracer::new(&fine).expect("the scene is good");
-    let paths = Paths {
-        paths: PATHS,
-        light: Light::Direct,
-        ..Paths::default()
-    };
-    let film = tracer
-        .render(&view(camera), &paths, |_| true)
-        .expect("a picture");
-    let reference = film.picture();
+    let reference = Reference::new(&tracer, &view(camera), Light::Direct, PATHS);
+    let reference = reference.expect("a picture");
+    let noise = reference.noise();
+    let reference = reference.picture;
     let found = Comparison::new(&picture, &reference).expect("alike in size");
-    let values = reference.radiance.as_flattened();
-    let mean = values.iter().map(|&v| f64::from(v)).sum::<f64>() / values.len() as f64;
-    let errors = film.standard_error();
-    let variance = errors.iter().flat_map(|e| (*e * *e).to_array());
-    let noise = variance
-        .zip(values)
-        .map(|(variance, &b)| variance / (f64::from(b).powi(2) + (0.01 * mean).powi(2)))
-        .sum::<f64>()
-        / values.len() as f64;
     show(&format!("{name} {direct:?}"), &picture, &reference);
     let rel_mse = found.rel_mse - noise;
     println!(
@@ -174,16 +148,6 @@ fn compare(
     Found {
         bias: found.bias,
         rms: found.rms,
-    }
-}
-
-/// Where pictures are written to be looked at, if anywhere.
-fn show(name: &str, ours: &Picture, reference: &Picture) {
-    if let Some(folder) = std::env::var_os("MESOLUX_TEST_PICTURES") {
-        let path = std::path::Path::new(&folder).join(format!("{name}.png"));
-        side_by_side(ours, reference)
-            .and_then(|picture| picture.write(&path, None))
-            .expect("a picture file");
     }
 }
 
@@ -223,14 +187,10 @@ fn ball(cells: u32) -> Scene {
     let dark = build.material(0.0, 0.0);
     let lamp = build.material(0.0, 100.0);
     let skin = build.material(0.7, 0.0);
-    let step = |x: f64| {
-        let x = x.clamp(0.0, 1.0);
-        x * x * (3.0 - 2.0 * x)
-    };
     // Even at its edges, where the texture meets itself turned.
-    let edge = |a: f64| step(8.0 * (0.5 - (a - 0.5).abs()) - 0.5);
+    let edge = |a: f64| smooth_step(8.0 * (0.5 - (a - 0.5).abs()) - 0.5);
     build.relief(skin, 2 * TEXELS, |x, y| {
-        0.5 * edge(x) * edge(y) * bumps(2.0 * x, 2.0 * y) * REPEAT
+        0.06 * edge(x) * edge(y) * bumps(2.0 * x, 2.0 * y) * REPEAT
     });
     build.room(DVec3::ZERO, DVec3::splat(2.0), 2, dark);
     build.quad(

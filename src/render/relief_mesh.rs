@@ -157,7 +157,7 @@ impl ReliefMesh {
             .map(|&m| (m as u32, corners_by_vertex(m)))
             .collect();
         let clusters =
-            clustered.map(|moments| FaceClusters::new(&vertices, &directions, moments, &faces));
+            clustered.map(|moments| FaceClusters::new(vertices, &directions, moments, &faces));
         let mut prisms = Vec::with_capacity(order.len());
         let mut mirrored = Vec::with_capacity(order.len());
         for (at, &(m, corners)) in faces.iter().enumerate() {
