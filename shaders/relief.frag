@@ -31,8 +31,10 @@ layout(scalar, binding = 6) readonly buffer Coefficients { Coefficient coefficie
 layout(scalar, binding = 7) readonly buffer Exits { vec3 exits[]; };
 
 layout(scalar, binding = 8) readonly buffer LightPoints { LightPoint light_points[]; };
-// Share of the light of light_points that reaches the vertex, [light vertex].
-layout(scalar, binding = 9) readonly buffer Shares { vec3 light_shares[]; };
+layout(scalar, binding = 9) readonly buffer Nodes { ShadowNode shadow_nodes[]; };
+layout(scalar, binding = 10) readonly buffer Triangles { ShadowTriangle shadow_triangles[]; };
+// By prism, where it is lit so.
+layout(scalar, binding = 11) readonly buffer ParallelLights { ParallelLight parallel_lights[]; };
 
 layout(push_constant, scalar) uniform Parameters {
     vec3 x;
@@ -42,19 +44,28 @@ layout(push_constant, scalar) uniform Parameters {
     vec3 reflectance;
     vec3 emitted;        // Le, W·m⁻²·sr⁻¹
     float metered;
+    uint light_count;    // of light_points; those of emitters come first
+    uint emitter_points;
     uint shading;
     uint view;
     float pixel;         // angle of a sample
     uvec2 cells;         // of the directions
-    uint light_count;    // of light_points; those of emitters come first
-    uint emitter_points;
 };
 
+uint march_steps = 0;
+#define ALL_STEPS march_steps
 #include "shared/height_march.glsl"
+#include "shared/light_points.glsl"
+#include "shared/shadow_rays.glsl"
 
 const float PI = 3.14159265358979;
 // Rays to lights begin so much of the relief's range above it.
 const float LIFT = 1e-4;
+// Shares of the relief's range by which a way to a light may leave the parabola that it is above a bent surface: taken for
+// straight, and by its chords, of which there are so many.
+const float STRAIGHT = 0.01;
+const float CHORD_OFF = 0.02;
+const float MOST_CHORDS = 4.0;
 // Shares of its size that a tetrahedron is padded by.
 const float PADDING = 2e-5;
 // Share of a prism's height that counts as its bottom; MARGIN of src/render/relief_mesh.rs lies below the relief.
@@ -217,37 +228,123 @@ vec3 facet_normal(Place place) {
     return normalize(place.slopes * vec3(-place.gradient, 1.0));
 }
 
-// Light straight from emitters and point lights on the surface at a place, by its own normal and shadowed by the relief.
-vec3 sharp(Prism p, ReliefSurface surface, Place place, vec3 at) {
-    vec3 facet = facet_normal(place);
+// The surface that a prism stands on, as ways to lights pass over it.
+struct Base {
+    mat3 shares;         // slopes of the corners' shares in space, an internal unit
+    mat3 axes;           // the corners' smooth normals, along which the relief rises
+    vec3 axis;           // at the place
+    vec3 normal;
+    float steepness;     // heights of an internal unit
+};
+
+Base base_of(Prism p, ReliefSurface surface, Place place) {
+    float middle = (surface.mean - surface.lowest) / (surface.top - surface.lowest);
+    vec3 a = mix(p.low_a, p.high_a, middle);
+    vec3 b = mix(p.low_b, p.high_b, middle) - a;
+    vec3 c = mix(p.low_c, p.high_c, middle) - a;
+    vec3 normal = cross(b, c);
+    float square = max(dot(normal, normal), 1e-30);
+    Base base;
+    vec3 of_b = cross(c, normal) / square;
+    vec3 of_c = cross(normal, b) / square;
+    base.shares = mat3(-of_b - of_c, of_b, of_c);
+    base.axes = mat3(normalize(p.high_a - p.low_a), normalize(p.high_b - p.low_b), normalize(p.high_c - p.low_c));
+    base.axis = normalize(base.axes * place.share);
+    base.normal = normal * inversesqrt(square);
+    base.steepness = (surface.top - surface.lowest) / length(p.high_a - p.low_a);
+    return base;
+}
+
+// Whether the relief itself stands on the way from a place to a light. `leaves` is where the way leaves the relief's shell
+// if nothing does, internal units.
+//
+// Over its own triangle the way is straight above the height map. Past it, the surface turns away from the way as the
+// smooth normals of the triangle tell, by triangles like this one, so that the way's height above it is a parabola: bumps
+// beyond a triangle's horizon still rise into the light, and the next triangle's do not shadow what they cannot.
+bool shadowed_by_relief(Prism p, ReliefSurface surface, Place place, Base base, vec3 towards, out float leaves) {
+    // Slopes over the triangle, not over the tetrahedron of the place, at whose borders they jump.
+    float out_of = dot(base.normal, towards) / dot(base.normal, base.axis);
+    vec3 tangential = towards - base.axis * out_of;
+    vec3 rates = tangential * base.shares;
+    vec3 local = vec3(rates.x * p.uv_a + rates.y * p.uv_b + rates.z * p.uv_c, out_of * base.steepness);
     float rise = surface.top - surface.lowest;
-    float height = place.height + LIFT * rise;
-    uvec2 pixel_at = uvec2(gl_FragCoord.xy) % 4;
-    uint turn = pixel_at.y * 4 + pixel_at.x;
+    vec3 from = vec3(place.uv, place.height + LIFT * rise);
+    float short_of = surface.top - from.z;
+    HeightHit hit;
+
+    // Find where the way leaves the triangle, how long it is over it, and how the surface bends along it.
+    vec3 ends = place.share / max(abs(rates), vec3(1e-12));
+    vec3 after = mix(vec3(NEVER), ends, lessThan(rates, vec3(0.0)));
+    vec3 before = mix(vec3(NEVER), ends, greaterThan(rates, vec3(0.0)));
+    float edge = max(min(min(after.x, after.y), after.z), 0.0);
+    float chord = edge + max(min(min(before.x, before.y), before.z), 0.0);
+    float bend = dot(base.axes * rates, tangential) * base.steepness;
+
+    leaves = local.z > 0.0 ? short_of / local.z : NEVER;
+    float past = leaves - edge;
+    bool straight = past <= 0.0 || local.z > 0.0 && abs(bend) * past * (past + chord) < 2.0 * STRAIGHT * rise;
+    if (straight) {
+        return march(tiles[p.surface], from, vec3(from.xy + local.xy * leaves, surface.top), hit);
+    }
+
+    // Past the edge the height is at_edge + slope x + bend x² / 2.
+    float at_edge = from.z + local.z * edge;
+    float slope = local.z + 0.5 * bend * chord;
+    float deepest = bend > 0.0 && slope < 0.0 ? at_edge - 0.5 * slope * slope / bend : at_edge;
+    if (deepest < surface.lowest || bend <= 0.0 && slope <= 0.0) {
+        return true;
+    }
+    float square = slope * slope + 2.0 * bend * (surface.top - at_edge);
+    // In a hollow the way may sink again before it is out: what shadows it then is the scene.
+    float root = sqrt(max(square, 0.0));
+    float run = slope > 0.0 && square > 0.0 ? 2.0 * (surface.top - at_edge) / (slope + root) : (root - slope) / bend;
+    leaves = edge + run;
+    vec3 last = vec3(from.xy + local.xy * edge, at_edge);
+    if (march(tiles[p.surface], from, last, hit)) {
+        return true;
+    }
+    // A chord of the parabola lies off it by bend / 8 times its length's square.
+    float chords = clamp(ceil(run * sqrt(abs(bend) / (8.0 * CHORD_OFF * rise))), 1.0, MOST_CHORDS);
+    for (float i = 1.0; i <= chords; i++) {
+        float x = run * i / chords;
+        vec3 next = vec3(from.xy + local.xy * (edge + x), at_edge + x * (slope + 0.5 * bend * x));
+        if (march(tiles[p.surface], last, next, hit)) {
+            return true;
+        }
+        last = next;
+    }
+    return false;
+}
+
+// Light straight from emitters and point lights on the surface at a place, by its own normal, shadowed by the relief and by
+// the rest of the scene.
+vec3 sharp(Prism p, ReliefSurface surface, Place place, vec3 at) {
+    uint samples = light_samples();
+    if (samples == 0) {
+        return vec3(0.0);
+    }
+    vec3 facet = facet_normal(place);
+    Base base = base_of(p, surface, place);
     vec3 sum = vec3(0.0);
-    uint emitters = emitter_points / LIGHT_TURNS;
-    for (uint i = 0; i < emitters + light_count - emitter_points; i++) {
-        bool emitter = i < emitters;
-        LightPoint light = light_points[emitter ? i * LIGHT_TURNS + turn : emitter_points + i - emitters];
+    for (uint i = 0; i < samples; i++) {
+        LightPoint light = light_of_sample(i);
         vec3 way = light.position - at;
         float square = dot(way, way);
         vec3 towards = way * inversesqrt(square);
-        vec3 local = towards * place.slopes;
-        float cosine = dot(facet, towards);
-        float sent = emitter ? float(LIGHT_TURNS) * max(-dot(light.normal, towards), 0.0) : 1.0;
-        if (local.z <= 0.0 || cosine <= 0.0 || sent == 0.0) {
+        float arrives = arriving(light, towards, dot(facet, towards), square);
+        if (arrives <= 0.0) {
             continue;
         }
-        vec3 from = vec3(place.uv, height);
-        vec3 to = vec3(place.uv + local.xy / local.z * (surface.top - height), surface.top);
-        HeightHit hit;
-        if (!march(tiles[p.surface], from, to, hit)) {
-            sum += light.strength * (sent * cosine / square);
+        float leaves;
+        if (!shadowed_by_relief(p, surface, place, base, towards, leaves)
+            && !blocked(at, end_of_way(light), leaves * inversesqrt(square))) {
+            sum += light.strength * arrives;
         }
     }
-    return sum * (place.share.x * light_shares[p.light_a] + place.share.y * light_shares[p.light_b]
-                + place.share.z * light_shares[p.light_c]);
+    return sum;
 }
+
+#include "shared/clusters.glsl"
 
 // E by the factors of the cell at a place, for the light of the three vertices.
 vec3 factored(Prism p, ReliefSurface surface, Place place) {
@@ -285,7 +382,7 @@ vec3 mean_sent(Prism p, vec3 share, vec3 to_eye) {
     return sum;
 }
 
-void main() {
+void draw() {
     // Nothing lies at the depth of 0, so that this is drawn nowhere.
     radiance = vec4(0.0);
     gl_FragDepth = 0.0;
@@ -330,15 +427,26 @@ void main() {
         shown = vec3((place.height - surface.lowest) / (surface.top - surface.lowest));
         break;
     case VIEW_IRRADIANCE:
-        shown = (factored(p, surface, place) + sharp(p, surface, place, at)) / PI;
+        shown = (factored(p, surface, place) + sharp(p, surface, place, at) + clustered(p, surface, place)) / PI;
+        break;
+    case VIEW_SLOTS:
+        shown = p.slots;
         break;
     default:
         shown = emitted;
         if (wide) {
             shown += mean_sent(p, place.share, -normalize(along)) / PI;
         } else {
-            shown += rho * (factored(p, surface, place) + sharp(p, surface, place, at)) / PI;
+            shown += rho * (factored(p, surface, place) + sharp(p, surface, place, at) + clustered(p, surface, place)) / PI;
         }
     }
     radiance = vec4(shown, metered);
+}
+
+void main() {
+    draw();
+    // Every fragment is shaded, hidden or not, for its depth is its own; the pipeline adds them up.
+    if (view == VIEW_OVERDRAW && !gl_FrontFacing) {
+        radiance = vec4(1.0, float(march_steps), 0.0, 0.0);
+    }
 }

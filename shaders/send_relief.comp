@@ -30,6 +30,8 @@ layout(scalar, binding = 12) writeonly buffer Exits { vec3 exits[]; };
 
 // Slots without light that were left out so far, [relief source].
 layout(scalar, binding = 13) buffer DarkSlots { uint dark_slots[]; };
+// With `by_pixel`: what each element sends, [meso element][direction].
+layout(scalar, binding = 14) readonly buffer Outgoing { vec3 outgoing[]; };
 
 layout(push_constant, scalar) uniform Parameters {
     uint first_source;
@@ -37,6 +39,7 @@ layout(push_constant, scalar) uniform Parameters {
     uint first_element;
     uint most_members;
     uvec2 cells;
+    uint by_pixel;            // 1: the pixel estimator has reflected the light already
 };
 
 shared vec3 part[MOST_DIRECTIONS];
@@ -78,6 +81,10 @@ void main() {
     uint dark = 0;
     for (uint i = 0; mine && i < s.element_count; i++) {
         uint m = s.first_element + i - first_element;
+        if (by_pixel == 1) {
+            member_exits[(first_member + i) * count + j] = outgoing[m * count + j];
+            continue;
+        }
         MesoElement meso = meso_elements[m];
         vec3 sent = vec3(0.0);
         for (uint k = 0; k < count; k++) {

@@ -8,6 +8,9 @@ layout(location = 2) in vec2 uv;
 
 layout(location = 0) out vec3 corner_irradiance;
 layout(location = 1) out vec2 corner_uv;
+layout(location = 2) out vec3 corner_share;
+layout(location = 3) out vec3 corner_position;
+layout(location = 4) flat out uint corner_triangle;
 
 layout(push_constant, scalar) uniform Parameters {
     vec3 x;
@@ -22,5 +25,10 @@ layout(push_constant, scalar) uniform Parameters {
 void main() {
     corner_irradiance = irradiance;
     corner_uv = uv;
+    // Triangles share no vertices.
+    uint corner = gl_VertexIndex % 3;
+    corner_share = vec3(equal(uvec3(corner), uvec3(0, 1, 2)));
+    corner_position = position;
+    corner_triangle = gl_VertexIndex / 3;
     gl_Position = vec4(dot(position, x), dot(position, y), near, dot(position, w));
 }

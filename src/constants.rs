@@ -36,16 +36,20 @@ shared! {
     FIXED_POINT_BITS = 61;
     /// Most directions of a meso element.
     MOST_DIRECTIONS = 64;
+    /// Most parallel lights that the light on a face is drawn by.
+    MOST_CLUSTERS = 64;
     /// Azimuths in which the horizon of a relief's facet is kept.
     AZIMUTHS = 128;
     /// A side of the grid of rays from each facet of a relief to the facets that it sees; RAY_STRATA² rays.
     RAY_STRATA = 8;
     /// Most factors of the light on a relief.
     MOST_RANK = 16;
-    /// Points that emitters are taken for where their light on relief is drawn sharply, and how many of them one sample looks
-    /// at: the samples of 4 × 4 pixels take turns.
+    /// Points that emitters are taken for in a pixel where their light is drawn sharply, and by how many samples they are
+    /// shared: those of 4 × 4 samples take turns.
     LIGHT_POINTS = 64;
     LIGHT_TURNS = 16;
+    /// Sets of such points, one a pixel of each 4 × 4: 64 fixed points would show as bands in penumbrae.
+    LIGHT_SETS = 16;
     /// A sample of so many texels shows the mean of the relief.
     WIDEST_SAMPLE = 2;
     /// How relief is drawn: displaced; only lit, at its mean height; so too, and shifted by its height.
@@ -58,4 +62,6 @@ shared! {
     VIEW_NORMAL = 2;
     VIEW_HEIGHT = 3;
     VIEW_IRRADIANCE = 4;
+    VIEW_SLOTS = 5;
+    VIEW_OVERDRAW = 6;
 }

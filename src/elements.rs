@@ -157,7 +157,10 @@ impl Elements {
             .filter(|&e| !self.is_meso(e))
             .map(|e| self.reflectance[e].max_element())
             .fold(0.0, f32::max);
-        let relief = self.relief.as_ref().map_or(0.0, Relief::highest_albedo);
+        let relief = self
+            .relief
+            .as_ref()
+            .map_or(0.0, |relief| relief.highest_albedo);
         plain.max(relief)
     }
 

@@ -123,6 +123,13 @@ pub fn fixed_point_tables(n: u32) -> Vec<u64> {
         .collect()
 }
 
+/// Form factors of the pixels, then their shares of half the sphere, as numbers; each `[3 n][n]`.
+pub fn pixel_form_factors(n: u32) -> Vec<f32> {
+    let unit = (1u64 << FIXED_POINT_BITS) as f64;
+    let fixed = fixed_point_tables(n);
+    fixed.iter().map(|&f| (f as f64 / unit) as f32).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

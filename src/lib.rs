@@ -27,6 +27,7 @@
 
 pub mod atomic_file;
 pub mod bake;
+pub mod bake_cache;
 pub mod bench;
 pub mod charts;
 pub mod constants;

@@ -6,6 +6,7 @@ use std::path::Path;
 use glam::{DVec3, Vec3};
 use safetensors::{Dtype, SafeTensors, tensor::TensorView};
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 
 use crate::atomic_file::write_atomically;
 use crate::elements::Elements;
@@ -127,7 +128,7 @@ impl Solution {
         let json = |value: serde_json::Result<String>| {
             value.map_err(|e| Error::file(path, format!("metadata: {e}")))
         };
-        let metadata = HashMap::from([
+        let mut metadata = HashMap::from([
             ("version".to_owned(), VERSION.to_owned()),
             (
                 "program".to_owned(),
@@ -226,6 +227,8 @@ impl Solution {
                 ("exitant", f32s, vec![m, k, 3], rgb(&relief.exitant)),
             ]);
         }
+        let parts_of_file = parts.iter().map(|(name, .., bytes)| (*name, &bytes[..]));
+        metadata.insert("sha256".to_owned(), checksum(parts_of_file));
         let tensors = parts
             .iter()
             .map(|(name, dtype, shape, bytes)| {
@@ -239,6 +242,18 @@ impl Solution {
     }
 }
 
+/// SHA-256 in hexadecimal over tensors by name, with their names and lengths.
+fn checksum<'a>(tensors: impl Iterator<Item = (&'a str, &'a [u8])>) -> String {
+    let mut tensors: Vec<_> = tensors.collect();
+    tensors.sort_unstable();
+    let mut hash = Sha256::new();
+    for (name, bytes) in tensors {
+        hash.update(format!("{name} {}\n", bytes.len()));
+        hash.update(bytes);
+    }
+    hash.finalize().iter().map(|b| format!("{b:02x}")).collect()
+}
+
 /// What drawing needs of a bake file.
 pub struct Bake {
     pub origin: Origin,
@@ -249,7 +264,7 @@ pub struct Bake {
 }
 
 impl Bake {
-    /// Reads a bake; refuses files of another make or version.
+    /// Reads a bake; refuses files of another make or version, and those whose tensors are not what was written.
     pub fn load(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(|e| Error::read(path, e))?;
         let bad = |what: String| Error::file(path, what);
@@ -270,6 +285,15 @@ impl Bake {
             .and_then(|s| serde_json::from_str(s).ok())
             .ok_or_else(|| bad("not a bake: it does not name its scene".into()))?;
         let file = SafeTensors::deserialize(&bytes).map_err(|e| bad(e.to_string()))?;
+        // Bakes of earlier programs have none.
+        if let Some(expected) = metadata.get("sha256") {
+            let tensors = file.iter().map(|(name, tensor)| (name, tensor.data()));
+            if checksum(tensors) != *expected {
+                return Err(bad(
+                    "damaged: its tensors are not those that were written".into()
+                ));
+            }
+        }
         let tensors = Tensors { file: &file, path };
         let irradiance = tensors.vectors("irradiance", &[])?;
         let bake = Self {

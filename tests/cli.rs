@@ -7,6 +7,10 @@ fn mesolux(args: &[&str], folder: &Path) -> Output {
     Command::new(env!("CARGO_BIN_EXE_mesolux"))
         .args(args)
         .current_dir(folder)
+        .env(
+            "XDG_CACHE_HOME",
+            concat!(env!("CARGO_TARGET_TMPDIR"), "/cache"),
+        )
         .output()
         .expect("the program runs")
 }

@@ -7,10 +7,12 @@ use glam::{DVec3, Vec3};
 use mesolux::constants::NONE;
 use mesolux::directions::Directions;
 use mesolux::meso::{Options, Transport};
+use mesolux::reference::pixels_relief::{Light, Received};
 use mesolux::reference::send_relief::send_relief;
-use mesolux::solver::{Settings, Solver};
+use mesolux::solver::{Estimator, Settings, Solver};
 
 const BATCH: u32 = 6;
+const FACE: u32 = 32;
 
 /// A room with an area light and a point light; four of its sides and a ball have a coloured relief, and the ball glows.
 fn scene() -> Build {
@@ -49,9 +51,14 @@ fn scene() -> Build {
 }
 
 fn solver(transport: Transport, k: u32, shots: Option<u32>) -> Solver {
+    solver_by(Estimator::Receiver, transport, k, shots)
+}
+
+fn solver_by(estimator: Estimator, transport: Transport, k: u32, shots: Option<u32>) -> Solver {
     let build = scene();
     let settings = Settings {
-        hemicube: 32,
+        estimator,
+        hemicube: FACE,
         batch: BATCH,
         shots,
         // Every shot is drawn, so that a batch is BATCH of them.
@@ -174,5 +181,139 @@ fn dark_slots_are_counted() {
         .expect("it has relief")
         .kept;
     assert!(shots_of_relief.iter().any(|v| *v != Vec3::ZERO));
+    assert_silent();
+}
+
+/// Largest difference of what is in f32 and what is in f64, as a share of the largest.
+fn apart<'a>(
+    found: impl Iterator<Item = DVec3>,
+    expected: impl Iterator<Item = &'a DVec3> + Clone,
+) -> f64 {
+    let largest = expected.clone().map(|v| v.abs().max_element());
+    let largest = largest.fold(f64::MIN_POSITIVE, f64::max);
+    let apart = found
+        .zip(expected)
+        .map(|(a, b)| (a - *b).abs().max_element());
+    apart.fold(0.0, f64::max) / largest
+}
+
+/// What one batch brings pixel by pixel, from the item buffers and the sent light of the device.
+#[test]
+fn pixels_bring_light_as_their_twin() {
+    // Differences of sums before and after the batch, each of thousands of pixels in f32.
+    const ROUNDING: f64 = 1e-4;
+    // A pixel whose ray lies on the border of two slots or texels may fall to either side, and moves what one pixel in
+    // hundreds brings.
+    const BORDER: f64 = 0.02;
+    for (transport, k) in [(Transport::Physical, 32), (Transport::Paper, 16)] {
+        let (mut by_direction, mut even) = (0, 0);
+        // Emission at first, and later what the relief sends.
+        for batches in [2, 3, 80] {
+            let start = |shots| solver_by(Estimator::Pixel, transport, k, shots);
+            let mut now = start(None);
+            now.run_batches(batches as usize, |_| ())
+                .expect("batches run");
+            let mut before = start(Some((batches - 1) * BATCH));
+            before.run(|_| true).expect("it runs");
+            let exits = now
+                .relief_exits()
+                .expect("they come back")
+                .expect("it has relief");
+            let (items, of_slots) = now.item_buffers().expect("they come back");
+            let relief = now.elements.relief.as_ref().expect("it has relief");
+            let mut twin = Received::new(&now.elements, relief);
+            let width = of_slots.len() * FACE as usize;
+            for (i, slot) in exits.slots.iter().enumerate() {
+                if slot.source == NONE {
+                    continue;
+                }
+                let source = &now.sources.list[slot.source as usize];
+                let column: Vec<u32> = items
+                    .chunks_exact(width)
+                    .flat_map(|row| &row[i * FACE as usize..][..FACE as usize])
+                    .copied()
+                    .collect();
+                let part = |p: usize| -> Vec<DVec3> {
+                    let row = &exits.exits[(2 * i + p) * k as usize..][..k as usize];
+                    row.iter().map(|v| v.as_dvec3()).collect()
+                };
+                let (emitted, reflected) = (part(0), part(1));
+                let of_relief = now.sources.relief.contains(&(slot.source as usize));
+                let light = if of_relief {
+                    by_direction += 1;
+                    Light::ByDirection(&emitted, &reflected)
+                } else {
+                    even += 1;
+                    Light::Even(slot.emitted.as_dvec3(), slot.reflected.as_dvec3())
+                };
+                twin.add((&now.elements, relief), source, &column, FACE, &light);
+            }
+            let (after, before) = (now.light(), before.light());
+            let (after, before) = (after.expect("it comes"), before.expect("it comes"));
+            let change = |after: &[Vec3], before: &[Vec3]| -> Vec<DVec3> {
+                let pairs = after.iter().zip(before);
+                pairs.map(|(a, b)| a.as_dvec3() - b.as_dvec3()).collect()
+            };
+            let direct = change(&after.irradiance_direct, &before.irradiance_direct);
+            let whole = change(&after.irradiance, &before.irradiance);
+            let radiosity = change(&after.radiosity, &before.radiosity);
+            let expected: Vec<DVec3> = twin
+                .direct
+                .iter()
+                .zip(&twin.indirect)
+                .map(|(d, i)| *d + *i)
+                .collect();
+            let (after, before) = (
+                after.relief.expect("it has relief"),
+                before.relief.expect("it has relief"),
+            );
+            let moments = after.moments.iter().zip(&before.moments);
+            let moments = moments.flat_map(|(a, b)| [0, 1, 2].map(|c| (a[c] - b[c]).as_dvec3()));
+            let sent = change(&after.exitant, &before.exitant);
+            let meso = now.elements.len() - relief.count();
+            let errors = [
+                apart(direct.iter().copied(), twin.direct.iter()),
+                apart(whole.iter().copied(), expected.iter()),
+                apart(radiosity[meso..].iter().copied(), twin.reflected.iter()),
+                apart(moments, twin.moments.iter().flatten()),
+                match transport {
+                    Transport::Paper => apart(sent.iter().copied(), twin.outgoing.iter()),
+                    _ => 0.0,
+                },
+            ];
+            println!(
+                "{transport:?}, K = {k}, batch {batches}: irradiance direct {:.1e}, whole {:.1e}; reflected {:.1e}, moments {:.1e}, sent {:.1e}",
+                errors[0], errors[1], errors[2], errors[3], errors[4]
+            );
+            assert!(expected.iter().any(|e| *e != DVec3::ZERO));
+            assert!(errors[..2].iter().all(|&e| e <= ROUNDING));
+            assert!(errors[2..].iter().all(|&e| e <= BORDER));
+        }
+        println!("{by_direction} sources by direction, {even} evenly");
+        assert!(by_direction > 3 && even > 3);
+    }
+    assert_silent();
+}
+
+/// Pixel sums have one order: the same run gives the same bits.
+#[test]
+fn pixels_of_relief_are_deterministic() {
+    for transport in [Transport::Physical, Transport::Paper] {
+        let bits = || {
+            let mut solver = solver_by(Estimator::Pixel, transport, 16, Some(60));
+            solver.run(|_| true).expect("it runs");
+            let light = solver.light().expect("it comes back");
+            let relief = light.relief.expect("it has relief");
+            (
+                light.irradiance,
+                light.radiosity,
+                relief.moments,
+                relief.exitant,
+            )
+        };
+        let (a, b) = (bits(), bits());
+        assert!(a.1.iter().any(|v| *v != Vec3::ZERO));
+        assert_eq!(a, b);
+    }
     assert_silent();
 }

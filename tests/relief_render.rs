@@ -8,12 +8,14 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use common::{Build, assert_silent, device};
+use common::{Build, assert_silent, device, show};
 use glam::{DVec3, Vec3};
 use mesolux::bake::bake;
+use mesolux::bench::pictures::{self, Reference};
+use mesolux::bench::relief_room::{CASES, REPEAT, TEXELS, bumps, camera, noise, room, smooth_step};
 use mesolux::directions::Directions;
 use mesolux::meso::{Options, Transport};
-use mesolux::path_tracer::{PathTracer, Settings as Paths};
+use mesolux::path_tracer::PathTracer;
 use mesolux::render::{
     Comparison, Light, Lighting, Picture, ReliefShading, SAMPLES, Show, View, render, side_by_side,
 };
@@ -23,9 +25,6 @@ use mesolux::solver::Settings;
 
 /// Pixels a side of the pictures.
 const SIDE: u32 = 48;
-/// Scene units of a repeat of the reliefs.
-const REPEAT: f64 = 0.25;
-const TEXELS: u32 = 32;
 
 /// Paths of each pixel. Their noise is known and taken off; what is left of it is a fiftieth of it, for the pixels are many.
 const DIRECT_PATHS: u32 = 64;
@@ -95,110 +94,8 @@ fn view(camera: &Camera) -> View<'_> {
     }
 }
 
-/// A camera that sees `look_at` from a distance, so many degrees from straight above.
-fn camera(look_at: DVec3, angle: f64, distance: f64, fov_y: f64) -> Camera {
-    let (s, c) = angle.to_radians().sin_cos();
-    // Along no axis of the relief.
-    let aside = DVec3::new(0.6, 0.0, 0.8);
-    Camera {
-        name: format!("{angle} degrees"),
-        position: look_at + distance * (s * aside + c * DVec3::Y),
-        look_at,
-        up: DVec3::Y,
-        fov_y,
-    }
-}
-
-/// Signed distance from `a` to the nearest of c + integers.
-fn apart(a: f64, c: f64) -> f64 {
-    a - c - (a - c).round()
-}
-
-fn smooth_step(x: f64) -> f64 {
-    let x = x.clamp(0.0, 1.0);
-    x * x * (3.0 - 2.0 * x)
-}
-
-/// 0 in the mortar of two rows of bricks, 1 on them.
-fn brick(x: f64, y: f64) -> f64 {
-    let row = (2.0 * y).floor();
-    let to_row = apart(2.0 * y, 0.0).abs() / 2.0;
-    let to_end = apart(x, 0.25 + 0.5 * row).abs();
-    smooth_step((to_row.min(to_end) - 0.03) / 0.07)
-}
-
-fn bumps(x: f64, y: f64) -> f64 {
-    let bump = |cx: f64, cy: f64, r: f64| {
-        let q = apart(x, cx).hypot(apart(y, cy)) / r;
-        (1.0 - q * q).max(0.0).powi(2)
-    };
-    1.2 * bump(0.3, 0.3, 0.3) + bump(0.8, 0.7, 0.22)
-}
-
-/// Two octaves between values at the points of a periodic lattice.
-fn noise(x: f64, y: f64) -> f64 {
-    let lattice = |i: i64, j: i64, n: i64| {
-        let (i, j) = (i.rem_euclid(n) as u64, j.rem_euclid(n) as u64);
-        let mut z = (i * 73 + j * 151 + n as u64 * 977 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        z = (z ^ (z >> 31)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z >> 40) as f64 / (1_u64 << 24) as f64
-    };
-    let octave = |n: i64| {
-        let (x, y) = (x * n as f64, y * n as f64);
-        let (i, j) = (x.floor(), y.floor());
-        let (s, t) = (smooth_step(x - i), smooth_step(y - j));
-        let (i, j) = (i as i64, j as i64);
-        let row = |j| lattice(i, j, n) * (1.0 - s) + lattice(i + 1, j, n) * s;
-        row(j) * (1.0 - t) + row(j + 1) * t
-    };
-    octave(3) + 0.4 * octave(6)
-}
-
 /// Samples, of 147 456, that may be seen through between prisms.
 const MOST_CRACKS: f32 = 0.0;
-
-/// A relief to be seen.
-struct Case {
-    name: &'static str,
-    /// Over 0..1 × 0..1; in repeats.
-    height: fn(f64, f64) -> f64,
-    /// Reflectance of the whole, and of the lowest places where they have another.
-    colour: [f32; 3],
-    lowest: Option<[f32; 3]>,
-    /// Texture coordinates that turn to the right.
-    mirrored: bool,
-}
-
-const CASES: [Case; 4] = [
-    Case {
-        name: "flat",
-        height: |_, _| 0.0,
-        colour: [0.5; 3],
-        lowest: None,
-        mirrored: false,
-    },
-    Case {
-        name: "bricks",
-        height: |x, y| 0.06 * brick(x, y),
-        colour: [0.7, 0.3, 0.2],
-        lowest: Some([0.5, 0.5, 0.45]),
-        mirrored: false,
-    },
-    Case {
-        name: "bumps",
-        height: |x, y| 0.12 * bumps(x, y),
-        colour: [0.3, 0.5, 0.8],
-        lowest: None,
-        mirrored: true,
-    },
-    Case {
-        name: "noise",
-        height: |x, y| 0.15 * noise(x, y),
-        colour: [0.5, 0.7, 0.3],
-        lowest: None,
-        mirrored: false,
-    },
-];
 
 /// Gives triangles a material and texture coordinates, one repeat each [`REPEAT`] along two directions.
 ///
@@ -215,117 +112,6 @@ fn cover(
         for uv in &mut t.uv {
             *uv = uv.map(|x| x + 0.5 / TEXELS as f32);
         }
-    }
-}
-
-/// A room with a relief as its floor, lit from above and aside; one wall is red.
-fn room(case: &Case) -> Scene {
-    let mut build = Build::new();
-    let white = build.material(0.4, 0.0);
-    let red = build.material(0.0, 0.0);
-    build.scene.materials[red as usize].kd = [0.6, 0.1, 0.1];
-    let lamp = build.material(0.0, 10.0);
-    let floor = build.material(0.0, 0.0);
-    build.relief(floor, TEXELS, |x, y| REPEAT * (case.height)(x, y));
-    let material = &mut build.scene.materials[floor as usize];
-    material.kd = case.colour;
-    if let Some(lowest) = case.lowest {
-        let centre = |i: u32| (f64::from(i) + 0.5) / f64::from(TEXELS);
-        let texel = |row: u32, column: u32| {
-            let share = brick(centre(column), 1.0 - centre(row)) as f32;
-            std::array::from_fn(|c| share * case.colour[c] + (1.0 - share) * lowest[c])
-        };
-        material.kd = [1.0; 3];
-        material.map_kd = Some(Arc::new(Texture {
-            path: "test".into(),
-            width: TEXELS,
-            height: TEXELS,
-            texels: (0..TEXELS * TEXELS)
-                .map(|i| texel(i / TEXELS, i % TEXELS))
-                .collect(),
-        }));
-    }
-    let sides = build.room(DVec3::ZERO, DVec3::new(2.0, 4.0, 2.0), 8, white);
-    let v = if case.mirrored { -DVec3::X } else { DVec3::X };
-    cover(&mut build, sides[0].clone(), floor, (DVec3::Z, v));
-    for t in &mut build.scene.triangles[sides[2].clone()] {
-        t.material = red;
-    }
-    build.quad(
-        DVec3::new(0.1, 3.98, 0.3),
-        DVec3::X * 1.0,
-        DVec3::Z * 1.0,
-        (3, 3),
-        lamp,
-    );
-    build.scene
-}
-
-/// Steep, oblique and grazing, of the floor alone.
-fn cameras() -> [Camera; 3] {
-    let middle = DVec3::new(1.0, 0.0, 1.0);
-    [
-        camera(middle, 20.0, 1.0, 30.0),
-        camera(middle, 50.0, 1.0, 30.0),
-        camera(middle, 75.0, 0.9, 14.0),
-    ]
-}
-
-/// The truth but for noise, whose variance is known.
-struct Reference {
-    picture: Picture,
-    /// RGB, `[pixel]`.
-    variance: Vec<DVec3>,
-}
-
-impl Reference {
-    fn new(tracer: &PathTracer<'_>, camera: &Camera, light: Light, paths: u32) -> Self {
-        let settings = Paths {
-            paths,
-            light,
-            ..Paths::default()
-        };
-        let film = tracer
-            .render(&view(camera), &settings, |_| true)
-            .expect("a picture");
-        Self {
-            picture: film.picture(),
-            variance: film.standard_error().iter().map(|e| e * e).collect(),
-        }
-    }
-
-    fn plus(&self, other: &Self) -> Self {
-        let mut picture = self.picture.clone();
-        for (sum, other) in picture.radiance.iter_mut().zip(&other.picture.radiance) {
-            *sum = std::array::from_fn(|c| sum[c] + other[c]);
-        }
-        let variance = self.variance.iter().zip(&other.variance);
-        Self {
-            picture,
-            variance: variance.map(|(a, b)| a + b).collect(),
-        }
-    }
-
-    /// What [`Comparison::rel_mse`] tells of a perfect picture.
-    fn noise(&self) -> f64 {
-        let values = self.picture.radiance.as_flattened();
-        let mean = values.iter().map(|&v| f64::from(v)).sum::<f64>() / values.len() as f64;
-        let variance = self.variance.iter().flat_map(DVec3::to_array);
-        variance
-            .zip(values)
-            .map(|(variance, &b)| variance / (f64::from(b).powi(2) + (0.01 * mean).powi(2)))
-            .sum::<f64>()
-            / values.len() as f64
-    }
-}
-
-/// Where pictures are written to be looked at, if anywhere.
-fn show(name: &str, ours: &Picture, reference: &Picture) {
-    if let Some(folder) = std::env::var_os("MESOLUX_TEST_PICTURES") {
-        let path = std::path::Path::new(&folder).join(format!("{name}.png"));
-        side_by_side(ours, reference)
-            .and_then(|picture| picture.write(&path, None))
-            .expect("a picture file");
     }
 }
 
@@ -348,10 +134,13 @@ fn pictures_are_those_of_the_displaced_scene() {
             bake_time.as_secs_f64(),
             fine.triangles.len()
         );
-        for (camera, flat_bias) in cameras().iter().zip(&mut flat_bias) {
+        for (camera, flat_bias) in scene.cameras.iter().zip(&mut flat_bias) {
             let start = Instant::now();
-            let direct = Reference::new(&tracer, camera, Light::Direct, DIRECT_PATHS);
-            let indirect = Reference::new(&tracer, camera, Light::Indirect, INDIRECT_PATHS);
+            let trace = |light, paths| {
+                Reference::new(&tracer, &view(camera), light, paths).expect("a picture")
+            };
+            let direct = trace(Light::Direct, DIRECT_PATHS);
+            let indirect = trace(Light::Indirect, INDIRECT_PATHS);
             let global = direct.plus(&indirect);
             let trace_time = start.elapsed();
             let start = Instant::now();
@@ -749,4 +538,43 @@ fn comparisons_have_closed_forms() {
             "{message}"
         );
     }
+}
+
+/// A row and a picture for each view and part of the light, and the same rows in both files; no row for what is not there.
+#[test]
+fn bench_writes_rows_and_pictures() {
+    let folder = tempfile::tempdir().expect("a folder for the test");
+    let run = |material| {
+        let options = pictures::Options {
+            side: 8,
+            paths: 4,
+            material: Some(material),
+            lighting: Lighting {
+                cache: Some(folder.path()),
+                ..Lighting::from(&[][..])
+            },
+        };
+        pictures::run(&device(), &options, folder.path(), || true)
+    };
+    let rows = run("bumps").expect("rows");
+    assert_eq!(rows.len(), 9);
+    for row in &rows {
+        let name = format!("{}-{}-{}.png", row.material, row.angle, row.light);
+        let picture = image::open(folder.path().join(&name)).expect("a picture");
+        assert_eq!((picture.width(), picture.height()), (24, 8), "{name}");
+        assert!(row.noise > 0.0 && (0.0..1.0).contains(&row.flip), "{row:?}");
+    }
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect("read");
+    assert_eq!(read("pictures.csv").lines().count(), 10);
+    let json: serde_json::Value = serde_json::from_str(&read("pictures.json")).expect("JSON");
+    assert_eq!(json[8]["light"], "global");
+    // A number read may differ from the one written in its last bit.
+    let read_back = json[8]["rel_mse"].as_f64().expect("a number");
+    assert!((read_back - rows[8].rel_mse).abs() <= 1e-15 * read_back.abs());
+    let error = run("nosuch").expect_err("no such material").to_string();
+    assert!(
+        error.contains("nosuch") && error.contains("bricks"),
+        "{error}"
+    );
+    assert_silent();
 }

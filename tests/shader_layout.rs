@@ -51,9 +51,12 @@ fn spirv() -> BTreeSet<Vec<u32>> {
         shaders::MEASURE_COMP,
         shaders::FORM_FACTORS_COMP,
         shaders::GATHER_TO_RELIEF_COMP,
+        shaders::PIXELS_TO_RELIEF_COMP,
         shaders::ITEM_BUFFER_VERT,
         shaders::RELIEF_FRAG,
         shaders::RELIEF_RAYS_COMP,
+        shaders::SHADE_FRAG,
+        shaders::SHADOW_RAYS_COMP,
     ] {
         let mut offsets: BTreeMap<u32, BTreeMap<u32, u32>> = BTreeMap::new();
         let mut strides = BTreeMap::new();
@@ -107,9 +110,16 @@ fn rust_and_glsl_agree() {
     check!(true, ReceiverList: groups_x groups_y groups_z count);
     check!(true, MesoElement: tangent response bitangent scale);
     check!(true, Reflected: sum error);
+    check!(true, MesoTexel: uv_a uv_b uv_c first columns rows);
+    check!(true, TextureFacet: reflectance above_low above_high);
     check!(true, Prism: low_a low_b low_c high_a high_b high_c uv_a uv_b uv_c light_a light_b light_c surface
-        tangent texel bitangent normal);
-    check!(true, LightPoint: position kind normal strength);
+        tangent texel bitangent normal first_cluster cluster_count slots);
+    check!(true, ParallelLight: towards fluence_a fluence_b fluence_c);
+    check!(true, LightPoint: position kind normal area strength);
+    check!(true, ShadowNode: low skip high first count);
+    check!(true, ShadowTriangle: a b c relief);
+    check!(true, ShadowRay: from clear to);
+    check!(true, LitTriangle: a b c normal_a normal_b normal_c plane above open);
     check!(true, ReliefSurface: lowest top mean columns rows rank first_factor slope);
     check!(true, HeightTile: first width height top highest);
     check!(true, HeightRay: from tile to);

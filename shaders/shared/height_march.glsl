@@ -1,5 +1,6 @@
 // Where a straight segment first passes below a bilinear, periodic height map: exact, by the pyramid of maxima of
-// src/meso/height_pyramid.rs. Including files have shared/types.glsl and a buffer `float pyramid[]`.
+// src/meso/height_pyramid.rs. Including files have shared/types.glsl and a buffer `float pyramid[]`; the steps of all
+// marches are added to the variable ALL_STEPS if there is one.
 //
 // Lengths are in texels here, x along columns and y along rows (down the image, against v), heights as the map has them.
 // A texel's centre has whole coordinates. f32 keeps no more than 1e-4 of a texel a thousand texels away from where it
@@ -147,6 +148,9 @@ bool march(HeightTile tile, vec3 from, vec3 to, out HeightHit hit) {
     float most = min(2.0 * moves, MOST_STEPS);
     for (float count = 0.0; count < most; count++) {
         hit.steps++;
+#ifdef ALL_STEPS
+        ALL_STEPS++;
+#endif
         // Find where the segment leaves this block.
         ivec2 block = cell >> level;
         ivec2 low = block << level;

@@ -119,6 +119,23 @@ struct MesoElement {
     vec3 scale;         // its own reflectance over the tile's mean
 };
 
+// Where an element with a relief lies in its texture.
+struct MesoTexel {
+    vec2 uv_a;
+    vec2 uv_b;
+    vec2 uv_c;
+    uint first;         // facet of the texture among those of all textures
+    uint columns;
+    uint rows;
+};
+
+// A facet of a texture, as the pixel estimator looks it up.
+struct TextureFacet {
+    vec3 reflectance;
+    uint above_low;     // a bit for each of the first 32 directions less than 90° from its normal
+    uint above_high;    // of the others
+};
+
 // Reflected radiosity of an element with a relief, with the rounding error of its last sum.
 struct Reflected {
     vec3 sum;
@@ -171,13 +188,25 @@ struct Prism {
     float texel;        // internal units
     vec3 bitangent;
     vec3 normal;
+    uint first_cluster; // parallel lights on it
+    uint cluster_count; // 0: lit by the light vertices alone
+    vec3 slots;         // false colour of its light by direction
 };
 
-// A place that shines on relief: a part of an emitter, or a point light.
+// A parallel light on a face, in place of the light from near-parallel directions.
+struct ParallelLight {
+    vec3 towards;       // unit, along the world's axes
+    vec3 fluence_a;     // at the corners of the prism, W·m⁻²
+    vec3 fluence_b;
+    vec3 fluence_c;
+};
+
+// A place that light comes straight from: a part of an emitter, or a point light.
 struct LightPoint {
     vec3 position;      // from the eye, internal units
     uint kind;          // KIND_SURFACE or KIND_POINT
     vec3 normal;
+    float area;         // of the part of an emitter
     vec3 strength;      // Le times its area, or radiant intensity
 };
 
@@ -191,4 +220,41 @@ struct ReliefSurface {
     uint rank;
     uint first_factor;
     vec2 slope;         // scene heights a texture repeat in u and in v for a unit of height
+};
+
+// A box of the tree of what casts shadows, in depth-first order: the first within it follows it.
+struct ShadowNode {
+    vec3 low;           // from the eye, internal units
+    uint skip;          // the node that follows all that is in this one
+    vec3 high;
+    uint first;         // of its triangles
+    uint count;         // of a leaf's triangles, 0 in others
+};
+
+// What casts a shadow.
+struct ShadowTriangle {
+    vec3 a;
+    vec3 b;
+    vec3 c;
+    uint relief;        // 1: it stands for a relief about it
+};
+
+// A straight way.
+struct ShadowRay {
+    vec3 from;
+    float clear;        // share of the way before which triangles with a relief are passed over
+    vec3 to;
+};
+
+// A plain triangle that is lit straight.
+struct LitTriangle {
+    vec3 a;             // from the eye, internal units
+    vec3 b;
+    vec3 c;
+    vec3 normal_a;      // of the smooth surface at the corners
+    vec3 normal_b;
+    vec3 normal_c;
+    vec3 plane;         // its own normal
+    float above;        // what rays start above it
+    uint open;          // 1: nothing stands between it and the lights
 };

@@ -1,4 +1,4 @@
-//! `mesolux bench frame`: how long a frame takes, by scene, number of directions and shading.
+//! `mesolux bench frame`: how long a frame takes, by scene, number of directions, shading and size.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -22,10 +22,12 @@ use crate::vk::Device;
 
 /// What is to be measured.
 pub struct Options<'a> {
-    pub size: (u32, u32),
+    /// Pixels across and down.
+    pub sizes: Vec<(u32, u32)>,
     /// Rounds; in each, every kind of frame is drawn once.
     pub rounds: usize,
-    /// Shots of the bakes: a frame takes as long whatever the light is.
+    /// Shots of the bakes. A frame takes as long whatever the light is but for clusters, of which there are as many as slots
+    /// with light.
     pub shots: u32,
     pub cache: Option<&'a Path>,
 }
@@ -50,12 +52,13 @@ pub struct Row {
 }
 
 /// How frames are drawn, by name.
-const SHADINGS: [(&str, ReliefShading, Direct); 5] = [
+const SHADINGS: [(&str, ReliefShading, Direct); 6] = [
     ("none", ReliefShading::None, Direct::Slots),
     ("normal", ReliefShading::Normal, Direct::Slots),
     ("parallax", ReliefShading::Parallax, Direct::Slots),
     ("factored, slots", ReliefShading::Factored, Direct::Slots),
     ("factored, sharp", ReliefShading::Factored, Direct::Sharp),
+    ("clusters", ReliefShading::Clusters, Direct::Slots),
 ];
 const DIRECTIONS: [u32; 3] = [16, 32, 64];
 
@@ -87,65 +90,90 @@ pub fn run(
             scene.name
         ))
     })?;
-    for camera in [Some(own.clone()), close(scene, &solutions[0], &own)]
-        .into_iter()
-        .flatten()
-    {
-        let view = View {
-            camera: &camera,
-            width: options.size.0,
-            height: options.size.1,
-        };
-        let mut under = Vec::new();
-        for (name, shading, direct) in SHADINGS {
-            for (&k, solution) in DIRECTIONS.iter().zip(&solutions) {
-                if shading == ReliefShading::None && k != DIRECTIONS[0] {
-                    continue;
-                }
-                let lighting = Lighting {
-                    shading,
-                    direct,
-                    cache: options.cache,
-                    ..Lighting::from(solution)
-                };
-                let renderer = Renderer::new(device, scene, lighting, &view, 1)?;
-                let row = Row {
-                    scene: scene.name.clone(),
-                    camera: camera.name.clone(),
-                    shading: name.into(),
-                    directions: (shading != ReliefShading::None).then_some(k),
-                    width: view.width,
-                    height: view.height,
-                    relief: renderer.relief_coverage()?,
-                    median: 0.0,
-                    low: 0.0,
-                    high: 0.0,
-                };
-                under.push((row, renderer, Vec::new()));
+    let cameras = [Some(own.clone()), close(scene, &solutions[0], &own)];
+    for camera in cameras.into_iter().flatten() {
+        for &size in &options.sizes {
+            let first = rows.len();
+            measure(device, scene, &solutions, (&camera, size), options, rows)?;
+            for row in &rows[first..] {
+                println!("{}", line(row, &rows[first..]));
             }
-        }
-        // In turns, so that what slows the machine slows all of them; the first round warms up.
-        for round in 0..=options.rounds {
-            for (_, renderer, times) in &mut under {
-                let taken = renderer.frames(1)?;
-                if round > 0 {
-                    times.extend(taken.iter().map(|s| 1e3 * s));
-                }
-            }
-        }
-        let first = rows.len();
-        for (mut row, _, mut times) in under {
-            (row.median, row.low, row.high) = spread(&mut times);
-            rows.push(row);
-        }
-        for row in &rows[first..] {
-            println!("{}", line(row, &rows[first..]));
         }
     }
     Ok(())
 }
 
-pub const HEADER: &str = "scene             camera   shading           K  relief   ms a frame (10 % to 90 %)    over K = 16  over none";
+/// Frames of one camera and size, by shading and number of directions.
+fn measure(
+    device: &Arc<Device>,
+    scene: &Scene,
+    solutions: &[Solution],
+    (camera, (width, height)): (&Camera, (u32, u32)),
+    options: &Options<'_>,
+    rows: &mut Vec<Row>,
+) -> Result<()> {
+    let view = View {
+        camera,
+        width,
+        height,
+    };
+    let mut found = Vec::new();
+    let mut renderers = Vec::new();
+    for (name, shading, direct) in SHADINGS {
+        for (&k, solution) in DIRECTIONS.iter().zip(solutions) {
+            if shading == ReliefShading::None && k != DIRECTIONS[0] {
+                continue;
+            }
+            let lighting = Lighting {
+                shading,
+                direct,
+                cache: options.cache,
+                ..Lighting::from(solution)
+            };
+            let renderer = Renderer::new(device, scene, lighting, &view, 1)?;
+            found.push(Row {
+                scene: scene.name.clone(),
+                camera: camera.name.clone(),
+                shading: name.into(),
+                directions: (shading != ReliefShading::None).then_some(k),
+                width,
+                height,
+                relief: renderer.relief_coverage()?,
+                median: 0.0,
+                low: 0.0,
+                high: 0.0,
+            });
+            renderers.push(renderer);
+        }
+    }
+    let times = in_turns(&renderers, options.rounds)?;
+    for (row, (median, low, high)) in found.iter_mut().zip(times) {
+        (row.median, row.low, row.high) = (median, low, high);
+    }
+    rows.append(&mut found);
+    Ok(())
+}
+
+/// Milliseconds of a frame of each, median and the 10 % and 90 % points over so many rounds.
+///
+/// In turns, so that what slows the machine slows all of them; a round before the first warms up.
+///
+/// # Errors
+/// A device that fails.
+pub fn in_turns(renderers: &[Renderer<'_>], rounds: usize) -> Result<Vec<(f64, f64, f64)>> {
+    let mut times = vec![Vec::with_capacity(rounds); renderers.len()];
+    for round in 0..=rounds {
+        for (renderer, times) in renderers.iter().zip(&mut times) {
+            let taken = renderer.frames(1)?;
+            if round > 0 {
+                times.extend(taken.iter().map(|s| 1e3 * s));
+            }
+        }
+    }
+    Ok(times.iter_mut().map(|times| spread(times)).collect())
+}
+
+pub const HEADER: &str = "scene             camera        size shading           K  relief   ms a frame (10 % to 90 %)    over K = 16  over none";
 
 fn line(row: &Row, others: &[Row]) -> String {
     let over =
@@ -154,9 +182,10 @@ fn line(row: &Row, others: &[Row]) -> String {
         .iter()
         .find(|o| o.shading == row.shading && o.directions == Some(16));
     format!(
-        "{:<17} {:<8} {:<16} {:>2} {:>6.1}% {:>9.1} ({:.1} to {:.1}) {:>13} {:>10}",
+        "{:<17} {:<8} {:>9} {:<16} {:>2} {:>6.1}% {:>9.1} ({:.1} to {:.1}) {:>13} {:>10}",
         row.scene,
         row.camera,
+        format!("{}x{}", row.width, row.height),
         row.shading,
         row.directions.map_or("-".into(), |k| k.to_string()),
         100.0 * row.relief,
@@ -241,39 +270,51 @@ pub fn write(rows: &[Row], folder: &Path) -> Result<()> {
     chart(rows).write(&folder.join("frame.svg"))
 }
 
-/// Milliseconds with their spread for K = 64, one group for a scene and camera.
+/// Milliseconds with their spread for K = 64, one group for a scene, camera and size; of the clusters, whose cost grows with K,
+/// for each K.
 fn chart(rows: &[Row]) -> Bars<'static> {
-    let colours = [
-        RGBColor(120, 120, 120),
-        RGBColor(158, 202, 225),
-        RGBColor(66, 146, 198),
-        RGBColor(8, 69, 148),
-        RGBColor(217, 95, 14),
+    const KINDS: [(&str, u32, RGBColor); 8] = [
+        ("none", 64, RGBColor(120, 120, 120)),
+        ("normal", 64, RGBColor(158, 202, 225)),
+        ("parallax", 64, RGBColor(66, 146, 198)),
+        ("factored, slots", 64, RGBColor(8, 69, 148)),
+        ("factored, sharp", 64, RGBColor(217, 95, 14)),
+        ("clusters", 16, RGBColor(199, 233, 192)),
+        ("clusters", 32, RGBColor(116, 196, 118)),
+        ("clusters", 64, RGBColor(0, 109, 44)),
     ];
-    let group = |row: &Row| format!("{}, {}", row.scene, row.camera);
+    let group = |row: &Row| {
+        format!(
+            "{}, {}, {}x{}",
+            row.scene, row.camera, row.width, row.height
+        )
+    };
     let mut groups: Vec<String> = Vec::new();
     for row in rows {
         if !groups.contains(&group(row)) {
             groups.push(group(row));
         }
     }
-    let shown = rows.iter().filter(|r| r.directions.is_none_or(|k| k == 64));
-    let bars = shown.filter_map(|row| {
+    let bars = rows.iter().filter_map(|row| {
         Some(Bar {
             group: groups.iter().position(|g| *g == group(row))?,
-            kind: SHADINGS.iter().position(|s| s.0 == row.shading)?,
+            kind: KINDS
+                .iter()
+                .position(|k| k.0 == row.shading && row.directions.is_none_or(|d| d == k.1))?,
             value: row.median,
             spread: Some((row.low, row.high)),
         })
     });
     Bars {
-        caption: "Time of a frame, K = 64",
+        caption: "Time of a frame, K = 64 where not said",
         unit: "milliseconds",
         bars: bars.collect(),
-        kinds: SHADINGS
+        kinds: KINDS
             .iter()
-            .zip(colours)
-            .map(|(shading, colour)| (shading.0.to_owned(), colour))
+            .map(|&(shading, k, colour)| match shading {
+                "clusters" => (format!("{shading}, K = {k}"), colour),
+                _ => (shading.to_owned(), colour),
+            })
             .collect(),
         groups,
     }

@@ -5,7 +5,10 @@ mod difference;
 pub mod frame;
 pub mod hemicube;
 pub mod irradiance;
+pub mod pictures;
+pub mod relief_room;
 pub mod table1;
+mod table1_output;
 
 pub use difference::{Difference, plain_pairs};
 

@@ -1,33 +1,36 @@
-//! `mesolux bench table1`: the paper's Table 1, its time column beside ours.
+//! `mesolux bench table1`: the paper's Table 1, its times and frame rates beside ours.
 //!
 //! The bakes of a scene take turns of a few seconds, so that what slows the machine slows all of them.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use glam::Vec3;
-use plotters::style::RGBColor;
 use serde::Serialize;
 
-use crate::atomic_file::write_atomically;
 use crate::bake;
 use crate::directions::Directions;
 use crate::error::{Error, Result};
 use crate::meso::{Options as ReliefOptions, Transport};
+use crate::render::{Lighting, ReliefShading, Renderer, View};
 use crate::scene::{BuiltinOptions, Scene, displace, load};
+use crate::solution::Solution;
 use crate::solver::{Settings, Solver, StopReason};
 use crate::vk::Device;
 
-use super::bars::{Bar, Bars};
-use super::{Difference, plain_pairs};
+use super::table1_output::{HEADER, KINDS, against_high_poly, line, write};
+use super::{Difference, frame, plain_pairs};
 
-/// A scene of the paper with its minutes for K = 16, 32, 64 (on hardware of 2013 that it does not name).
-pub const SCENES: [(&str, [f64; 3]); 3] = [
-    ("fruit-platter", [10.4, 11.0, 12.3]),
-    ("bowl-and-bunny", [6.3, 6.6, 7.8]),
-    ("cornell-relief", [8.8, 9.8, 10.3]),
+/// A scene of the paper with its minutes and its frames a second for K = 16, 32, 64 (on hardware of 2013 and at a size that it
+/// does not name).
+pub const SCENES: [(&str, [f64; 3], [f64; 3]); 3] = [
+    ("fruit-platter", [10.4, 11.0, 12.3], [62.0, 48.0, 29.0]),
+    ("bowl-and-bunny", [6.3, 6.6, 7.8], [98.0, 67.0, 25.0]),
+    ("cornell-relief", [8.8, 9.8, 10.3], [64.0, 46.0, 22.0]),
 ];
+
+/// Pixels of the frames, one sample each.
+pub const FRAME: (u32, u32) = (1280, 720);
 
 /// What is to be measured.
 pub struct Options {
@@ -38,6 +41,10 @@ pub struct Options {
     pub residual: f64,
     /// Also bake the relief as geometry.
     pub high_poly: bool,
+    /// Rounds over which frames are measured, none for 0.
+    pub frame_rounds: usize,
+    /// Folder that keeps the visibility of reliefs for the frames; bakes compute it anew.
+    pub cache: Option<PathBuf>,
 }
 
 /// One bake.
@@ -56,20 +63,26 @@ pub struct Row {
     /// All of the bake but reading the scene.
     pub seconds: f64,
     pub paper_minutes: Option<f64>,
+    /// Frames a second from the scene's first camera, [`FRAME`] pixels, for bakes in K directions.
+    pub fps_factored: Option<Rate>,
+    pub fps_clusters: Option<Rate>,
+    pub paper_fps: Option<f64>,
     /// How far the triangles without relief are from those of the high-poly bake; none before that is done.
     pub plain: Option<Difference>,
 }
 
-impl Row {
-    fn name(&self) -> String {
-        bake_name(&self.kind)
-    }
+/// Frames a second: median, and the 10 % and 90 % points.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Rate {
+    pub median: f64,
+    pub low: f64,
+    pub high: f64,
 }
 
-/// A bake that is done, with its irradiance, `[triangle]` in the order of the input.
+/// A bake that is done.
 struct Done {
     row: Row,
-    irradiance: Vec<Vec3>,
+    solution: Solution,
 }
 
 /// A bake under way.
@@ -105,7 +118,7 @@ pub fn run(
         100.0 * options.residual
     );
     println!("{HEADER}");
-    for (name, paper) in scenes {
+    for (name, minutes, fps) in scenes {
         let builtin = BuiltinOptions {
             patches: options.patches,
             statue: None,
@@ -118,7 +131,7 @@ pub fn run(
             Ok(())
         };
         start("lambert", Transport::Lambert, 16, None)?;
-        for (k, minutes) in [16, 32, 64].into_iter().zip(paper) {
+        for (k, minutes) in [16, 32, 64].into_iter().zip(minutes) {
             start(&k.to_string(), Transport::Physical, k, Some(minutes))?;
         }
         let first = rows.len();
@@ -129,18 +142,21 @@ pub fn run(
             }
             write(&rows, folder)
         };
-        let low = in_turns(under, &go_on)?;
+        let mut low = in_turns(under, &scene, &go_on)?;
+        if go_on() && options.frame_rounds > 0 {
+            measure_frames(device, &scene, options, fps, &mut low)?;
+        }
         keep(&low)?;
         if options.high_poly && go_on() {
             let fine = displace(&scene);
             let lambert = (Transport::Lambert, 16);
             let under = begin(device, &fine, options, "high-poly", lambert, None)?;
-            let high = in_turns(vec![under], &go_on)?;
+            let high = in_turns(vec![under], &fine, &go_on)?;
             keep(&high)?;
             if let [high] = &high[..] {
                 let pairs = plain_pairs(&scene, &fine);
                 for (row, done) in rows[first..].iter_mut().zip(&low) {
-                    let light = (&done.irradiance[..], &high.irradiance[..]);
+                    let light = (&done.solution.irradiance[..], &high.solution.irradiance[..]);
                     let difference = Difference::new(&scene, &pairs, light);
                     println!("{}", against_high_poly(row, &high.row, &difference));
                     row.plain = Some(difference);
@@ -186,6 +202,9 @@ fn begin(
             relief_seconds,
             seconds: start.elapsed().as_secs_f64(),
             paper_minutes,
+            fps_factored: None,
+            fps_clusters: None,
+            paper_fps: None,
             plain: None,
         },
         solver,
@@ -193,7 +212,7 @@ fn begin(
     })
 }
 
-fn in_turns(mut under: Vec<Under>, go_on: &impl Fn() -> bool) -> Result<Vec<Done>> {
+fn in_turns(mut under: Vec<Under>, scene: &Scene, go_on: &impl Fn() -> bool) -> Result<Vec<Done>> {
     while under.iter().any(|u| !u.done) && go_on() {
         for bake in under.iter_mut().filter(|u| !u.done) {
             let turn = Instant::now();
@@ -215,125 +234,57 @@ fn in_turns(mut under: Vec<Under>, go_on: &impl Fn() -> bool) -> Result<Vec<Done
     }
     let done = under.into_iter().filter(|u| u.done).map(|u| {
         let light = u.solver.light()?;
+        let report = u.solver.report().clone();
         Ok(Done {
-            irradiance: u.solver.elements.to_input_order(&light.irradiance),
+            solution: Solution::new(scene, &u.solver.elements, &light, report),
             row: u.row,
         })
     });
     done.collect()
 }
 
-/// What a bake of relief gains and loses against the same relief as geometry.
-fn against_high_poly(row: &Row, high: &Row, difference: &Difference) -> String {
-    format!(
-        "{:<17} {:<10} {:.2} times as fast as high-poly; its {} plain triangles against it: bias {:+.2} %, rms {:.2} %",
-        row.scene,
-        row.name(),
-        high.seconds / row.seconds,
-        difference.triangles,
-        100.0 * difference.bias,
-        100.0 * difference.rms
-    )
-}
-
-const HEADER: &str = "scene             bake       elements  meso  hemicubes  seconds  of it relief  over K=16  over lambert  paper, min";
-
-/// A row as it is printed, with its time over those of the same scene's K = 16 and `lambert`.
-fn line(row: &Row, scene: &[Row]) -> String {
-    let over = |kind: &str| {
-        scene
-            .iter()
-            .find(|r| r.kind == kind)
-            .map_or("-".into(), |r| format!("{:.3}", row.seconds / r.seconds))
+/// Frames of the bakes in K directions, drawn by factors and by clusters, in turns.
+fn measure_frames(
+    device: &Arc<Device>,
+    scene: &Scene,
+    options: &Options,
+    paper: [f64; 3],
+    bakes: &mut [Done],
+) -> Result<()> {
+    let Some(camera) = scene.cameras.first() else {
+        return Ok(());
     };
-    format!(
-        "{:<17} {:<10} {:>8} {:>4.0}% {:>10} {:>8.1} {:>13.2} {:>10} {:>13} {:>11}",
-        row.scene,
-        row.name(),
-        row.elements,
-        100.0 * row.meso_elements as f64 / row.elements as f64,
-        row.hemicubes,
-        row.seconds,
-        row.relief_seconds,
-        over("16"),
-        over("lambert"),
-        row.paper_minutes.map_or("-".into(), |m| format!("{m:.1}")),
-    )
-}
-
-fn write(rows: &[Row], folder: &Path) -> Result<()> {
-    let bad = |path: &Path, e: String| Error::file(path, e);
-    let json = folder.join("table1.json");
-    let text = serde_json::to_string_pretty(rows).map_err(|e| bad(&json, e.to_string()))?;
-    write_atomically(&json, |out| out.write_all(text.as_bytes()))?;
-    write_atomically(&folder.join("table1.csv"), |out| {
-        writeln!(
-            out,
-            "scene,bake,elements,meso_elements,sources,hemicubes,error_bound,relief_seconds,seconds,paper_minutes,plain_bias,plain_rms"
-        )?;
-        for r in rows {
-            let optional = |v: Option<f64>| v.map_or(String::new(), |v| v.to_string());
-            writeln!(
-                out,
-                "{},{},{},{},{},{},{},{},{},{},{},{}",
-                r.scene,
-                r.kind,
-                r.elements,
-                r.meso_elements,
-                r.sources,
-                r.hemicubes,
-                optional(r.error_bound),
-                r.relief_seconds,
-                r.seconds,
-                optional(r.paper_minutes),
-                optional(r.plain.map(|d| d.bias)),
-                optional(r.plain.map(|d| d.rms))
-            )?;
-        }
-        Ok(())
-    })?;
-    chart(rows).write(&folder.join("table1.svg"))
-}
-
-/// Seconds, one group a scene.
-fn chart(rows: &[Row]) -> Bars<'static> {
-    const KINDS: [(&str, RGBColor); 5] = [
-        ("lambert", RGBColor(120, 120, 120)),
-        ("16", RGBColor(158, 202, 225)),
-        ("32", RGBColor(66, 146, 198)),
-        ("64", RGBColor(8, 69, 148)),
-        ("high-poly", RGBColor(217, 95, 14)),
-    ];
-    let mut groups: Vec<String> = Vec::new();
-    for row in rows {
-        if !groups.contains(&row.scene) {
-            groups.push(row.scene.clone());
+    let view = View {
+        camera,
+        width: FRAME.0,
+        height: FRAME.1,
+    };
+    let directed = |done: &&Done| done.solution.relief.is_some();
+    let mut renderers = Vec::new();
+    for done in bakes.iter().filter(directed) {
+        for shading in [ReliefShading::Factored, ReliefShading::Clusters] {
+            let lighting = Lighting {
+                shading,
+                cache: options.cache.as_deref(),
+                ..Lighting::from(&done.solution)
+            };
+            renderers.push(Renderer::new(device, scene, lighting, &view, 1)?);
         }
     }
-    let bars = rows.iter().filter_map(|row| {
-        Some(Bar {
-            group: groups.iter().position(|g| *g == row.scene)?,
-            kind: KINDS.iter().position(|k| k.0 == row.kind)?,
-            value: row.seconds,
-            spread: None,
-        })
-    });
-    Bars {
-        caption: "Time of a bake",
-        unit: "seconds",
-        bars: bars.collect(),
-        kinds: KINDS
-            .iter()
-            .map(|(kind, colour)| (bake_name(kind), *colour))
-            .collect(),
-        groups,
+    let times = frame::in_turns(&renderers, options.frame_rounds)?;
+    drop(renderers);
+    // The fastest frame has the highest rate.
+    let rate = |&(median, low, high): &(f64, f64, f64)| Rate {
+        median: 1e3 / median,
+        low: 1e3 / high,
+        high: 1e3 / low,
+    };
+    let rows = bakes.iter_mut().filter(|d| d.solution.relief.is_some());
+    for (done, times) in rows.zip(times.chunks_exact(2)) {
+        done.row.fps_factored = Some(rate(&times[0]));
+        done.row.fps_clusters = Some(rate(&times[1]));
+        let k = KINDS.iter().position(|k| k.0 == done.row.kind);
+        done.row.paper_fps = k.and_then(|k| paper.get(k.checked_sub(1)?).copied());
     }
-}
-
-/// A kind of bake as it is shown.
-fn bake_name(kind: &str) -> String {
-    match kind.parse::<u32>() {
-        Ok(k) => format!("K = {k}"),
-        Err(_) => kind.to_owned(),
-    }
+    Ok(())
 }

@@ -81,10 +81,11 @@ pub struct SolveOptions {
     /// How relief takes part: keeping energy, by the paper's equations, or not at all
     #[arg(long, value_enum, default_value = "physical")]
     transport: TransportName,
-    /// Folder that keeps the visibility of reliefs from run to run [default: mesolux in the user's cache folder]
+    /// Folder that keeps the visibility of reliefs from run to run, and bakes that `render` makes of scenes, the 16 used last
+    /// and 1 GiB at most [default: mesolux in the user's cache folder]
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
-    /// Compute the visibility of reliefs anew and do not keep it
+    /// Compute everything anew and keep nothing
     #[arg(long, conflicts_with = "cache")]
     no_cache: bool,
 }
@@ -283,7 +284,7 @@ fn kept_with(bake: &Path) -> Result<Visibility> {
 }
 
 /// Where the scene came from, for the bake's metadata; paths are made absolute.
-fn origin(scene: &str, builtin: &Builtin, hash: String) -> Origin {
+pub fn origin(scene: &str, builtin: &Builtin, hash: String) -> Origin {
     let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     let named = mesolux::scene::builtin::NAMES.contains(&scene);
     Origin {

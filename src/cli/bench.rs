@@ -18,19 +18,22 @@ pub struct Options {
 
 #[derive(Subcommand)]
 enum What {
-    /// Milliseconds a frame of the three scenes, by shading of the relief and number of directions
+    /// Milliseconds a frame of the three scenes, by shading of the relief, number of directions and size
     Frame(FrameOptions),
     /// Hemicubes a second in the Cornell box, with and without culling, side by side
     Hemicube(HemicubeOptions),
     /// Irradiance of bakes of one scene, on what has no relief, against path traced irradiance with the relief as geometry
     Irradiance(IrradianceOptions),
-    /// The paper's Table 1: three scenes in 16, 32 and 64 directions, without directions, and with the relief as geometry
+    /// Pictures of relief against path traced geometry: relMSE, bias and HDR-FLIP by material, view and part of the light
+    Pictures(super::bench_pictures::Options),
+    /// The paper's Table 1, minutes and frames a second: three scenes in 16, 32 and 64 directions, without directions, and with
+    /// the relief as geometry
     Table1(Table1Options),
 }
 
 #[derive(Args)]
 struct Table1Options {
-    /// Folder for table1.csv, table1.json and table1.svg
+    /// Folder for table1.csv, table1.json, table1.svg and table1-fps.svg
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// Only this scene (fruit-platter, bowl-and-bunny, cornell-relief); may be given again
@@ -42,6 +45,9 @@ struct Table1Options {
     /// Error bound at which a bake is done, as a share of the emitted power
     #[arg(long, value_name = "X", default_value_t = 0.01)]
     residual: f64,
+    /// Rounds over which the frames are measured, 1280x720 pixels; each draws every kind of frame once; 0: no frames
+    #[arg(long, value_name = "N", default_value_t = 9)]
+    frame_rounds: usize,
     /// Leave out the bake of the relief as geometry, which takes longest
     #[arg(long)]
     no_high_poly: bool,
@@ -57,9 +63,9 @@ struct FrameOptions {
     /// Only these scenes; the three of Table 1 if not given
     #[arg(long, value_name = "SCENE")]
     scene: Vec<String>,
-    /// Pixels across and down, one sample each
+    /// Pixels across and down, one sample each; may be given again
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = super::render::size)]
-    size: (u32, u32),
+    size: Vec<(u32, u32)>,
     /// Rounds; each draws every kind of frame once
     #[arg(long, value_name = "N", default_value_t = 15)]
     rounds: usize,
@@ -104,6 +110,7 @@ pub fn run(options: &Options) -> Result<()> {
         What::Hemicube(options) => run_hemicube(options),
         What::Frame(options) => run_frame(options),
         What::Irradiance(options) => run_irradiance(options),
+        What::Pictures(options) => super::bench_pictures::run(options),
         What::Table1(options) => run_table1(options),
     }
 }
@@ -117,12 +124,12 @@ fn run_frame(options: &FrameOptions) -> Result<()> {
     let device = options.device.open()?;
     let cache = super::bake::cache_folder();
     let wanted = frame::Options {
-        size: options.size,
+        sizes: options.size.clone(),
         rounds: options.rounds.max(1),
-        shots: 256,
+        shots: 1024,
         cache: cache.as_deref(),
     };
-    println!("{}; {}x{}", device.name(), options.size.0, options.size.1);
+    println!("{}", device.name());
     println!("{}", frame::HEADER);
     let mut rows = Vec::new();
     for name in &scenes {
@@ -182,6 +189,8 @@ fn run_table1(options: &Table1Options) -> Result<()> {
         patches: options.patches,
         residual: options.residual,
         high_poly: !options.no_high_poly,
+        frame_rounds: options.frame_rounds,
+        cache: super::bake::cache_folder(),
     };
     let device = options.device.open()?;
     super::progress::catch_interrupts();

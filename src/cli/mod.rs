@@ -2,6 +2,7 @@
 
 mod bake;
 mod bench;
+mod bench_pictures;
 mod camera;
 mod compare;
 mod info;
@@ -9,6 +10,7 @@ mod progress;
 mod reference;
 mod render;
 mod scene;
+mod series;
 mod show;
 
 use std::path::{Path, PathBuf};

@@ -1,6 +1,7 @@
 //! What a long command shows on its way, and how it is stopped.
 
 use std::io::IsTerminal;
+use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -8,17 +9,22 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-/// The first Ctrl-C asks the solver to stop and keep its result, the second ends the program.
+/// The first Ctrl-C asks what is under way to stop and keep its result, the second ends the program. Asking for this again
+/// forgets a Ctrl-C that has been heeded.
 pub fn catch_interrupts() {
-    let caught = ctrlc::set_handler(|| {
-        if INTERRUPTED.swap(true, Ordering::SeqCst) {
-            std::process::exit(130);
+    static ONCE: Once = Once::new();
+    INTERRUPTED.store(false, Ordering::SeqCst);
+    ONCE.call_once(|| {
+        let caught = ctrlc::set_handler(|| {
+            if INTERRUPTED.swap(true, Ordering::SeqCst) {
+                std::process::exit(130);
+            }
+            eprintln!("stopping after this step; the result so far is kept (again: stop at once)");
+        });
+        if let Err(error) = caught {
+            tracing::warn!("Ctrl-C will not keep the result: {error}");
         }
-        eprintln!("stopping after this batch; the result so far is kept (again: stop at once)");
     });
-    if let Err(error) = caught {
-        tracing::warn!("Ctrl-C will not keep the result: {error}");
-    }
 }
 
 pub fn interrupted() -> bool {

@@ -5,21 +5,25 @@ use std::sync::Arc;
 
 use clap::Args;
 
-use super::bake::{SolveOptions, bake_visibly, writable};
+use super::bake::{SolveOptions, bake_visibly, origin, writable};
 use super::camera::CameraOptions;
+use super::progress::interrupted;
 use super::reference::{self, ReferenceOptions};
+use super::series::{self, SeriesOptions};
 use super::show::ShowOptions;
 use super::{Builtin, DeviceOptions};
+use mesolux::bake_cache::CachedBake;
 use mesolux::error::{Error, Result};
-use mesolux::render::{FileKind, Lighting, Picture, View, render};
+use mesolux::render::{FileKind, Lighting, Picture, Renderer, SAMPLES, View};
 use mesolux::scene::{Camera, Scene};
 use mesolux::solution::Bake;
+use mesolux::solver::Settings;
 use mesolux::vk::Device;
 
 /// Draw a scene or a bake to a picture
 ///
-/// A PNG is exposed and tone-mapped; an EXR holds linear radiance. A SCENE is baked first, with the options of `bake`, or
-/// path traced with --reference.
+/// A PNG is exposed and tone-mapped; an EXR holds linear radiance. A SCENE is baked first, with the options of `bake`, and the
+/// bake is kept for the next time; or it is path traced with --reference.
 #[derive(Args)]
 pub struct Options {
     /// A scene (see `bake`) or a bake (.safetensors)
@@ -36,6 +40,8 @@ pub struct Options {
     /// Multiplies the light by 2^EV; found from the picture if not given
     #[arg(long, value_name = "EV", allow_hyphen_values = true)]
     exposure: Option<f32>,
+    #[command(flatten)]
+    series: SeriesOptions,
     #[command(flatten)]
     show: ShowOptions,
     #[command(flatten)]
@@ -80,35 +86,76 @@ pub fn run(options: &Options) -> Result<()> {
         }
         return run_reference(options);
     }
-    let solve = &options.solve;
-    let cache = solve.settings()?.relief.cache;
-    let draw = |device: &Arc<Device>, scene: &Scene, lighting: Lighting<'_>, view: &View<'_>| {
-        let lighting = Lighting {
-            cache: cache.as_deref(),
-            ..lighting
-        };
-        let parts = options.show.parts().iter();
-        let pictures = parts
-            .map(|&part| render(device, scene, options.show.apply(lighting, part), view))
-            .collect::<Result<Vec<_>>>()?;
-        options.device.check()?;
-        options.write(&Picture::side_by_side(&pictures)?, view)
-    };
-    if is_bake {
+    let settings = options.solve.settings()?;
+    let folder = settings.relief.cache.as_deref();
+    let (scene, bake) = if is_bake {
         let bake = Bake::load(path)?;
-        let scene = Builtin::scene_of(path, &bake)?;
-        let camera = options.camera.of(&scene)?;
-        let view = options.view(&camera);
-        let device = options.device.open()?;
-        return draw(&device, &scene, (&bake).into(), &view);
-    }
-    let settings = solve.settings()?;
-    let scene = options.builtin.load(&options.input)?;
+        (Builtin::scene_of(path, &bake)?, Some(bake))
+    } else {
+        settings.check()?;
+        (options.builtin.load(&options.input)?, None)
+    };
+    // Whatever is wrong with the views is told before the bake.
     let camera = options.camera.of(&scene)?;
-    let view = options.view(&camera);
+    let cameras = options.series.cameras(&scene, &camera)?;
     let device = options.device.open()?;
-    let solution = bake_visibly(&device, &scene, &settings)?;
-    draw(&device, &scene, (&solution).into(), &view)
+    let found = match (bake, folder) {
+        (Some(bake), _) => Some(bake),
+        (None, Some(folder)) => kept_bake(&options.cached(folder, &scene, &settings, &device)),
+        (None, None) => None,
+    };
+    let solution = match &found {
+        Some(_) => None,
+        None => Some(bake_visibly(&device, &scene, &settings)?),
+    };
+    if let (Some(solution), Some(folder)) = (&solution, folder) {
+        let origin = origin(&options.input, &options.builtin, scene.hash());
+        let cached = options.cached(folder, &scene, &settings, &device);
+        match cached.save(solution, &origin, &options.solve) {
+            Ok(true) => tracing::info!("bake kept as {}", cached.path.display()),
+            Ok(false) => tracing::info!("a bake that was stopped is not kept"),
+            Err(error) => tracing::warn!("the bake is not kept: {error}"),
+        }
+    }
+    let lighting = match (&found, &solution) {
+        (Some(bake), _) => Lighting::from(bake),
+        (None, Some(solution)) => Lighting::from(solution),
+        (None, None) => unreachable!("a scene is baked where no bake was found"),
+    };
+    let lighting = Lighting {
+        cache: folder,
+        ..lighting
+    };
+    options.draw(&device, &scene, lighting, &camera, cameras.as_deref())?;
+    options.device.check()
+}
+
+/// The bake that the cache has, if it has one.
+fn kept_bake(cached: &CachedBake) -> Option<Bake> {
+    match cached.load() {
+        Ok(found) => {
+            if found.is_some() {
+                tracing::info!("bake found in the cache: {}", cached.path.display());
+            }
+            found
+        }
+        Err(error) => {
+            tracing::warn!("{error}; baking again");
+            None
+        }
+    }
+}
+
+/// The program as it was built: a rebuilt one may bake otherwise.
+fn program() -> String {
+    let version = env!("CARGO_PKG_VERSION");
+    let built = std::env::current_exe()
+        .and_then(std::fs::metadata)
+        .and_then(|file| Ok((file.len(), file.modified()?)));
+    match built {
+        Ok((length, at)) => format!("mesolux {version} {length} {at:?}"),
+        Err(_) => format!("mesolux {version}"),
+    }
 }
 
 /// The same by the path tracer.
@@ -117,16 +164,27 @@ fn run_reference(options: &Options) -> Result<()> {
     let budget = solve.budget()?;
     let scene = options.builtin.load(&options.input)?;
     let camera = options.camera.of(&scene)?;
+    let cameras = options.series.cameras(&scene, &camera)?;
     let scene = reference::tessellated(scene);
-    let view = options.view(&camera);
-    let parts = options.show.parts().iter();
-    let pictures = parts
-        .map(|&part| {
-            let settings = options.reference.settings(budget, solve.seed, part);
-            Ok(reference::draw(&scene, &view, &settings)?.picture())
-        })
-        .collect::<Result<Vec<_>>>()?;
-    options.write(&Picture::side_by_side(&pictures)?, &view)
+    let trace = |camera: &Camera| {
+        let view = options.view(camera);
+        let parts = options.show.parts().iter();
+        let pictures = parts
+            .map(|&part| {
+                let settings = options.reference.settings(budget, solve.seed, part);
+                Ok(reference::draw(&scene, &view, &settings)?.picture())
+            })
+            .collect::<Result<Vec<_>>>()?;
+        Picture::side_by_side(&pictures)
+    };
+    match cameras {
+        None => options.write(&trace(&camera)?, &camera),
+        Some(cameras) => series::draw(&options.output, &cameras, options.exposure, |camera| {
+            let picture = trace(camera)?;
+            // Fewer paths than the others had would be seen.
+            Ok((!interrupted()).then_some(picture))
+        }),
+    }
 }
 
 impl Options {
@@ -138,14 +196,58 @@ impl Options {
         }
     }
 
-    fn write(&self, picture: &Picture, view: &View<'_>) -> Result<()> {
+    /// The place of this bake in the cache.
+    fn cached(
+        &self,
+        folder: &Path,
+        scene: &Scene,
+        settings: &Settings,
+        device: &Device,
+    ) -> CachedBake {
+        let maker = format!("{} on {}", program(), device.name());
+        CachedBake::new(folder, &scene.hash(), settings, &maker)
+    }
+
+    /// One picture, or a series of them.
+    fn draw(
+        &self,
+        device: &Arc<Device>,
+        scene: &Scene,
+        lighting: Lighting<'_>,
+        camera: &Camera,
+        cameras: Option<&[Camera]>,
+    ) -> Result<()> {
+        let first = cameras.and_then(|c| c.first()).unwrap_or(camera);
+        let parts = self.show.parts().iter();
+        let mut renderers = parts
+            .map(|&part| {
+                let lighting = self.show.apply(lighting, part);
+                Renderer::new(device, scene, lighting, &self.view(first), SAMPLES)
+            })
+            .collect::<Result<Vec<_>>>()?;
+        let drawn = |renderers: &[Renderer<'_>]| {
+            let pictures = renderers.iter().map(Renderer::picture);
+            Picture::side_by_side(&pictures.collect::<Result<Vec<_>>>()?)
+        };
+        let Some(cameras) = cameras else {
+            return self.write(&drawn(&renderers)?, camera);
+        };
+        series::draw(&self.output, cameras, self.exposure, |camera| {
+            for renderer in &mut renderers {
+                renderer.look(&self.view(camera))?;
+            }
+            Ok(Some(drawn(&renderers)?))
+        })
+    }
+
+    fn write(&self, picture: &Picture, camera: &Camera) -> Result<()> {
         picture.write(&self.output, self.exposure)?;
         tracing::info!(
             "{}: {}x{}, camera {}",
             self.output.display(),
             picture.width,
             picture.height,
-            view.camera.name
+            camera.name
         );
         Ok(())
     }

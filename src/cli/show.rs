@@ -17,7 +17,7 @@ pub struct ShowOptions {
         conflicts_with = "reference"
     )]
     shading: ShadingName,
-    /// How light straight from emitters falls on relief
+    /// How light straight from emitters and point lights is drawn
     #[arg(
         long,
         value_enum,
@@ -51,6 +51,9 @@ enum LightName {
 enum ShadingName {
     /// Relief mapping, lit by the factors of the relief's response
     Factored,
+    /// Relief mapping, lit as in the paper by a few parallel lights a triangle, each shadowed at each pixel; slower the more
+    /// directions there are, and --direct does nothing
+    Clusters,
     /// Flat and lit by the relief's response
     Normal,
     /// The same, its texture shifted by the height
@@ -61,9 +64,9 @@ enum ShadingName {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum DirectName {
-    /// Shadowed by the relief at each pixel
+    /// Shadowed at each pixel by the scene and by the relief itself
     Sharp,
-    /// By the slots, as in the paper
+    /// As it was baked, on relief by the slots, as in the paper; quicker
     Slots,
 }
 
@@ -79,6 +82,11 @@ enum ViewName {
     Height,
     /// Irradiance over pi, as on a white surface
     Irradiance,
+    /// Each triangle's strongest slot: hue, its direction about the normal (red along u, yellow-green along v); bright,
+    /// near the normal; coloured, most of the light, and grey, light from everywhere
+    Slots,
+    /// Fragments of prisms that a sample shades, hidden ones too; dark: none, the bar below: from 0 to the printed number
+    Overdraw,
 }
 
 impl ShowOptions {
@@ -98,6 +106,7 @@ impl ShowOptions {
             part,
             shading: match self.shading {
                 ShadingName::Factored => ReliefShading::Factored,
+                ShadingName::Clusters => ReliefShading::Clusters,
                 ShadingName::Normal => ReliefShading::Normal,
                 ShadingName::Parallax => ReliefShading::Parallax,
                 ShadingName::None => ReliefShading::None,
@@ -112,6 +121,8 @@ impl ShowOptions {
                 ViewName::Normal => Show::Normal,
                 ViewName::Height => Show::Height,
                 ViewName::Irradiance => Show::Irradiance,
+                ViewName::Slots => Show::Slots,
+                ViewName::Overdraw => Show::Overdraw,
             },
             ..lighting
         }

@@ -2,26 +2,32 @@
 //!
 //! ```text
 //! height map ─► height field ─► visibility (GPU, cached) ─► response ─► relief of the elements
-//! solution ─► vertices
+//! solution ─► vertices ─► clusters
 //! ```
 
+mod clusters;
 mod exchange;
 mod factors;
+mod footprints;
 mod height_field;
 mod height_pyramid;
 mod relief;
 mod response;
+mod scattering;
 mod tiles;
 mod transfer;
 mod vertices;
 mod visibility;
 
+pub use clusters::{Cluster, FaceClusters, NEAR_PARALLEL_COS, clusters};
 pub use factors::{CORNERS, Factors, RANK_STEP};
+pub use footprints::Footprints;
 pub use height_field::{Facet, HeightField};
 pub use height_pyramid::HeightPyramid;
 pub(crate) use relief::visibility;
-pub use relief::{Class, Options, Relief, Transport};
+pub use relief::{Class, MOST_FOOTPRINTS, Options, Relief, Transport};
 pub use response::{Block, Response, slot_shares};
+pub use scattering::Scattering;
 pub use tiles::{Frame, Shading, Tile, tiles};
 pub use vertices::MesoVertices;
 pub use visibility::Visibility;

@@ -1,18 +1,23 @@
-//! The relief of a scene's elements: tangent frames, and one response for each material and size of its tiles.
+//! The relief of a scene's elements: tangent frames, and responses: one for each material and size of its tiles, and where
+//! elements are smaller than a tile one for each footprint.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use glam::Vec3;
+use bytemuck::Zeroable;
+use glam::{DVec2, Vec3};
 use serde::Serialize;
 
+use super::response::Block;
+use super::scattering::Scattering;
 use super::tiles::{Tile, tiles};
-use super::{HeightField, Response, Visibility};
+use super::{Footprints, HeightField, Response, Visibility};
 use crate::constants::NONE;
 use crate::directions::Directions;
 use crate::elements::Elements;
 use crate::error::Result;
 use crate::passes::relief_visibility::ReliefVisibility;
+use crate::passes::types::{MesoTexel, TextureFacet};
 use crate::scene::Scene;
 use crate::vk::Device;
 
@@ -62,11 +67,29 @@ pub struct Relief {
     /// Along growing u and growing v, orthogonal, unit; zero for an element without relief.
     pub tangent: Vec<Vec3>,
     pub bitangent: Vec<Vec3>,
-    /// The element's own mean reflectance over the tile's.
+    /// The element's own mean reflectance over that of its response's facets.
     pub scale: Vec<Vec3>,
     pub responses: Vec<Response>,
     pub classes: Vec<Class>,
+    /// Where the elements lie in their textures; `paper` transport alone.
+    pub texels: Option<Texels>,
+    /// Most of what reaches any relief, the same light over all of its tile, that leaves it again.
+    pub highest_albedo: f32,
 }
+
+/// Normals and reflectance that the pixels of an item buffer look up.
+#[derive(Debug, Clone, Default)]
+pub struct Texels {
+    /// `[element]` in the elements' own order; zero for one without relief.
+    pub elements: Vec<MesoTexel>,
+    /// Those of each tile's height field after those of the last.
+    pub facets: Vec<TextureFacet>,
+}
+
+/// Bytes of all responses at most, unless each tile has but one.
+const MOST_RESPONSES: usize = 32 << 20;
+/// Footprints of a tile at most.
+pub const MOST_FOOTPRINTS: usize = 256;
 
 /// One material at one size of its tiles.
 #[derive(Debug, Clone, Serialize)]
@@ -75,12 +98,46 @@ pub struct Class {
     /// Scene units that a repeat of the texture is wide and high.
     pub tile: [f64; 2],
     pub elements: usize,
+    /// Responses to parts of the tile, for elements smaller than it.
+    pub footprints: usize,
     pub facets: usize,
     pub rms_slope: f64,
     /// Mean reflectance of the facets, and share of a uniform sky's light that leaves the tile again, RGB.
     pub reflectance: [f32; 3],
     pub albedo: [f32; 3],
     pub visibility_from_cache: bool,
+}
+
+impl Texels {
+    /// A tile, whose members have these texture coordinates.
+    fn add(&mut self, directions: &Directions, tile: &Tile, coordinates: &[[DVec2; 3]]) {
+        let first = self.facets.len() as u32;
+        let shading = &tile.shading;
+        let facets = shading.normals.iter().zip(&shading.reflectance);
+        self.facets.extend(facets.map(|(normal, &reflectance)| {
+            let above = (0..directions.count())
+                .filter(|&k| normal.dot(directions.centre(k)) > 0.0)
+                .fold(0_u64, |bits, k| bits | 1 << k);
+            TextureFacet {
+                reflectance,
+                above_low: above as u32,
+                above_high: (above >> 32) as u32,
+            }
+        }));
+        for (&e, uv) in tile.members.iter().zip(coordinates) {
+            // Near the origin, where f32 is finest.
+            let home = uv[0].floor();
+            let [uv_a, uv_b, uv_c] = uv.map(|p| (p - home).as_vec2());
+            self.elements[e] = MesoTexel {
+                uv_a,
+                uv_b,
+                uv_c,
+                first,
+                columns: tile.field.columns,
+                rows: tile.field.rows,
+            };
+        }
+    }
 }
 
 impl Relief {
@@ -108,7 +165,15 @@ impl Relief {
             scale: vec![Vec3::ZERO; count],
             responses: Vec::new(),
             classes: Vec::new(),
+            texels: (options.transport == Transport::Paper).then(|| Texels {
+                elements: vec![MesoTexel::zeroed(); count],
+                facets: Vec::new(),
+            }),
+            highest_albedo: 0.0,
         };
+        let k = options.directions.count();
+        let most_responses = MOST_RESPONSES / (size_of::<Block>() * k * k);
+        let members_of_all: usize = tiles.iter().map(|tile| tile.members.len()).sum();
         let mut marcher = None;
         for tile in &tiles {
             let Tile {
@@ -118,51 +183,88 @@ impl Relief {
                 ..
             } = tile;
             let material = &scene.materials[tile.material as usize];
-            let (response, visibility_from_cache) = match options.transport {
+            let coordinates: Vec<[DVec2; 3]> = members
+                .iter()
+                .map(|&e| scene.triangles[elements.input_index[e] as usize].uv)
+                .map(|uv| uv.map(|[u, v]| DVec2::new(f64::from(u), f64::from(v))))
+                .collect();
+            // Responses are dealt out by the tiles' elements.
+            let most = (most_responses * tile.members.len() / members_of_all).min(MOST_FOOTPRINTS);
+            let footprints = Footprints::new(field, &coordinates, most);
+            let (whole, parts, visibility_from_cache) = match options.transport {
                 Transport::Physical => {
                     let (visibility, cached) =
                         visibility(device, field, options.cache.as_deref(), &mut marcher)?;
-                    let response = Response::physical(
+                    let scattering = Scattering::new(
                         &options.directions,
                         field,
                         &visibility,
                         &shading.normals,
                         &shading.reflectance,
                     );
-                    (response, cached)
+                    let whole = scattering.whole();
+                    let parts = scattering.of_footprints(&footprints, &whole);
+                    (whole, parts, cached)
                 }
                 _ => {
-                    let paper = Response::paper(
-                        &options.directions,
-                        &shading.normals,
-                        &shading.reflectance,
-                    );
-                    (paper, false)
+                    let paper = |shares: Option<&[f32]>| {
+                        Response::paper(
+                            &options.directions,
+                            &shading.normals,
+                            &shading.reflectance,
+                            shares,
+                        )
+                    };
+                    let parts = (0..footprints.count())
+                        .map(|f| paper(Some(&footprints.shares(f))))
+                        .collect();
+                    (paper(None), parts, false)
                 }
             };
             let mean = shading.mean_reflectance();
-            for &e in members {
+            let over = |own: Vec3, mean: Vec3| {
+                Vec3::select(mean.cmpgt(Vec3::ZERO), own / mean, Vec3::ZERO)
+            };
+            let means: Vec<Vec3> = (0..footprints.count())
+                .map(|f| footprints.mean(f, &shading.reflectance))
+                .collect();
+            let mut highest = 0.0_f32;
+            let first = relief.responses.len() as u32;
+            let mut with_whole = false;
+            for (&e, &footprint) in members.iter().zip(&footprints.of) {
                 let Some(frame) = &frames[e] else { continue };
-                relief.class[e] = relief.responses.len() as u32;
+                let own = elements.reflectance[e];
+                highest = highest.max(over(own, mean).max_element());
                 relief.tangent[e] = frame.tangent.as_vec3();
                 relief.bitangent[e] = frame.bitangent.as_vec3();
-                relief.scale[e] = Vec3::select(
-                    mean.cmpgt(Vec3::ZERO),
-                    elements.reflectance[e] / mean,
-                    Vec3::ZERO,
-                );
+                with_whole |= footprint == NONE;
+                (relief.class[e], relief.scale[e]) = if footprint == NONE {
+                    (first + parts.len() as u32, over(own, mean))
+                } else {
+                    let mean = means[footprint as usize];
+                    (first + footprint, over(own, mean))
+                };
+            }
+            let albedo = whole.highest_albedo(&options.directions);
+            relief.highest_albedo = relief.highest_albedo.max(highest * albedo);
+            if let Some(texels) = &mut relief.texels {
+                texels.add(&options.directions, tile, &coordinates);
             }
             relief.classes.push(Class {
                 material: material.name.clone(),
                 tile: tile.size.to_array(),
                 elements: members.len(),
+                footprints: footprints.count(),
                 facets: field.facet_count(),
                 rms_slope: field.rms_slope(),
                 reflectance: mean.to_array(),
-                albedo: response.mean_albedo(&options.directions).to_array(),
+                albedo: whole.mean_albedo(&options.directions).to_array(),
                 visibility_from_cache,
             });
-            relief.responses.push(response);
+            relief.responses.extend(parts);
+            if with_whole {
+                relief.responses.push(whole);
+            }
         }
         Ok((!relief.responses.is_empty()).then_some(relief))
     }
@@ -185,26 +287,13 @@ impl Relief {
         apply(&mut self.tangent, order);
         apply(&mut self.bitangent, order);
         apply(&mut self.scale, order);
+        if let Some(texels) = &mut self.texels {
+            apply(&mut texels.elements, order);
+        }
     }
 
     pub fn response(&self, element: usize) -> &Response {
         &self.responses[self.class[element] as usize]
-    }
-
-    /// Most of what reaches any relief that leaves it again.
-    pub fn highest_albedo(&self) -> f32 {
-        let mut scales = vec![0.0_f32; self.responses.len()];
-        for (&class, scale) in self.class.iter().zip(&self.scale) {
-            if class != NONE {
-                let highest = &mut scales[class as usize];
-                *highest = highest.max(scale.max_element());
-            }
-        }
-        self.responses
-            .iter()
-            .zip(scales)
-            .map(|(response, scale)| scale * response.highest_albedo(&self.directions))
-            .fold(0.0, f32::max)
     }
 }
 

@@ -9,12 +9,10 @@
 //! gives back linear functions and the sum over a slot exactly, the rows of W and those of G with the sky sum to 1.
 
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 
-use super::exchange::Exchange;
-use super::transfer::{CELLS, Facets, Fit};
+use super::scattering::Scattering;
 use super::{HeightField, Visibility};
-use crate::directions::{Directions, FineCell};
+use crate::directions::Directions;
 
 /// A slot's colour-by-vector block: `[colour]` rows that multiply a moment's vector of that colour.
 pub type Block = [Vec3; 3];
@@ -44,10 +42,6 @@ pub fn slot_shares(directions: &Directions) -> Vec<f64> {
     shares.iter().map(|s| s / sum).collect()
 }
 
-/// Bounces stop when the largest change is this share of the largest value.
-const CONVERGED: f32 = 1e-6;
-const MOST_BOUNCES: usize = 2_000;
-
 impl Response {
     /// `physical` transport. `reflectance` and the normals that shade are given `[facet]`.
     pub fn physical(
@@ -57,51 +51,27 @@ impl Response {
         normals: &[DVec3],
         reflectance: &[Vec3],
     ) -> Self {
-        let facets = Facets::new(field, normals, visibility);
-        let fit = Fit::new(directions);
-        let count = field.facet_count();
-        let k = directions.count();
-        // Vectors of each facet, `[facet][in]`.
-        let vectors: Vec<Vec3> = facets
-            .transfer
-            .par_chunks(CELLS)
-            .flat_map_iter(|row| fit.apply(row))
-            .collect();
-        let exchange = Exchange::new(visibility, &facets.sky);
-        let looks: Vec<Vec<(usize, f32)>> = slots_of_cells(directions);
-        let columns: Vec<(Vec<Block>, Vec3)> = (0..k)
-            .into_par_iter()
-            .map(|out| {
-                let seen = seen_from(&facets, &looks[out]);
-                let weights = gathered(&exchange, &seen, reflectance);
-                let mut column = vec![[Vec3::ZERO; 3]; k];
-                let mut emission = Vec3::ZERO;
-                for q in 0..count {
-                    emission += weights[q];
-                    let sent = weights[q] * reflectance[q];
-                    for (block, v) in column.iter_mut().zip(&vectors[q * k..]) {
-                        for c in 0..3 {
-                            block[c] += sent[c] * *v;
-                        }
-                    }
-                }
-                (column, emission)
-            })
-            .collect();
-        Self::new(directions, &columns)
+        Scattering::new(directions, field, visibility, normals, reflectance).whole()
     }
 
     /// `paper` transport, equations (3) and (4): a pixel's irradiance, whatever its direction, leaves with its albedo in
     /// every direction less than 90° from its normal. The facets are seen as the flat element shows them, each alike.
-    pub fn paper(directions: &Directions, normals: &[DVec3], reflectance: &[Vec3]) -> Self {
+    /// `shares` of the facets in what is seen sum to 1; where none are given, all facets are seen alike.
+    pub fn paper(
+        directions: &Directions,
+        normals: &[DVec3],
+        reflectance: &[Vec3],
+        shares: Option<&[f32]>,
+    ) -> Self {
         let k = directions.count();
-        let share = 1.0 / normals.len() as f32;
+        let alike = 1.0 / normals.len() as f32;
+        let share = |q: usize| shares.map_or(alike, |shares| shares[q]);
         let columns: Vec<(Vec<Block>, Vec3)> = (0..k)
             .map(|out| {
                 let direction = directions.centre(out);
                 let above = || (0..normals.len()).filter(|&q| normals[q].dot(direction) > 0.0);
-                let sent: Vec3 = above().map(|q| reflectance[q] * share).sum();
-                let emission = Vec3::splat(above().count() as f32 * share);
+                let sent: Vec3 = above().map(|q| reflectance[q] * share(q)).sum();
+                let emission = Vec3::splat(above().map(share).sum());
                 let block = [sent.x, sent.y, sent.z].map(|s| Vec3::new(0.0, 0.0, s));
                 (vec![block; k], emission)
             })
@@ -110,7 +80,7 @@ impl Response {
     }
 
     /// From the columns, `[out]` of `[in]`, and the emission.
-    fn new(directions: &Directions, columns: &[(Vec<Block>, Vec3)]) -> Self {
+    pub(super) fn new(directions: &Directions, columns: &[(Vec<Block>, Vec3)]) -> Self {
         let k = directions.count();
         let shares = slot_shares(directions);
         let mut matrix = Vec::with_capacity(k * k);
@@ -185,62 +155,4 @@ impl Response {
             })
             .fold(0.0, f32::max)
     }
-}
-
-/// For each slot, the fine cells that a bilinear look-up takes from it, with their weights.
-fn slots_of_cells(directions: &Directions) -> Vec<Vec<(usize, f32)>> {
-    let mut looks = vec![Vec::new(); directions.count()];
-    for (i, cell) in FineCell::all().enumerate() {
-        for (slot, weight) in directions.bilinear(cell.direction) {
-            if weight > 0.0 {
-                looks[slot].push((i, weight as f32));
-            }
-        }
-    }
-    looks
-}
-
-/// W of one slot: the share of each facet in what is seen from its directions.
-fn seen_from(facets: &Facets, looks: &[(usize, f32)]) -> Vec<f32> {
-    let mut seen: Vec<f64> = facets
-        .transfer
-        .chunks_exact(CELLS)
-        .zip(&facets.area)
-        .map(|(row, area)| {
-            let sum: f32 = looks.iter().map(|&(i, weight)| weight * row[i]).sum();
-            area * f64::from(sum)
-        })
-        .collect();
-    let sum: f64 = seen.iter().sum();
-    seen.iter_mut().for_each(|s| *s /= sum);
-    seen.into_iter().map(|s| s as f32).collect()
-}
-
-/// What each facet's own light adds to what is seen, all bounces inside the relief included: y = w + Gᵀ ρ y.
-fn gathered(exchange: &Exchange, seen: &[f32], reflectance: &[Vec3]) -> Vec<Vec3> {
-    let mut total: Vec<Vec3> = seen.iter().map(|&w| Vec3::splat(w)).collect();
-    let mut bounce = total.clone();
-    let mut highest = total.iter().map(|v| v.max_element()).fold(0.0, f32::max);
-    for _ in 0..MOST_BOUNCES {
-        let sent: Vec<Vec3> = bounce
-            .iter()
-            .zip(reflectance)
-            .map(|(y, r)| *y * *r)
-            .collect();
-        let mut change = 0.0_f32;
-        for (q, y) in bounce.iter_mut().enumerate() {
-            *y = exchange
-                .to(q)
-                .iter()
-                .map(|&(from, weight)| sent[from as usize] * weight)
-                .sum();
-            total[q] += *y;
-            change = change.max(y.max_element());
-            highest = highest.max(total[q].max_element());
-        }
-        if change <= CONVERGED * highest {
-            break;
-        }
-    }
-    total
 }

@@ -54,6 +54,7 @@ impl ItemBuffer {
                     format: Format::R32G32B32_SFLOAT,
                     offset: 0,
                 }],
+                sums: false,
             },
         )?;
         Ok(Self { pass, pipeline })

@@ -11,6 +11,7 @@ pub mod item_buffer;
 pub mod keep;
 pub mod measure;
 pub mod measure_relief;
+pub mod pixels_relief;
 pub mod relief;
 pub mod relief_buffers;
 pub mod relief_rays;
@@ -18,6 +19,7 @@ pub mod relief_visibility;
 pub mod select;
 pub mod send_relief;
 pub mod shade;
+pub mod shadow_rays;
 pub mod types;
 
 use crate::constants::GROUP;

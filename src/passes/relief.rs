@@ -10,8 +10,8 @@ use glam::{Vec3, Vec4};
 use super::buffers::upload;
 use super::shade::Shade;
 use super::shaders;
-use super::types::{HeightTile, LightPoint, Prism, ReliefSurface};
-use crate::constants::KIND_SURFACE;
+use super::shadow_rays::LightBuffers;
+use super::types::{HeightTile, ParallelLight, Prism, ReliefSurface};
 use crate::error::Result;
 use crate::vk::{
     Bind, Binding, Buffer, BufferUse, Commands, DescriptorSet, Device, Format, GraphicsPipeline,
@@ -40,9 +40,6 @@ pub struct Parameters {
     pub pixel: f32,
     /// Columns and rows of the directions.
     pub cells: [u32; 2],
-    /// Of the light points; those of emitters come first.
-    pub light_count: u32,
-    pub emitter_points: u32,
 }
 
 /// What a picture's relief is made of, `[prism]` and `[surface]`.
@@ -57,17 +54,13 @@ pub struct Parts<'a> {
     pub coefficients: &'a [[Vec3; 2]],
     /// `[light vertex][direction]`
     pub exits: &'a [Vec3],
-    /// Those of emitters first, LIGHT_POINTS or none.
-    pub light_points: &'a [LightPoint],
-    /// Share of their light that arrives, `[light vertex]`.
-    pub light_shares: &'a [Vec3],
+    /// As the prisms count them.
+    pub parallel_lights: &'a [ParallelLight],
 }
 
 /// [`Parts`] on the device.
 pub struct Buffers {
-    parts: [Buffer; 9],
-    light_count: u32,
-    emitter_points: u32,
+    parts: [Buffer; 8],
     vertices: Buffer,
     indices: Buffer,
 }
@@ -95,13 +88,13 @@ const HULL: [u32; 24] = [
 ];
 
 impl Relief {
-    /// Draws into the targets of `shade`.
-    pub fn new(device: &Arc<Device>, shade: &Shade) -> Result<Self> {
+    /// Draws into the targets of `shade`; with `counts`, for VIEW_OVERDRAW alone, sums over all fragments, hidden or not.
+    pub fn new(device: &Arc<Device>, shade: &Shade, counts: bool) -> Result<Self> {
         let attribute = |format, offset: usize| VertexAttribute {
             format,
             offset: offset as u32,
         };
-        let mut bindings = [Binding::Storage; 10];
+        let mut bindings = [Binding::Storage; 12];
         bindings[0] = Binding::Sampled;
         Ok(Self {
             pipeline: GraphicsPipeline::new(
@@ -121,6 +114,7 @@ impl Relief {
                         ),
                         attribute(Format::R32_UINT, std::mem::offset_of!(Vertex, prism)),
                     ],
+                    sums: counts,
                 },
             )?,
         })
@@ -131,8 +125,9 @@ impl Relief {
         albedo: &Image,
         sampler: &Sampler,
         buffers: &Buffers,
+        lights: &LightBuffers,
     ) -> Result<DescriptorSet> {
-        let [a, b, c, d, e, f, g, h, i] = &buffers.parts;
+        let [a, b, c, d, e, f, g, clusters] = &buffers.parts;
         let buffer = Bind::Buffer;
         self.pipeline.bind(
             "relief",
@@ -145,8 +140,10 @@ impl Relief {
                 buffer(e),
                 buffer(f),
                 buffer(g),
-                buffer(h),
-                buffer(i),
+                buffer(&lights.points),
+                buffer(&lights.nodes),
+                buffer(&lights.triangles),
+                buffer(clusters),
             ],
         )
     }
@@ -169,11 +166,6 @@ impl Relief {
 }
 
 impl Buffers {
-    /// All light points, and those of emitters.
-    pub fn light_counts(&self) -> [u32; 2] {
-        [self.light_count, self.emitter_points]
-    }
-
     /// `mirrored` tells of each prism whether its a, b, c turn to the right seen from above.
     pub fn new(device: &Arc<Device>, parts: &Parts<'_>, mirrored: &[bool]) -> Result<Self> {
         let vertices: Vec<Vertex> = (0..)
@@ -203,15 +195,8 @@ impl Buffers {
                 upload(device, "relief factors", parts.factors, storage)?,
                 upload(device, "relief coefficients", parts.coefficients, storage)?,
                 upload(device, "relief exits", parts.exits, storage)?,
-                upload(device, "relief light points", parts.light_points, storage)?,
-                upload(device, "relief light shares", parts.light_shares, storage)?,
+                upload(device, "relief clusters", parts.parallel_lights, storage)?,
             ],
-            light_count: parts.light_points.len() as u32,
-            emitter_points: parts
-                .light_points
-                .iter()
-                .filter(|p| p.kind == KIND_SURFACE)
-                .count() as u32,
             vertices: upload(device, "relief vertices", &vertices, BufferUse::Geometry)?,
             indices: upload(device, "relief indices", &indices, BufferUse::Geometry)?,
         })

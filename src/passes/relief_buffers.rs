@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use bytemuck::Zeroable;
 use glam::Vec3;
 
 use super::buffers::upload;
@@ -42,9 +43,17 @@ pub struct ReliefBuffers {
     pub exits: Buffer,
     /// Slots without light that were left out, `[relief source]`.
     pub dark_slots: Buffer,
+    /// Whether elements reflect by the normal and albedo of each pixel; the rest is for that alone.
+    pub by_pixel: bool,
+    pub texels: Buffer,
+    pub facets: Buffer,
+    /// Reflected light by direction, `[meso element][direction]`.
+    pub outgoing: Buffer,
 }
 
 impl ReliefBuffers {
+    /// `by_pixel`: whether each pixel reflects by its own normal and albedo, as `pixel` estimator and `paper` transport do.
+    ///
     /// # Errors
     /// More directional state than a buffer of the device may hold.
     pub fn new(
@@ -53,6 +62,7 @@ impl ReliefBuffers {
         relief: &Relief,
         sources: &Sources,
         batch_slots: u32,
+        by_pixel: bool,
     ) -> Result<Self> {
         let k = relief.directions.count() as u64;
         let first_element = elements.len() - relief.count();
@@ -83,6 +93,10 @@ impl ReliefBuffers {
                 scale: relief.scale[e],
             })
             .collect();
+        let (texels, facets) = match &relief.texels {
+            Some(on) if by_pixel => (on.elements[meso.clone()].to_vec(), on.facets.clone()),
+            _ => (vec![Zeroable::zeroed()], vec![Zeroable::zeroed()]),
+        };
         let responses = || relief.responses.iter();
         let matrices: Vec<f32> = responses()
             .flat_map(|r| r.matrix.chunks_exact(k as usize))
@@ -133,6 +147,14 @@ impl ReliefBuffers {
             member_exits: storage("member exits", 12 * k * slots * u64::from(most_members))?,
             exits: storage("exits", 24 * k * slots)?,
             dark_slots: zeroed("dark slots", 4 * of_relief.len() as u64)?,
+            by_pixel,
+            // No buffer is empty: a shader that does not read one binds it all the same.
+            texels: upload(device, "meso texels", &texels, BufferUse::Storage)?,
+            facets: upload(device, "texture facets", &facets, BufferUse::Storage)?,
+            outgoing: zeroed(
+                "outgoing",
+                12 * if by_pixel { k * meso.len() as u64 } else { 1 },
+            )?,
         })
     }
 

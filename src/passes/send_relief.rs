@@ -20,8 +20,8 @@ impl SendRelief {
                 device,
                 "send relief",
                 shaders::SEND_RELIEF_COMP,
-                &[Binding::Storage; 14],
-                24,
+                &[Binding::Storage; 15],
+                28,
                 &[],
                 false,
             )?,
@@ -51,6 +51,7 @@ impl SendRelief {
                 &relief.member_exits,
                 &relief.exits,
                 &relief.dark_slots,
+                &relief.outgoing,
             ]
             .map(Bind::Buffer),
         )
@@ -71,6 +72,7 @@ impl SendRelief {
             relief.most_members,
             columns,
             rows,
+            u32::from(relief.by_pixel),
         ];
         cmd.dispatch(&self.pipeline, set, &parameters, [batch.all_slots(), 1, 1]);
     }

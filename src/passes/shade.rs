@@ -1,5 +1,5 @@
 //! Draws elements as radiance, L = ρ(u, v) · E / π + Le. Shaders: `shade.vert`, `shade.frag`; twin:
-//! [`crate::reference::shade`].
+//! [`crate::reference::shade`]. What comes straight from light points is compared with [`crate::path_tracer`].
 
 use std::sync::Arc;
 
@@ -7,6 +7,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 
 use super::shaders;
+use super::shadow_rays::LightBuffers;
 use crate::error::Result;
 use crate::vk::{
     Attachment, Bind, Binding, Buffer, BufferUse, Commands, DescriptorSet, Device, Format,
@@ -41,6 +42,20 @@ pub struct Parameters {
     pub emitted: Vec3,
     /// 1 where an exposure meter looks, 0 where it does not; goes to alpha.
     pub metered: f32,
+    /// Of the light points that light it straight; those of emitters come first.
+    pub light_count: u32,
+    pub emitter_points: u32,
+}
+
+impl Parameters {
+    /// The same, lit straight by so many light points, of which so many are of emitters.
+    pub fn lit_by(self, [light_count, emitter_points]: [u32; 2]) -> Self {
+        Self {
+            light_count,
+            emitter_points,
+            ..self
+        }
+    }
 }
 
 /// A run of vertices of one material.
@@ -85,7 +100,13 @@ impl Shade {
                 name: "shade",
                 vertex: shaders::SHADE_VERT,
                 fragment: shaders::SHADE_FRAG,
-                bindings: &[Binding::Sampled],
+                bindings: &[
+                    Binding::Sampled,
+                    Binding::Storage,
+                    Binding::Storage,
+                    Binding::Storage,
+                    Binding::Storage,
+                ],
                 push_bytes: size_of::<Parameters>(),
                 vertex_stride: size_of::<Vertex>() as u32,
                 attributes: &[
@@ -99,6 +120,7 @@ impl Shade {
                     ),
                     attribute(Format::R32G32_SFLOAT, std::mem::offset_of!(Vertex, uv)),
                 ],
+                sums: false,
             },
         )?;
         Ok(Self { pass, pipeline })
@@ -108,9 +130,29 @@ impl Shade {
         &self.pass
     }
 
-    /// Binds the texture of a material.
-    pub fn bind(&self, albedo: &Image, sampler: &Sampler) -> Result<DescriptorSet> {
-        self.pipeline.bind("shade", &[Bind::Image(albedo, sampler)])
+    /// Binds the texture of a material, the light points with what casts shadows, and what they light, [`LitTriangle`]s by
+    /// the order of the drawn triangles; none are needed where nothing is drawn by light points.
+    ///
+    /// # Errors
+    /// A device without the memory.
+    ///
+    /// [`LitTriangle`]: super::types::LitTriangle
+    pub fn bind(
+        &self,
+        (albedo, sampler): (&Image, &Sampler),
+        lights: &LightBuffers,
+        lit: &Buffer,
+    ) -> Result<DescriptorSet> {
+        self.pipeline.bind(
+            "shade",
+            &[
+                Bind::Image(albedo, sampler),
+                Bind::Buffer(&lights.points),
+                Bind::Buffer(&lights.nodes),
+                Bind::Buffer(&lights.triangles),
+                Bind::Buffer(lit),
+            ],
+        )
     }
 
     /// Draws into the left top `size` of the target, lets `then` draw there too, and copies all of it to where the CPU reads

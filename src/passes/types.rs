@@ -209,6 +209,29 @@ pub struct MesoElement {
     pub scale: Vec3,
 }
 
+/// Where an element with a relief lies in its texture.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct MesoTexel {
+    pub uv_a: Vec2,
+    pub uv_b: Vec2,
+    pub uv_c: Vec2,
+    /// Facet of the texture among those of all textures: two a cell, as in [`crate::meso::HeightField`].
+    pub first: u32,
+    pub columns: u32,
+    pub rows: u32,
+}
+
+/// A facet of a texture, as the pixel estimator looks it up.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct TextureFacet {
+    pub reflectance: Vec3,
+    /// A bit for each of the first 32 directions less than 90° from its normal, and for each of the others.
+    pub above_low: u32,
+    pub above_high: u32,
+}
+
 /// Reflected radiosity of an element with a relief, with the rounding error of its last sum.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -289,9 +312,22 @@ pub struct Prism {
     pub texel: f32,
     pub bitangent: Vec3,
     pub normal: Vec3,
+    pub first_cluster: u32,
+    pub cluster_count: u32,
+    pub slots: Vec3,
 }
 
-/// A place that shines on relief: a part of an emitter, or a point light.
+/// A parallel light on a face; see `shaders/shared/types.glsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct ParallelLight {
+    pub towards: Vec3,
+    pub fluence_a: Vec3,
+    pub fluence_b: Vec3,
+    pub fluence_c: Vec3,
+}
+
+/// A place that light comes straight from: a part of an emitter, or a point light.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub struct LightPoint {
@@ -299,8 +335,63 @@ pub struct LightPoint {
     pub position: Vec3,
     pub kind: u32,
     pub normal: Vec3,
+    /// Of the part of an emitter, internal units.
+    pub area: f32,
     /// Le times its area, or radiant intensity, in internal units.
     pub strength: Vec3,
+}
+
+/// A box of the tree of what casts shadows, in depth-first order.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct ShadowNode {
+    pub low: Vec3,
+    /// The node that follows all that is in this one.
+    pub skip: u32,
+    pub high: Vec3,
+    pub first: u32,
+    /// Triangles of a leaf, 0 in others.
+    pub count: u32,
+}
+
+/// What casts a shadow.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct ShadowTriangle {
+    pub a: Vec3,
+    pub b: Vec3,
+    pub c: Vec3,
+    /// 1: it stands for a relief about it.
+    pub relief: u32,
+}
+
+/// A straight way from `from` to `to`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct ShadowRay {
+    pub from: Vec3,
+    /// Share of the way before which triangles with a relief are passed over.
+    pub clear: f32,
+    pub to: Vec3,
+}
+
+/// A plain triangle that is lit straight, from the eye, internal units.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct LitTriangle {
+    pub a: Vec3,
+    pub b: Vec3,
+    pub c: Vec3,
+    /// Of the smooth surface at the corners.
+    pub normal_a: Vec3,
+    pub normal_b: Vec3,
+    pub normal_c: Vec3,
+    /// Its own normal.
+    pub plane: Vec3,
+    /// What rays start above it.
+    pub above: f32,
+    /// 1: nothing stands between it and the lights.
+    pub open: u32,
 }
 
 /// A relief as it is drawn.

@@ -86,7 +86,7 @@ pub fn side_by_side(ours: &Picture, reference: &Picture) -> Result<Picture> {
     })
 }
 
-fn same_size(a: &Picture, b: &Picture) -> Result<()> {
+pub(super) fn same_size(a: &Picture, b: &Picture) -> Result<()> {
     match (a.width, a.height) == (b.width, b.height) {
         true => Ok(()),
         false => Err(Error::Usage(format!(

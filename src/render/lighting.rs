@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::constants::{
     SHADING_NORMAL, SHADING_PARALLAX, SHADING_RELIEF, VIEW_ALBEDO, VIEW_HEIGHT, VIEW_IRRADIANCE,
-    VIEW_NORMAL, VIEW_SHADED,
+    VIEW_NORMAL, VIEW_OVERDRAW, VIEW_SHADED, VIEW_SLOTS,
 };
 use crate::scene::Scene;
 use crate::solution::{Bake, DirectionalLight, Solution};
@@ -49,6 +49,9 @@ pub enum ReliefShading {
     /// Relief mapping, lit by the factors of the relief's response.
     #[default]
     Factored,
+    /// Relief mapping, lit as in the paper: by parallel lights, the clusters of near-parallel slots, each shadowed at each pixel;
+    /// light inside the relief by the factors. Light straight from emitters is in the slots, whatever [`Direct`] says.
+    Clusters,
     /// Flat, lit by the relief's response: normal mapping, with its shadows and inner light.
     Normal,
     /// The same, with its texture shifted by its height.
@@ -60,21 +63,26 @@ pub enum ReliefShading {
 impl ReliefShading {
     pub(super) fn code(self) -> Option<u32> {
         match self {
-            Self::Factored => Some(SHADING_RELIEF),
+            Self::Factored | Self::Clusters => Some(SHADING_RELIEF),
             Self::Normal => Some(SHADING_NORMAL),
             Self::Parallax => Some(SHADING_PARALLAX),
             Self::None => None,
         }
     }
+
+    /// By rays through the height map.
+    pub(super) fn is_displaced(self) -> bool {
+        self.code() == Some(SHADING_RELIEF)
+    }
 }
 
-/// How light straight from emitters and point lights falls on relief.
+/// How light straight from emitters and point lights falls on surfaces.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Direct {
-    /// From points on them, shadowed by the relief at each pixel; by the rest of the scene at each vertex.
+    /// From points on them, shadowed at each sample by the scene and by the relief itself.
     #[default]
     Sharp,
-    /// By the slots, as in the paper.
+    /// As it was baked: on relief by the slots, as in the paper.
     Slots,
 }
 
@@ -91,6 +99,10 @@ pub enum Show {
     Height,
     /// E/π, as on a white surface.
     Irradiance,
+    /// The strongest slot of each triangle, see [`super::slot_colour`].
+    Slots,
+    /// How many fragments of prisms are shaded, see [`super::Overdraw`]; plain triangles are left out.
+    Overdraw,
 }
 
 impl Show {
@@ -101,6 +113,8 @@ impl Show {
             Self::Normal => VIEW_NORMAL,
             Self::Height => VIEW_HEIGHT,
             Self::Irradiance => VIEW_IRRADIANCE,
+            Self::Slots => VIEW_SLOTS,
+            Self::Overdraw => VIEW_OVERDRAW,
         }
     }
 }
@@ -118,6 +132,9 @@ pub struct Lighting<'a> {
     pub shading: ReliefShading,
     pub direct: Direct,
     pub show: Show,
+    /// Whether samples of plain triangles that nothing stands between and the lights follow no ways to light points: quicker,
+    /// and the same picture.
+    pub skip_open: bool,
     /// Folder that keeps the visibility of reliefs from run to run.
     pub cache: Option<&'a Path>,
 }
@@ -132,12 +149,34 @@ impl<'a> Lighting<'a> {
             shading: ReliefShading::default(),
             direct: Direct::default(),
             show: Show::default(),
+            skip_open: true,
             cache: None,
         }
     }
 
     pub(super) fn relief(&self) -> Option<(&'a DirectionalLight, u32)> {
         self.relief.zip(self.shading.code())
+    }
+
+    /// Whether light straight from emitters and point lights is shown by their points: only where the rest of the light is
+    /// known apart from it.
+    pub(super) fn sharp(&self) -> bool {
+        self.direct == Direct::Sharp
+            && self.part != Light::Indirect
+            && self.irradiance_direct.is_some()
+    }
+
+    /// The part of the irradiance that is shown as it was baked on plain triangles.
+    pub(super) fn baked(&self) -> Vec<Vec3> {
+        match self.irradiance_direct {
+            Some(_) if self.sharp() && self.part == Light::Direct => {
+                vec![Vec3::ZERO; self.irradiance.len()]
+            }
+            Some(direct) if self.sharp() => {
+                Light::Indirect.of(self.irradiance, direct, |all, direct| all - direct)
+            }
+            _ => self.irradiance(),
+        }
     }
 
     /// The part of the irradiance that is shown.

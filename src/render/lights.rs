@@ -1,23 +1,33 @@
-//! Points that emitters and point lights are taken for where their light on relief is drawn sharply.
+//! Points that emitters and point lights are taken for where their light is drawn sharply, and what casts shadows there.
 
-use glam::{DVec3, Vec3};
+use std::sync::Arc;
 
-use super::Projection;
-use crate::constants::{KIND_POINT, KIND_SURFACE, LIGHT_POINTS};
-use crate::passes::types::LightPoint;
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::shafts::Shafts;
+use super::{Lighting, Projection};
+use crate::constants::{KIND_POINT, KIND_SURFACE, LIGHT_POINTS, LIGHT_SETS};
+use crate::error::Result;
+use crate::passes::shadow_rays::{LightBuffers, ShadowTree};
+use crate::passes::types::{LightPoint, ShadowTriangle};
 use crate::scene::Scene;
 use crate::sources::triangle_area;
+use crate::vk::Device;
 
 /// A light point in scene units.
-pub struct Shining {
+struct Shining {
     position: DVec3,
     /// Of an emitter; none of a point light.
     normal: Option<DVec3>,
+    area: f64,
     strength: DVec3,
 }
 
-/// LIGHT_POINTS points on the emitters, if there are any, by their power, then the point lights.
-pub fn shining(scene: &Scene) -> Vec<Shining> {
+/// LIGHT_SETS sets of LIGHT_POINTS points on the emitters, if there are any, each by their power, then the point lights.
+fn shining(scene: &Scene) -> Vec<Shining> {
+    let mut whole = 0.0;
+    // Each with the power of all up to it.
     let emitters: Vec<(usize, DVec3, f64)> = scene
         .triangles
         .iter()
@@ -25,60 +35,69 @@ pub fn shining(scene: &Scene) -> Vec<Shining> {
         .filter_map(|(e, t)| {
             let emitted = DVec3::from(scene.materials[t.material as usize].ke.map(f64::from));
             let power = emitted.element_sum() * triangle_area(scene.corners(t));
-            (power > 0.0).then_some((e, emitted, power))
+            whole += power;
+            (power > 0.0).then_some((e, emitted, whole))
         })
         .collect();
-    let whole: f64 = emitters.iter().map(|e| e.2).sum();
     let share = whole / f64::from(LIGHT_POINTS);
     let mut points = Vec::new();
-    let mut remaining = emitters.iter();
-    let mut current = remaining.next();
-    let mut passed = 0.0;
-    for i in 0..LIGHT_POINTS {
-        let at = (f64::from(i) + 0.5) * share;
-        while let Some(&(.., power)) = current {
-            if at <= passed + power {
-                break;
-            }
-            match remaining.next() {
-                Some(next) => {
-                    passed += power;
-                    current = Some(next);
-                }
-                None => break,
-            }
-        }
-        let Some(&(e, emitted, _)) = current else {
+    // Points that each emitter has by now: those of the next set fall between them.
+    let mut taken = vec![0; emitters.len()];
+    for i in 0..LIGHT_SETS * LIGHT_POINTS {
+        let (set, i_in_set) = (i / LIGHT_POINTS, i % LIGHT_POINTS);
+        let in_share = (f64::from(set) + 0.5) / f64::from(LIGHT_SETS);
+        let at = (f64::from(i_in_set) + in_share) * share;
+        let place = emitters.partition_point(|e| e.2 < at);
+        let place = place.min(emitters.len().saturating_sub(1));
+        let Some(&(e, emitted, _)) = emitters.get(place) else {
             break;
         };
-        let [a, b, c] = scene.corners(&scene.triangles[e]);
-        // The R2 sequence (Roberts 2018), folded into the triangle.
-        let along = |step: f64| (0.5 + step * f64::from(i)).fract();
-        let (s, t) = (
-            along(0.754_877_666_246_692_8),
-            along(0.569_840_290_998_053_2),
-        );
-        let (s, t) = if s + t > 1.0 {
-            (1.0 - s, 1.0 - t)
-        } else {
-            (s, t)
-        };
+        let corners = scene.corners(&scene.triangles[e]);
+        let [a, b, c] = corners;
+        let position = spread(corners, taken[place]);
+        taken[place] += 1;
         points.push(Shining {
-            position: a + (b - a) * s + (c - a) * t,
+            position,
             normal: Some((b - a).cross(c - a).normalize_or_zero()),
+            area: share / emitted.element_sum(),
             strength: emitted * (share / emitted.element_sum()),
         });
     }
     points.extend(scene.point_lights.iter().map(|light| Shining {
         position: light.position,
         normal: None,
+        area: 0.0,
         strength: DVec3::from(light.intensity.map(f64::from)),
     }));
     points
 }
 
+/// Place i of a sequence in a triangle whose first 4ⁿ places lie in all of the 4ⁿ triangles like it that it is cut into: the
+/// triangular van der Corput sequence of Basu and Owen 2015, its digits turned by those before them: in rows, places
+/// would pass the edge of what casts a shadow many at a time.
+fn spread(corners: [DVec3; 3], i: u32) -> DVec3 {
+    let [mut a, mut b, mut c] = corners;
+    let mut digits = i;
+    let mut turn = 0_u32;
+    // Digits of any i, and some zeros, which halve a triangle in place.
+    for _ in 0..16 {
+        let (ab, bc, ca) = ((a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0);
+        let child = (digits % 4 + (turn >> 30)) % 4;
+        turn = (turn ^ (child + 1)).wrapping_mul(0x9e37_79b9);
+        (a, b, c) = match child {
+            0 => (bc, ca, ab),
+            1 => (a, ab, ca),
+            2 => (ab, b, bc),
+            _ => (ca, bc, c),
+        };
+        digits /= 4;
+    }
+    (a + b + c) / 3.0
+}
+
 impl Shining {
-    pub fn seen_from(&self, projection: &Projection) -> LightPoint {
+    fn seen_from(&self, projection: &Projection) -> LightPoint {
+        let square = projection.unit * projection.unit;
         LightPoint {
             position: ((self.position - projection.eye) / projection.unit).as_vec3(),
             kind: if self.normal.is_some() {
@@ -87,77 +106,87 @@ impl Shining {
                 KIND_POINT
             },
             normal: self.normal.unwrap_or_default().as_vec3(),
-            strength: (self.strength / (projection.unit * projection.unit)).as_vec3(),
+            area: (self.area / square) as f32,
+            strength: (self.strength / square).as_vec3(),
         }
-    }
-
-    /// What would arrive at a place without anything between, as a vector in the frame's coordinates, `[colour]`; none from
-    /// below the frame's horizon.
-    fn arriving(&self, at: DVec3, frame: [DVec3; 3]) -> [DVec3; 3] {
-        let way = self.position - at;
-        let square = way.length_squared();
-        let towards = way / square.sqrt();
-        let sent = self.normal.map_or(1.0, |n| (-n.dot(towards)).max(0.0));
-        let local = DVec3::from(frame.map(|axis| axis.dot(towards)));
-        if local.z <= 0.0 || sent == 0.0 {
-            return [DVec3::ZERO; 3];
-        }
-        (self.strength * (sent / square))
-            .to_array()
-            .map(|s| local * s)
     }
 }
 
-/// The share of the points' light that arrives at a place, by colour: the direct light there, `[slot][colour]` as vectors,
-/// along what would arrive without anything between; none where nothing would.
-pub fn share(
-    points: &[Shining],
-    at: DVec3,
-    frame: [DVec3; 3],
-    direct: &[[Vec3; 3]],
-) -> Option<Vec3> {
-    let mut open = [DVec3::ZERO; 3];
-    for point in points {
-        let arriving = point.arriving(at, frame);
-        (0..3).for_each(|c| open[c] += arriving[c]);
-    }
-    let share = |c: usize| {
-        let found: DVec3 = direct.iter().map(|m| m[c].as_dvec3()).sum();
-        match open[c].length_squared() {
-            0.0 => 0.0,
-            square => (found.dot(open[c]) / square).clamp(0.0, 2.0) as f32,
-        }
+/// The scene's light points and what casts shadows before them, on the device and, where any light is drawn sharply, as shafts.
+///
+/// All is taken from the eye, rounded as what is drawn is: a place that is drawn is as near to what casts its shadow as to
+/// itself.
+///
+/// # Errors
+/// A device without the memory.
+pub fn light_buffers(
+    device: &Arc<Device>,
+    scene: &Scene,
+    lighting: &Lighting<'_>,
+    projection: &Projection,
+) -> Result<(LightBuffers, Option<Shafts>)> {
+    let points: Vec<_> = if lighting.sharp() {
+        shining(scene)
+            .iter()
+            .map(|point| point.seen_from(projection))
+            .collect()
+    } else {
+        Vec::new()
     };
-    let any = open.iter().any(|c| *c != DVec3::ZERO);
-    any.then(|| Vec3::new(share(0), share(1), share(2)))
-}
-
-/// Shares beyond the horizon from those of the neighbours, triangle by triangle: bumps there still rise into the light.
-pub fn spread(shares: Vec<Option<Vec3>>, triangles: &[[u32; 3]]) -> Vec<Vec3> {
-    let mut shares = shares;
-    for _ in 0..ROUNDS {
-        let mut found = vec![(Vec3::ZERO, 0.0_f32); shares.len()];
-        for triangle in triangles {
-            let known = triangle.iter().filter_map(|&v| shares[v as usize]);
-            let (sum, count) = known.fold((Vec3::ZERO, 0.0), |(sum, n), s| (sum + s, n + 1.0));
-            for &v in triangle {
-                if count > 0.0 && shares[v as usize].is_none() {
-                    found[v as usize].0 += sum / count;
-                    found[v as usize].1 += 1.0;
-                }
-            }
-        }
-        if found.iter().all(|f| f.1 == 0.0) {
-            break;
-        }
-        for (share, (sum, count)) in shares.iter_mut().zip(found) {
-            if count > 0.0 {
-                *share = Some(sum / count);
-            }
-        }
+    if points.is_empty() {
+        let none = LightBuffers::new(device, &points, &ShadowTree::default())?;
+        return Ok((none, None));
     }
-    shares.into_iter().map(Option::unwrap_or_default).collect()
+    let tree = ShadowTree::new(casters(scene, lighting, projection));
+    let buffers = LightBuffers::new(device, &points, &tree)?;
+    let shafts = if lighting.skip_open {
+        Shafts::new(tree, scene, projection)
+    } else {
+        Shafts::closed()
+    };
+    Ok((buffers, Some(shafts)))
 }
 
-/// Triangles that a share spreads over beyond the horizon.
-const ROUNDS: usize = 8;
+/// Every triangle, those with relief at its mean height.
+fn casters(scene: &Scene, lighting: &Lighting<'_>, projection: &Projection) -> Vec<ShadowTriangle> {
+    let relief_is_drawn = lighting.relief().is_some();
+    scene
+        .triangles
+        .par_iter()
+        .map(|t| {
+            let corners = scene.corners(t);
+            let [a, b, c] = corners.map(|p| ((p - projection.eye) / projection.unit).as_vec3());
+            let relief = relief_is_drawn && scene.materials[t.material as usize].has_relief();
+            ShadowTriangle {
+                a,
+                b,
+                c,
+                relief: relief.into(),
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of 4³ places in a row, one lies in each of the 64 parts; and their mean is the middle, each part's being its own.
+    #[test]
+    fn places_are_spread_evenly() {
+        let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        let mut found = std::collections::HashSet::new();
+        let mut mean = DVec3::ZERO;
+        for i in 64..128 {
+            let place = spread(corners, i);
+            mean += place / 64.0;
+            let (x, y) = (8.0 * place.x, 8.0 * place.y);
+            let upper = x.fract() + y.fract() > 1.0;
+            found.insert((x as u32, y as u32, upper));
+        }
+        assert_eq!(found.len(), 64);
+        // Half of a part, on the side that its own place is shifted to.
+        const SHIFT: f64 = 1.0 / 16.0;
+        assert!((mean - DVec3::new(1.0, 1.0, 0.0) / 3.0).length() < SHIFT);
+    }
+}

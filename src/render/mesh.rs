@@ -7,11 +7,14 @@ use rayon::prelude::*;
 
 use super::projection::{self, Projection, Tile};
 use super::relief_mesh::FlatRelief;
-use super::textures::Textures;
+use super::shafts::Shafts;
+use super::textures::Bound;
 use super::{Light, Lighting, corner_irradiance};
+use crate::corners::Corners;
 use crate::error::Result;
 use crate::passes::buffers::upload;
 use crate::passes::shade::{Draw, Parameters, Vertex};
+use crate::passes::types::LitTriangle;
 use crate::scene::{Material, Scene, Triangle};
 use crate::vk::{Buffer, BufferUse, Device};
 
@@ -19,6 +22,10 @@ use crate::vk::{Buffer, BufferUse, Device};
 pub struct Mesh {
     pub vertices: Buffer,
     pub indices: Buffer,
+    /// As light points light them, `[drawn triangle]`; none where they do not.
+    pub lit: Buffer,
+    /// Of the lit triangles those that nothing stands between and the lights, and all.
+    pub open: [usize; 2],
     /// First vertex, count.
     ranges: Vec<(Kind, u32, u32)>,
 }
@@ -32,16 +39,23 @@ enum Kind {
     Back,
 }
 
+impl Kind {
+    /// By light points.
+    fn is_lit(self) -> bool {
+        matches!(self, Self::Front(_))
+    }
+}
+
 impl Mesh {
     pub fn new(
         device: &Arc<Device>,
         scene: &Scene,
         lighting: &Lighting<'_>,
         projection: &Projection,
-        rest: Option<&FlatRelief>,
+        (rest, shafts): (Option<&FlatRelief>, Option<&Shafts>),
     ) -> Result<Self> {
         let far = |e: usize| rest.and_then(|rest| rest.far.get(&e));
-        let smooth = corner_irradiance(scene, &lighting.irradiance());
+        let smooth = corner_irradiance(scene, &lighting.baked());
         // Which side is seen is found here in f64: a rasteriser finds it from rounded corners, wrongly for slivers.
         let mut order: Vec<_> = scene
             .triangles
@@ -77,21 +91,29 @@ impl Mesh {
             ranges.push((same[0].0, first, count));
             first += count;
         }
+        let lit = shafts.map_or_else(Vec::new, |shafts| {
+            lit_triangles(scene, &order, &vertices, shafts)
+        });
+        let fronts = order.iter().filter(|(kind, _)| kind.is_lit()).count();
+        let open = lit.iter().filter(|t| t.open == 1).count();
         let indices: Vec<u32> = (0..vertices.len() as u32).collect();
         Ok(Self {
             vertices: upload(device, "shade vertices", &vertices, BufferUse::Geometry)?,
             indices: upload(device, "shade indices", &indices, BufferUse::Geometry)?,
+            lit: upload(device, "lit triangles", &lit, BufferUse::Storage)?,
+            open: [open, if lit.is_empty() { 0 } else { fronts }],
             ranges,
         })
     }
 
+    /// `lights` counts light points as [`Parameters::lit_by`] does.
     pub fn draws<'a>(
         &'a self,
         scene: &'a Scene,
-        textures: &'a Textures,
-        projection: &Projection,
-        tile: Tile,
+        textures: &'a Bound,
+        (projection, tile): (&Projection, Tile),
         part: Light,
+        lights: [u32; 2],
     ) -> impl Iterator<Item = Draw<'a>> {
         let rows = projection.rows(tile);
         self.ranges.iter().map(move |&(kind, first, count)| Draw {
@@ -102,7 +124,9 @@ impl Mesh {
                 Kind::Far(_) | Kind::Back => textures.white(),
             },
             parameters: match kind {
-                Kind::Front(m) => parameters(rows, Some(&scene.materials[m as usize]), part),
+                Kind::Front(m) => {
+                    parameters(rows, Some(&scene.materials[m as usize]), part).lit_by(lights)
+                }
                 Kind::Far(m) => Parameters {
                     reflectance: Vec3::ONE,
                     ..parameters(rows, Some(&scene.materials[m as usize]), part)
@@ -111,6 +135,49 @@ impl Mesh {
             },
         })
     }
+}
+
+/// Ways to light points start above a triangle by this share of its corners' greatest distance along an axis of the eye's
+/// frame, 2⁻¹⁸: places on it are interpolated with weights that sum to 1 within some 2⁻²², and so lie off its plane by so
+/// much of that distance.
+const ABOVE: f32 = 1.0 / (1 << 18) as f32;
+
+/// `vertices` are those of the triangles of `order`.
+fn lit_triangles(
+    scene: &Scene,
+    order: &[(Kind, usize)],
+    vertices: &[Vertex],
+    shafts: &Shafts,
+) -> Vec<LitTriangle> {
+    let neighbours = Corners::new(scene);
+    order
+        .par_iter()
+        .zip(vertices.par_chunks(3))
+        .map(|(&(kind, e), drawn)| {
+            let triangle = &scene.triangles[e];
+            let plane = neighbours.normals[e];
+            let [normal_a, normal_b, normal_c] = triangle.vertices.map(|vertex| {
+                let about = neighbours.smooth(e, vertex);
+                let sum: DVec3 = about.map(|(t, angle)| neighbours.normals[t] * angle).sum();
+                sum.try_normalize().unwrap_or(plane).as_vec3()
+            });
+            let [a, b, c] = [0, 1, 2].map(|k| drawn[k].position);
+            let furthest = a.abs().max(b.abs()).max(c.abs()).max_element();
+            let mut lit = LitTriangle {
+                a,
+                b,
+                c,
+                normal_a,
+                normal_b,
+                normal_c,
+                plane: plane.as_vec3(),
+                above: ABOVE * furthest,
+                open: 0,
+            };
+            lit.open = (kind.is_lit() && shafts.is_open(&lit)).into();
+            lit
+        })
+        .collect()
 }
 
 /// Of a material's fronts, or of backs.
@@ -128,6 +195,8 @@ pub fn parameters([x, y, w]: [Vec3; 3], material: Option<&Material>, part: Light
         reflectance: reflectance.into(),
         emitted: Vec3::from(emitted) * shines,
         metered,
+        light_count: 0,
+        emitter_points: 0,
     }
 }
 

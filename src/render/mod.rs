@@ -9,15 +9,20 @@
 //! ```
 
 mod compare;
+mod flip;
 mod gathered;
 mod lighting;
 mod lights;
 mod mesh;
+mod overdraw;
 mod picture;
 mod projection;
 mod relief;
 mod relief_mesh;
+mod relief_scene;
 mod renderer;
+mod shafts;
+mod slots;
 mod smooth;
 mod textures;
 pub mod tone;
@@ -25,10 +30,13 @@ pub mod tone;
 use std::sync::Arc;
 
 pub use compare::{Comparison, side_by_side};
+pub use flip::{Flip, PIXELS_PER_DEGREE, ldr};
 pub use lighting::{Direct, Light, Lighting, ReliefShading, Show};
+pub use overdraw::Overdraw;
 pub use picture::{FileKind, Picture, SAMPLES};
 pub(crate) use projection::Projection;
 pub use renderer::Renderer;
+pub use slots::slot_colour;
 pub use smooth::corner_irradiance;
 
 use crate::error::{Error, Result};

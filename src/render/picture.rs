@@ -78,11 +78,7 @@ impl FileKind {
 impl Picture {
     /// A picture of pixels without samples of their own, `[row][column]` from the top left; `metered` says at which of them
     /// an exposure meter looks.
-    pub(crate) fn new(
-        (width, height): (u32, u32),
-        radiance: Vec<[f32; 3]>,
-        metered: &[bool],
-    ) -> Self {
+    pub fn new((width, height): (u32, u32), radiance: Vec<[f32; 3]>, metered: &[bool]) -> Self {
         let mut luminances: Vec<_> = radiance
             .iter()
             .zip(metered)
@@ -168,19 +164,7 @@ impl Picture {
     /// Another ending; a file that cannot be written.
     pub fn write(&self, path: &Path, exposure: Option<f32>) -> Result<()> {
         match FileKind::of(path)? {
-            FileKind::Png => {
-                let codes = self.srgb_codes(exposure);
-                write_atomically(path, |out| {
-                    PngEncoder::new(out)
-                        .write_image(
-                            &codes,
-                            self.width,
-                            self.height,
-                            image::ExtendedColorType::Rgb8,
-                        )
-                        .map_err(io::Error::other)
-                })
-            }
+            FileKind::Png => write_png(path, (self.width, self.height), &self.srgb_codes(exposure)),
             FileKind::Exr => write_atomically(path, |out| {
                 // The encoder goes back to fill in its table, which a stream cannot.
                 let mut whole = Cursor::new(Vec::new());
@@ -221,6 +205,15 @@ impl Picture {
             });
         codes
     }
+}
+
+/// Writes 8-bit codes, `[row][column][channel]`.
+pub(super) fn write_png(path: &Path, (width, height): (u32, u32), codes: &[u8]) -> Result<()> {
+    write_atomically(path, |out| {
+        PngEncoder::new(out)
+            .write_image(codes, width, height, image::ExtendedColorType::Rgb8)
+            .map_err(io::Error::other)
+    })
 }
 
 /// The mean of a pixel's samples.

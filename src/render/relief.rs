@@ -2,20 +2,21 @@
 
 use std::sync::Arc;
 
-use super::Lighting;
 use super::mesh::parameters;
 use super::projection::{Projection, Tile};
 use super::relief_mesh::ReliefMesh;
+use super::relief_scene::ReliefScene;
 use super::textures::Textures;
+use super::{Lighting, ReliefShading};
 use crate::error::Result;
 use crate::passes;
-use crate::passes::shade::Shade;
+use crate::passes::shadow_rays::LightBuffers;
 use crate::scene::Scene;
 use crate::vk::{Commands, DescriptorSet, Device, Sampler};
 
 /// The relief of a picture, ready to be drawn.
 pub struct Relief {
-    pass: passes::relief::Relief,
+    pass: Arc<passes::relief::Relief>,
     pub mesh: ReliefMesh,
     /// One for each range of the mesh.
     sets: Vec<DescriptorSet>,
@@ -27,22 +28,30 @@ impl Relief {
     /// None where nothing with relief is drawn as such.
     pub fn new(
         device: &Arc<Device>,
-        shade: &Shade,
+        kept: Option<&ReliefScene>,
         scene: &Scene,
         lighting: &Lighting<'_>,
-        textures: &Textures,
+        (textures, lights): (&Textures, &LightBuffers),
         (projection, samples): (&Projection, u32),
     ) -> Result<Option<Self>> {
-        let Some((light, shading)) = lighting.relief() else {
+        let Some(((light, shading), kept)) = lighting.relief().zip(kept) else {
             return Ok(None);
         };
-        let pass = passes::relief::Relief::new(device, shade)?;
-        let mesh = ReliefMesh::new(device, scene, lighting, light, (projection, samples))?;
+        let pass = Arc::clone(&kept.pass);
+        let mesh = ReliefMesh::new(
+            device,
+            scene,
+            lighting,
+            (light, kept),
+            (projection, samples),
+        )?;
         let sampler = Sampler::new(device, "relief albedo", true)?;
         let sets = mesh
             .ranges
             .iter()
-            .map(|&(material, ..)| pass.bind(textures.image(material), &sampler, &mesh.buffers))
+            .map(|&(material, ..)| {
+                pass.bind(textures.image(material), &sampler, &mesh.buffers, lights)
+            })
             .collect::<Result<_>>()?;
         Ok(Some(Self {
             pass,
@@ -58,12 +67,16 @@ impl Relief {
         cmd: &Commands,
         scene: &Scene,
         lighting: &Lighting<'_>,
-        projection: &Projection,
+        (projection, lights): (&Projection, &LightBuffers),
         (tile, samples): (Tile, u32),
     ) {
         let rows = projection.rows(tile);
         let directions = self.mesh.directions;
-        let [light_count, emitter_points] = self.mesh.buffers.light_counts();
+        let counts = if lighting.shading == ReliefShading::Factored {
+            lights.counts
+        } else {
+            [0; 2]
+        };
         let draws = self.mesh.ranges.iter().zip(&self.sets);
         let draws = draws.map(|(&(material, first, count), set)| {
             let material = &scene.materials[material as usize];
@@ -72,13 +85,11 @@ impl Relief {
                 prism_count: count,
                 set,
                 parameters: passes::relief::Parameters {
-                    shade: parameters(rows, Some(material), lighting.part),
+                    shade: parameters(rows, Some(material), lighting.part).lit_by(counts),
                     shading: self.shading,
                     view: lighting.show.code(),
                     pixel: projection.sample_angle(samples),
                     cells: [directions.columns, directions.rows],
-                    light_count,
-                    emitter_points,
                 },
             }
         });

@@ -6,21 +6,19 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::lights::{share, shining, spread};
-use super::{Direct, Light, Lighting, Projection, ReliefShading, Show};
+use super::relief_scene::ReliefScene;
+use super::slots::slot_colour;
+use super::{Light, Lighting, Projection, ReliefShading, Show};
 use crate::constants::{MOST_RANK, WIDEST_SAMPLE};
 use crate::directions::Directions;
-use crate::elements::Elements;
 use crate::error::Result;
-use crate::meso::{Factors, HeightPyramid, MesoVertices, Tile, tiles, visibility};
+use crate::meso::{Cluster, FaceClusters, Factors, HeightPyramid, Tile};
 use crate::passes::relief::{Buffers, Parts};
-use crate::passes::types::{HeightTile, Prism, ReliefSurface};
+use crate::passes::types::{HeightTile, ParallelLight, Prism, ReliefSurface};
 use crate::scene::{HeightMap, Material, Scene, relief_normals};
 use crate::solution::DirectionalLight;
 use crate::vk::Device;
 
-/// What the factors may leave out of the light, see [`Factors::error`].
-const FACTOR_ERROR: f64 = 0.01;
 /// Prisms reach this share of the relief's range beyond it, so that a ray begins above it for certain.
 const MARGIN: f64 = 1e-3;
 
@@ -48,7 +46,6 @@ pub struct FlatRelief {
 struct LightVertices {
     coefficients: Vec<[Vec3; 2]>,
     exits: Vec<Vec3>,
-    shares: Vec<Option<Vec3>>,
     /// By vertex and surface.
     known: HashMap<(u32, u32), u32>,
 }
@@ -59,58 +56,46 @@ impl ReliefMesh {
         device: &Arc<Device>,
         scene: &Scene,
         lighting: &Lighting<'_>,
-        light: &DirectionalLight,
+        (light, kept): (&DirectionalLight, &ReliefScene),
         (projection, samples): (&Projection, u32),
     ) -> Result<Self> {
-        let directions = Directions::new(light.directions.len() as u32)?;
-        let elements = Elements::new(scene);
-        let (tiles, _) = tiles(scene, &elements)?;
-        let mut surface_of = vec![u32::MAX; scene.triangles.len()];
-        for (surface, tile) in (0..).zip(&tiles) {
-            for &e in &tile.members {
-                surface_of[elements.input_index[e] as usize] = surface;
-            }
-        }
-        let mut marcher = None;
-        let mut factors = Vec::with_capacity(tiles.len());
-        for tile in &tiles {
-            let (visibility, _) = visibility(device, &tile.field, lighting.cache, &mut marcher)?;
-            factors.push(Factors::new(
-                &directions,
-                &tile.field,
-                &visibility,
-                &tile.shading,
-                FACTOR_ERROR,
-            ));
-        }
-        let surfaces = Surfaces::new(scene, &tiles, &factors);
-
-        let vertices = MesoVertices::new(scene, light);
-        let gather = |moments| vertices.gather(&directions, light, moments);
-        let all = gather(&light.incident_moment);
-        let direct = gather(&light.incident_moment_direct);
+        let ReliefScene {
+            tiles,
+            surface_of,
+            factors,
+            surfaces,
+            vertices,
+            all,
+            direct,
+            ..
+        } = kept;
+        let directions = kept.directions;
         let indirect: Vec<[Vec3; 3]> = all
             .iter()
-            .zip(&direct)
+            .zip(direct)
             .map(|(all, direct)| [0, 1, 2].map(|c| all[c] - direct[c]))
             .collect();
         // Light that has bounced inside the relief is indirect, wherever it came from.
-        let sharp = lighting.direct == Direct::Sharp
-            && lighting.shading == ReliefShading::Factored
-            && lighting.part != Light::Indirect;
-        let inside = (lighting.part != Light::Direct).then_some(&all);
+        let sharp = lighting.sharp() && lighting.shading == ReliefShading::Factored;
+        let inside = (lighting.part != Light::Direct).then_some(all);
         let arriving = match (lighting.part, sharp) {
-            (Light::Global, false) => Some(&all),
+            (Light::Global, false) => Some(all),
             (Light::Global, true) | (Light::Indirect, _) => Some(&indirect),
-            (Light::Direct, false) => Some(&direct),
+            (Light::Direct, false) => Some(direct),
             (Light::Direct, true) => None,
         };
-        let points = if sharp { shining(scene) } else { Vec::new() };
+        let clustered = arriving.filter(|_| lighting.shading == ReliefShading::Clusters);
+        let arriving = arriving.filter(|_| clustered.is_none());
+        let shown = lighting.part.of(
+            &light.incident_moment,
+            &light.incident_moment_direct,
+            |all, direct| [0, 1, 2].map(|c| all[c] - direct[c]),
+        );
         let exits = vertices.mean(&lighting.exits(scene, light), directions.count());
         let mut lit = LightVertices::default();
         let normals = relief_normals(scene);
         let widest = f64::from(WIDEST_SAMPLE) / f64::from(projection.sample_angle(samples));
-        let averaged = lighting.shading == ReliefShading::Factored && lighting.show == Show::Shaded;
+        let averaged = lighting.shading.is_displaced() && lighting.show == Show::Shaded;
         let mut rest = FlatRelief {
             prism: vec![false; scene.triangles.len()],
             away: HashMap::new(),
@@ -161,16 +146,28 @@ impl ReliefMesh {
             order.push(m);
         }
         order.sort_by_key(|&m| scene.triangles[light.elements[m] as usize].material);
+        let corners_by_vertex = |m: usize| {
+            let mut corners = [0, 1, 2];
+            let triangle = &scene.triangles[light.elements[m] as usize];
+            corners.sort_by_key(|&k| triangle.vertices[k]);
+            corners
+        };
+        let faces: Vec<_> = order
+            .iter()
+            .map(|&m| (m as u32, corners_by_vertex(m)))
+            .collect();
+        let clusters =
+            clustered.map(|moments| FaceClusters::new(vertices, &directions, moments, &faces));
         let mut prisms = Vec::with_capacity(order.len());
         let mut mirrored = Vec::with_capacity(order.len());
-        for &m in &order {
+        for (at, &(m, corners)) in faces.iter().enumerate() {
+            let m = m as usize;
             let e = light.elements[m] as usize;
             let triangle = &scene.triangles[e];
             let surface = surface_of[e];
             let tile = &tiles[surface as usize];
             let range = &surfaces.ranges[surface as usize];
-            let mut corners = [0, 1, 2];
-            corners.sort_by_key(|&k| triangle.vertices[k]);
+            let (first_cluster, cluster_count) = clusters.as_ref().map_or((0, 0), |c| c.ranges[at]);
             let place = |k: usize, height: f64| {
                 let vertex = triangle.vertices[corners[k]] as usize;
                 let at = scene.vertices[vertex] + normals[vertex] * range.above(height);
@@ -190,12 +187,6 @@ impl ReliefMesh {
                     };
                     lit.push(&coefficients(inside), &coefficients(arriving));
                     lit.exits.extend_from_slice(&exits[slots.clone()]);
-                    lit.shares.push(share(
-                        &points,
-                        scene.vertices[triangle.vertices[k] as usize],
-                        vertices.frames[vertex as usize].map(|axis| axis.as_dvec3()),
-                        &direct[slots],
-                    ));
                 })
             });
             let [tangent, bitangent, normal] = light.frames[m];
@@ -218,6 +209,12 @@ impl ReliefMesh {
                 texel: (texel.min_element() / projection.unit) as f32,
                 bitangent,
                 normal,
+                first_cluster,
+                cluster_count,
+                slots: slot_colour(
+                    &directions,
+                    &shown[m * directions.count()..][..directions.count()],
+                ),
             });
             mirrored.push(matches!(corners, [0, 2, 1] | [1, 0, 2] | [2, 1, 0]));
         }
@@ -237,11 +234,7 @@ impl ReliefMesh {
             factors: &surfaces.factors,
             coefficients: &lit.coefficients,
             exits: &lit.exits,
-            light_points: &points
-                .iter()
-                .map(|p| p.seen_from(projection))
-                .collect::<Vec<_>>(),
-            light_shares: &spread(lit.shares, &corners_of(&prisms)),
+            parallel_lights: &clusters.as_ref().map_or_else(Vec::new, parallel_lights),
         };
         Ok(Self {
             buffers: Buffers::new(device, &parts, &mirrored)?,
@@ -252,10 +245,15 @@ impl ReliefMesh {
     }
 }
 
-/// The light vertices of the prisms.
-fn corners_of(prisms: &[Prism]) -> Vec<[u32; 3]> {
-    let corners = |p: &Prism| [p.light_a, p.light_b, p.light_c];
-    prisms.iter().map(corners).collect()
+/// The clusters as the device has them.
+fn parallel_lights(clusters: &FaceClusters) -> Vec<ParallelLight> {
+    let light = |c: &Cluster| ParallelLight {
+        towards: c.towards,
+        fluence_a: c.fluence[0],
+        fluence_b: c.fluence[1],
+        fluence_c: c.fluence[2],
+    };
+    clusters.list.iter().map(light).collect()
 }
 
 impl LightVertices {
@@ -296,7 +294,7 @@ impl Range {
 
 /// What the surfaces share buffers for, `[surface]`.
 #[derive(Default)]
-struct Surfaces {
+pub struct Surfaces {
     list: Vec<ReliefSurface>,
     tiles: Vec<HeightTile>,
     ranges: Vec<Range>,
@@ -307,7 +305,7 @@ struct Surfaces {
 }
 
 impl Surfaces {
-    fn new(scene: &Scene, tiles: &[Tile], factors: &[Factors]) -> Self {
+    pub fn new(scene: &Scene, tiles: &[Tile], factors: &[Factors]) -> Self {
         let mut all = Self::default();
         let mut pyramids: HashMap<u32, HeightTile> = HashMap::new();
         for (tile, factors) in tiles.iter().zip(factors) {

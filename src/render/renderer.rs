@@ -1,16 +1,19 @@
-//! A scene on the device, ready to be drawn from one camera.
+//! A scene on the device, ready to be drawn from one camera after the other.
 
 use std::sync::Arc;
 
 use super::gathered::Gathered;
+use super::lights::light_buffers;
 use super::mesh::Mesh;
 use super::picture::{Picture, SAMPLES};
 use super::projection::{Projection, Tile};
 use super::relief::Relief;
-use super::textures::Textures;
-use super::{Lighting, View};
+use super::relief_scene::ReliefScene;
+use super::textures::{Bound, Textures};
+use super::{Lighting, Overdraw, Show, View};
 use crate::error::Result;
 use crate::passes::shade::{Shade, Target};
+use crate::passes::shadow_rays::LightBuffers;
 use crate::scene::Scene;
 use crate::vk::{Commands, Device, Timestamps};
 
@@ -20,7 +23,7 @@ const TILE: u32 = 2048 / SAMPLES;
 /// Marks a pixel of a plain triangle where relief is counted.
 const NOT_RELIEF: f32 = 2.0;
 
-/// Draws one view of a scene, as a picture or again and again.
+/// Draws a view of a scene, as a picture or again and again.
 pub struct Renderer<'a> {
     device: Arc<Device>,
     scene: &'a Scene,
@@ -29,6 +32,10 @@ pub struct Renderer<'a> {
     projection: Projection,
     shade: Shade,
     textures: Textures,
+    kept: Option<ReliefScene>,
+    samples: u32,
+    lights: LightBuffers,
+    bound: Bound,
     mesh: Mesh,
     relief: Option<Relief>,
 }
@@ -53,12 +60,19 @@ impl<'a> Renderer<'a> {
         view.check()?;
         let projection = Projection::new(scene, view)?;
         let shade = Shade::new(device)?;
-        let textures = Textures::new(device, &shade, scene)?;
+        let textures = Textures::new(device, scene)?;
+        let kept = ReliefScene::new(device, &shade, scene, &lighting)?;
+        let (lights, shafts) = light_buffers(device, scene, &lighting, &projection)?;
         let seen = (&projection, samples);
-        let relief = Relief::new(device, &shade, scene, &lighting, &textures, seen)?;
+        let shared = (&textures, &lights);
+        let relief = Relief::new(device, kept.as_ref(), scene, &lighting, shared, seen)?;
         let rest = relief.as_ref().map(|r| &r.mesh.rest);
+        let rest = (rest, shafts.as_ref());
+        let mesh = Mesh::new(device, scene, &lighting, &projection, rest)?;
         Ok(Self {
-            mesh: Mesh::new(device, scene, &lighting, &projection, rest)?,
+            bound: textures.bind(&shade, &lights, &mesh.lit)?,
+            lights,
+            mesh,
             relief,
             device: Arc::clone(device),
             scene,
@@ -67,11 +81,63 @@ impl<'a> Renderer<'a> {
             projection,
             shade,
             textures,
+            kept,
+            samples,
         })
+    }
+
+    /// Turns to another view, keeping pipelines, textures and what of the relief and its light does not depend on the view.
+    ///
+    /// # Errors
+    /// As [`super::render`]; what was seen before stays then.
+    pub fn look(&mut self, view: &View<'a>) -> Result<()> {
+        view.check()?;
+        let (device, scene) = (&self.device, self.scene);
+        let (lighting, kept) = (&self.lighting, self.kept.as_ref());
+        let projection = Projection::new(scene, view)?;
+        let (lights, shafts) = light_buffers(device, scene, lighting, &projection)?;
+        let seen = (&projection, self.samples);
+        let shared = (&self.textures, &lights);
+        let relief = Relief::new(device, kept, scene, lighting, shared, seen)?;
+        let rest = relief.as_ref().map(|r| &r.mesh.rest);
+        let rest = (rest, shafts.as_ref());
+        let mesh = Mesh::new(device, scene, lighting, &projection, rest)?;
+        self.bound = self.textures.bind(&self.shade, &lights, &mesh.lit)?;
+        self.lights = lights;
+        self.mesh = mesh;
+        self.relief = relief;
+        self.projection = projection;
+        self.view = *view;
+        Ok(())
     }
 
     /// SAMPLES × SAMPLES samples a pixel, tile by tile.
     pub fn picture(&self) -> Result<Picture> {
+        match self.lighting.show {
+            Show::Overdraw => Ok(self.overdraw()?.picture()),
+            // Colours that are looked up in a legend are not exposed.
+            Show::Slots => Ok(Picture {
+                automatic_exposure: 0.0,
+                ..self.gathered()?
+            }),
+            _ => self.gathered(),
+        }
+    }
+
+    /// What [`Show::Overdraw`] counts.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn overdraw(&self) -> Result<Overdraw> {
+        assert_eq!(
+            self.lighting.show,
+            Show::Overdraw,
+            "what is drawn must be counts"
+        );
+        Ok(Overdraw::new(&self.gathered()?))
+    }
+
+    fn gathered(&self) -> Result<Picture> {
         let view = &self.view;
         let (width, height) = (view.width.min(TILE), view.height.min(TILE));
         let target = Target::new(
@@ -119,6 +185,12 @@ impl<'a> Renderer<'a> {
             .collect()
     }
 
+    /// Of the plain triangles that light points light, those that nothing stands between and the lights, see
+    /// [`Lighting::skip_open`], and all.
+    pub fn open_triangles(&self) -> [usize; 2] {
+        self.mesh.open
+    }
+
     /// The share of the pixels of such a frame that show relief by rays.
     pub fn relief_coverage(&self) -> Result<f64> {
         let (target, tile) = self.whole()?;
@@ -158,22 +230,25 @@ impl<'a> Renderer<'a> {
         drawn: impl FnOnce(),
     ) {
         let part = self.lighting.part;
-        let plain = self
-            .mesh
-            .draws(self.scene, &self.textures, &self.projection, tile, part);
+        let seen = (&self.projection, tile);
+        let counts = self.lights.counts;
+        let plain = self.mesh.draws(self.scene, &self.bound, seen, part, counts);
         self.shade.record(
             cmd,
             target,
             (tile.width * samples, tile.height * samples),
             (&self.mesh.vertices, &self.mesh.indices),
-            plain.map(|mut draw| {
-                draw.parameters.metered = mark.unwrap_or(draw.parameters.metered);
-                draw
-            }),
+            plain
+                .filter(|_| self.lighting.show != Show::Overdraw)
+                .map(|mut draw| {
+                    draw.parameters.metered = mark.unwrap_or(draw.parameters.metered);
+                    draw
+                }),
             || {
                 if let Some(relief) = &self.relief {
                     let place = (tile, samples);
-                    relief.record(cmd, self.scene, &self.lighting, &self.projection, place);
+                    let seen = (&self.projection, &self.lights);
+                    relief.record(cmd, self.scene, &self.lighting, seen, place);
                 }
                 drawn();
             },

@@ -7,17 +7,23 @@ use rayon::prelude::*;
 
 use crate::error::Result;
 use crate::passes::shade::Shade;
+use crate::passes::shadow_rays::LightBuffers;
 use crate::scene::{Scene, Texture};
 use crate::vk::{Buffer, BufferUse, Commands, DescriptorSet, Device, Format, Image, Sampler};
 
-/// Every texture of a scene, once, ready to be drawn with.
+/// Every texture of a scene, once.
 pub struct Textures {
-    /// The first is white, for materials without one.
-    sets: Vec<DescriptorSet>,
-    /// `[material]`, its place in `sets`.
+    /// `[material]`, its place in `images`.
     of_material: Vec<usize>,
+    /// The first is white, for materials without one.
     images: Vec<Image>,
-    _sampler: Sampler,
+    sampler: Sampler,
+}
+
+/// The same, each with the light that falls on plain triangles, ready to be drawn with.
+pub struct Bound {
+    of_material: Vec<usize>,
+    sets: Vec<DescriptorSet>,
 }
 
 const TEXEL_BYTES: u64 = 16;
@@ -25,7 +31,7 @@ const TEXEL_BYTES: u64 = 16;
 impl Textures {
     /// # Errors
     /// A texture that does not fit the device's memory or its largest image.
-    pub fn new(device: &Arc<Device>, shade: &Shade, scene: &Scene) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, scene: &Scene) -> Result<Self> {
         let mut images = vec![upload(device, "white", (1, 1), &[[1.0; 3]])?];
         let mut places: HashMap<*const Texture, usize> = HashMap::new();
         let mut of_material = Vec::with_capacity(scene.materials.len());
@@ -49,25 +55,33 @@ impl Textures {
             };
             of_material.push(place);
         }
-        let sampler = Sampler::new(device, "albedo", true)?;
-        let sets = images
-            .iter()
-            .map(|image| shade.bind(image, &sampler))
-            .collect::<Result<_>>()?;
         Ok(Self {
-            sets,
             of_material,
             images,
-            _sampler: sampler,
+            sampler: Sampler::new(device, "albedo", true)?,
         })
-    }
-
-    pub fn white(&self) -> &DescriptorSet {
-        &self.sets[0]
     }
 
     pub fn image(&self, material: u32) -> &Image {
         &self.images[self.of_material[material as usize]]
+    }
+
+    /// With the light of `lights` on the triangles of `lit`, see [`Shade::bind`].
+    ///
+    /// # Errors
+    /// A device without the memory.
+    pub fn bind(&self, shade: &Shade, lights: &LightBuffers, lit: &Buffer) -> Result<Bound> {
+        let set = |image| shade.bind((image, &self.sampler), lights, lit);
+        Ok(Bound {
+            of_material: self.of_material.clone(),
+            sets: self.images.iter().map(set).collect::<Result<_>>()?,
+        })
+    }
+}
+
+impl Bound {
+    pub fn white(&self) -> &DescriptorSet {
+        &self.sets[0]
     }
 
     pub fn of_material(&self, material: u32) -> &DescriptorSet {

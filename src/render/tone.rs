@@ -26,6 +26,25 @@ pub fn neutral(colour: [f32; 3]) -> [f32; 3] {
     })
 }
 
+/// 8-bit sRGB codes of the colour map magma (Smith and van der Walt 2015) at 0..=1, from black over purple to pale yellow, by
+/// Zucker's polynomial of 2019, which keeps within five codes of it.
+pub fn magma(value: f32) -> [u8; 3] {
+    const TERMS: [[f32; 3]; 7] = [
+        [-0.002_136_485, -0.000_749_655, -0.005_386_128],
+        [0.251_660_54, 0.677_523_2, 2.494_026_6],
+        [8.353_717, -3.577_719_5, 0.314_467_9],
+        [-27.668_734, 14.264_731, -13.649_213],
+        [52.176_14, -27.943_606, 12.944_17],
+        [-50.768_525, 29.046_583, 4.234_153],
+        [18.655_706, -11.489_773, -5.601_961_5],
+    ];
+    let t = value.clamp(0.0, 1.0);
+    std::array::from_fn(|c| {
+        let shown = TERMS.iter().rev().fold(0.0, |sum, term| sum * t + term[c]);
+        (255.0 * shown + 0.5) as u8
+    })
+}
+
 /// Relative luminance of linear RGB, ITU-R BT.709.
 pub fn luminance([r, g, b]: [f32; 3]) -> f32 {
     0.2126 * r + 0.7152 * g + 0.0722 * b

@@ -12,6 +12,7 @@
 mod assemble;
 pub mod builtin;
 mod camera;
+pub mod camera_path;
 mod check;
 mod displace;
 mod hash;

@@ -2,23 +2,18 @@
 
 use std::sync::Arc;
 
-use super::{Estimator, Settings};
+use super::Settings;
+use super::estimate::{Estimate, ReliefSources};
 use crate::constants::FACES;
 use crate::error::Result;
 use crate::hemicube::pixel_count;
-use crate::passes::bin_pixels::{self, BinPixels};
 use crate::passes::buffers::{Batch, SceneBuffers, State, download};
 use crate::passes::cull::Cull;
 use crate::passes::factor_buffers::FactorBuffers;
-use crate::passes::form_factors::{self, FormFactors};
-use crate::passes::gather::{Gather, GatherRelief, ReliefSets};
 use crate::passes::item_buffer::ItemBuffer;
-use crate::passes::keep::{self, Keep};
 use crate::passes::measure::Measure;
-use crate::passes::measure_relief::MeasureRelief;
 use crate::passes::relief_buffers::ReliefBuffers;
 use crate::passes::select::{Parameters, Select};
-use crate::passes::send_relief::SendRelief;
 use crate::passes::types::{Draw, Progress, Slot};
 use crate::vk::{Buffer, BufferUse, Commands, DescriptorSet, Device, Stage, Timestamps};
 
@@ -54,7 +49,6 @@ pub struct BatchLoop {
     readback: [Buffer; 2],
     timestamps: [Timestamps; 2],
     batch: Batch,
-    _sets: Sets,
     _passes: Passes,
 }
 
@@ -67,117 +61,14 @@ pub(super) struct OnDevice<'a> {
     pub factors: Option<&'a FactorBuffers>,
 }
 
+/// Passes with what they are bound to.
 struct Passes {
-    measure: Measure,
-    select: Select,
-    cull: Cull,
-    item_buffer: ItemBuffer,
-    bin: Bin,
-}
-
-#[allow(clippy::large_enum_variant)] // one of each lives as long as the solver
-enum Bin {
-    Receivers(ReceiverPasses),
-    Pixels(BinPixels),
-}
-
-struct ReceiverPasses {
-    form_factors: FormFactors,
-    /// None where nothing is to be kept.
-    keep: Option<Keep>,
-    gather: GatherPasses,
-}
-
-#[allow(clippy::large_enum_variant)] // as `Bin`
-enum GatherPasses {
-    Plain(Gather),
-    Relief(ReliefPasses),
-}
-
-/// What only scenes with relief compile.
-struct ReliefPasses {
-    measure: MeasureRelief,
-    send: SendRelief,
-    gather: GatherRelief,
-}
-
-struct Sets {
-    measure: DescriptorSet,
-    select: DescriptorSet,
-    cull: DescriptorSet,
-    item_buffer: DescriptorSet,
-    bin: BinSets,
-}
-
-#[allow(clippy::large_enum_variant)] // as `Bin`
-enum BinSets {
-    Receivers(ReceiverSets),
-    Pixels(bin_pixels::Buffers),
-}
-
-struct ReceiverSets {
-    form_factors: form_factors::Sets,
-    keep: Option<keep::Sets>,
-    gather: GatherSets,
-}
-
-#[allow(clippy::large_enum_variant)] // as `Bin`
-enum GatherSets {
-    Plain(DescriptorSet),
-    Relief {
-        measure: DescriptorSet,
-        send: DescriptorSet,
-        gather: ReliefSets,
-    },
-}
-
-impl Bin {
-    fn new(device: &Arc<Device>, estimator: Estimator, on: &OnDevice<'_>) -> Result<Self> {
-        let Some(factors) = on.factors.filter(|_| estimator == Estimator::Receiver) else {
-            return Ok(Self::Pixels(BinPixels::new(device)?));
-        };
-        let gather = match on.relief {
-            Some(_) => GatherPasses::Relief(ReliefPasses {
-                measure: MeasureRelief::new(device)?,
-                send: SendRelief::new(device)?,
-                gather: GatherRelief::new(device)?,
-            }),
-            None => GatherPasses::Plain(Gather::new(device)?),
-        };
-        Ok(Self::Receivers(ReceiverPasses {
-            form_factors: FormFactors::new(device, on.relief.is_some())?,
-            keep: factors.keeps().then(|| Keep::new(device)).transpose()?,
-            gather,
-        }))
-    }
-
-    fn bind(&self, device: &Arc<Device>, batch: &Batch, on: &OnDevice<'_>) -> Result<BinSets> {
-        let (scene, state) = (on.scene, on.state);
-        let (passes, factors) = match (self, on.factors) {
-            (Self::Receivers(passes), Some(factors)) => (passes, factors),
-            (Self::Pixels(bin), _) => {
-                return Ok(BinSets::Pixels(bin.bind(device, scene, state, batch)?));
-            }
-            (Self::Receivers(_), None) => unreachable!("made for form factors"),
-        };
-        let gather = match (&passes.gather, on.relief) {
-            (GatherPasses::Plain(gather), _) => {
-                GatherSets::Plain(gather.bind(scene, state, batch, factors)?)
-            }
-            (GatherPasses::Relief(passes), Some(relief)) => GatherSets::Relief {
-                measure: passes.measure.bind(scene, state, relief)?,
-                send: passes.send.bind(scene, batch, relief)?,
-                gather: passes.gather.bind(scene, state, batch, factors, relief)?,
-            },
-            (GatherPasses::Relief(_), None) => unreachable!("made for a scene with relief"),
-        };
-        let keep = passes.keep.as_ref();
-        Ok(BinSets::Receivers(ReceiverSets {
-            form_factors: passes.form_factors.bind(scene, batch, factors, on.relief)?,
-            keep: keep.map(|k| k.bind(state, batch, factors)).transpose()?,
-            gather,
-        }))
-    }
+    measure: (Measure, DescriptorSet),
+    select: (Select, DescriptorSet),
+    cull: (Cull, DescriptorSet),
+    item_buffer: (ItemBuffer, DescriptorSet),
+    estimate: Estimate,
+    relief: Option<ReliefSources>,
 }
 
 const STAMPS: u32 = 6;
@@ -191,27 +82,22 @@ impl BatchLoop {
         on: &OnDevice<'_>,
         stop_power: f64,
     ) -> Result<Self> {
-        let &OnDevice {
-            scene,
-            state,
-            relief,
-            factors,
-        } = on;
+        let (scene, state) = (on.scene, on.state);
+        let measure = Measure::new(device)?;
+        let select = Select::new(device)?;
+        let cull = Cull::new(device, settings.culling)?;
+        let relief = on
+            .relief
+            .map(|relief| ReliefSources::new(device, &batch, on, relief));
         let passes = Passes {
-            measure: Measure::new(device)?,
-            select: Select::new(device)?,
-            cull: Cull::new(device, settings.culling)?,
-            item_buffer,
-            bin: Bin::new(device, settings.estimator, on)?,
+            estimate: Estimate::new(device, settings.estimator, &batch, on)?,
+            relief: relief.transpose()?,
+            measure: bound(measure, |p| p.bind(scene, state))?,
+            select: bound(select, |p| p.bind(scene, state, &batch))?,
+            cull: bound(cull, |p| p.bind(scene, &batch))?,
+            item_buffer: bound(item_buffer, |p| p.bind(&batch))?,
         };
-        let sets = Sets {
-            measure: passes.measure.bind(scene, state)?,
-            select: passes.select.bind(scene, state, &batch)?,
-            cull: passes.cull.bind(scene, &batch)?,
-            item_buffer: passes.item_buffer.bind(&batch)?,
-            bin: passes.bin.bind(device, &batch, on)?,
-        };
-        let select = Parameters {
+        let parameters = Parameters {
             source_count: scene.source_count,
             fresh_slots: batch.slot_count,
             replay_slots: batch.replay_slots,
@@ -234,57 +120,21 @@ impl BatchLoop {
                     &[Stage::Compute],
                 );
                 cmd.timestamp(stamps, 0);
-                passes
-                    .measure
-                    .record(cmd, &sets.measure, scene.source_count);
+                passes.measure(cmd, on);
+                passes.select.0.record(cmd, &passes.select.1, &parameters);
                 cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-                measure_relief(cmd, &passes, &sets, relief);
-                passes.select.record(cmd, &sets.select, &select);
-                cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-                if let Some((passes, GatherSets::Relief { send, .. }, relief)) =
-                    of_relief(&passes, &sets, relief)
-                {
-                    passes.send.record(cmd, send, relief, &batch);
-                    cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+                if let (Some(sources), Some(relief)) = (&passes.relief, on.relief) {
+                    sources.send(cmd, relief, &batch);
                 }
                 cmd.timestamp(stamps, 1);
-                passes.cull.record(cmd, &sets.cull, scene, &batch);
+                passes.cull.0.record(cmd, &passes.cull.1, scene, &batch);
                 cmd.barrier(&[Stage::Compute], &[Stage::Draw]);
                 cmd.timestamp(stamps, 2);
-                passes
-                    .item_buffer
-                    .record(cmd, &sets.item_buffer, scene, &batch);
+                let (pass, set) = &passes.item_buffer;
+                pass.record(cmd, set, scene, &batch);
                 cmd.timestamp(stamps, 3);
-                match (&passes.bin, &sets.bin, factors) {
-                    (Bin::Receivers(passes), BinSets::Receivers(sets), Some(factors)) => {
-                        let form_factors = &sets.form_factors;
-                        passes
-                            .form_factors
-                            .record(cmd, form_factors, &batch, factors);
-                        cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-                        cmd.timestamp(stamps, 4);
-                        match (&passes.gather, &sets.gather, relief) {
-                            (GatherPasses::Plain(pass), GatherSets::Plain(set), _) => {
-                                pass.record(cmd, set, scene, &batch);
-                            }
-                            (
-                                GatherPasses::Relief(passes),
-                                GatherSets::Relief { gather, .. },
-                                Some(relief),
-                            ) => passes.gather.record(cmd, gather, relief, &batch, factors),
-                            _ => unreachable!("passes and sets are made of one scene"),
-                        }
-                        if let (Some(keep), Some(set)) = (&passes.keep, &sets.keep) {
-                            cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-                            keep.record(cmd, set, &batch, factors);
-                        }
-                    }
-                    (Bin::Pixels(bin), BinSets::Pixels(buffers), _) => {
-                        bin.record(cmd, buffers, scene, &batch);
-                        cmd.timestamp(stamps, 4);
-                    }
-                    _ => unreachable!("passes and sets are made of one estimator"),
-                }
+                let found = || cmd.timestamp(stamps, 4);
+                passes.estimate.record(cmd, &batch, on, found);
                 cmd.timestamp(stamps, 5);
                 layout.record(cmd, state, &batch, &readback[i]);
                 Ok(())
@@ -293,16 +143,12 @@ impl BatchLoop {
         let commands = [record("batch a", 0)?, record("batch b", 1)?];
         let measure_only = Commands::record(device, "remeasure", |cmd| {
             cmd.barrier(&[Stage::Compute, Stage::Transfer], &[Stage::Compute]);
-            passes
-                .measure
-                .record(cmd, &sets.measure, scene.source_count);
-            cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-            measure_relief(cmd, &passes, &sets, relief);
+            passes.measure(cmd, on);
             let none = Parameters {
                 shot_limit: 0,
-                ..select
+                ..parameters
             };
-            passes.select.record(cmd, &sets.select, &none);
+            passes.select.0.record(cmd, &passes.select.1, &none);
             layout.record(cmd, state, &batch, &readback[0]);
             Ok(())
         })?;
@@ -312,7 +158,6 @@ impl BatchLoop {
             readback,
             timestamps,
             batch,
-            _sets: sets,
             _passes: passes,
         })
     }
@@ -390,28 +235,20 @@ impl BatchLoop {
     }
 }
 
-/// What a scene with relief has more of.
-fn of_relief<'a>(
-    passes: &'a Passes,
-    sets: &'a Sets,
-    relief: Option<&'a ReliefBuffers>,
-) -> Option<(&'a ReliefPasses, &'a GatherSets, &'a ReliefBuffers)> {
-    match (&passes.bin, &sets.bin, relief) {
-        (Bin::Receivers(passes), BinSets::Receivers(sets), Some(relief)) => match &passes.gather {
-            GatherPasses::Relief(passes) => Some((passes, &sets.gather, relief)),
-            GatherPasses::Plain(_) => None,
-        },
-        _ => None,
-    }
+fn bound<P>(pass: P, bind: impl FnOnce(&P) -> Result<DescriptorSet>) -> Result<(P, DescriptorSet)> {
+    let set = bind(&pass)?;
+    Ok((pass, set))
 }
 
-/// The unshot light of the sources with a relief, over what [`Measure`] took them for.
-fn measure_relief(cmd: &Commands, passes: &Passes, sets: &Sets, relief: Option<&ReliefBuffers>) {
-    if let Some((passes, GatherSets::Relief { measure, .. }, relief)) =
-        of_relief(passes, sets, relief)
-    {
-        passes.measure.record(cmd, measure, relief);
+impl Passes {
+    /// The unshot light of every source.
+    fn measure(&self, cmd: &Commands, on: &OnDevice<'_>) {
+        let (pass, set) = &self.measure;
+        pass.record(cmd, set, on.scene.source_count);
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+        if let (Some(sources), Some(relief)) = (&self.relief, on.relief) {
+            sources.measure(cmd, relief);
+        }
     }
 }
 

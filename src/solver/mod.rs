@@ -4,6 +4,7 @@
 //! device chooses what to shoot and when to stop, and the CPU looks on one batch behind.
 
 mod batch;
+mod estimate;
 mod relief_light;
 mod report;
 mod self_test;
@@ -189,11 +190,6 @@ impl Solver {
         kept: Option<&Visibility>,
     ) -> Result<Self> {
         settings.check()?;
-        if settings.estimator == Estimator::Pixel && elements.relief.is_some() {
-            return Err(Error::Usage(
-                "--estimator pixel knows no directions: use --transport lambert or --estimator receiver".into(),
-            ));
-        }
         let start = Instant::now();
         let (grouping, seed) = (&settings.grouping, settings.seed);
         let (sources, connections) = match kept {
@@ -225,7 +221,9 @@ impl Solver {
             .relief
             .as_ref()
             .map(|relief| {
-                ReliefBuffers::new(device, &elements, relief, &sources, batch.all_slots())
+                let by_pixel = settings.estimator == Estimator::Pixel && relief.texels.is_some();
+                let slots = batch.all_slots();
+                ReliefBuffers::new(device, &elements, relief, &sources, slots, by_pixel)
             })
             .transpose()?;
         let factors = match settings.estimator {

@@ -39,6 +39,11 @@ impl ReliefLight {
         for (sum, direct) in moments.iter_mut().zip(&direct) {
             (0..3).for_each(|c| sum[c] += direct[c]);
         }
+        let outgoing: Vec<Vec3> = if buffers.by_pixel {
+            download(device, &buffers.outgoing, count)?
+        } else {
+            Vec::new()
+        };
         let first = buffers.first_element;
         let exitant = moments
             .par_chunks(k)
@@ -48,10 +53,13 @@ impl ReliefLight {
                 let response = relief.response(e);
                 let scale = relief.scale[e];
                 let emitted = elements.emitted[e] / response.mean_emission;
-                let sent = response.send(moments);
+                let sent = match outgoing.get(m * k..(m + 1) * k) {
+                    Some(sent) => sent.to_vec(),
+                    None => response.send(moments).iter().map(|s| *s * scale).collect(),
+                };
                 sent.into_iter()
                     .zip(&response.emission)
-                    .map(move |(sent, emission)| sent * scale + emitted * *emission)
+                    .map(move |(sent, emission)| sent + emitted * *emission)
                     .collect::<Vec<_>>()
             })
             .collect();

@@ -198,6 +198,8 @@ pub struct GraphicsState<'a> {
     pub push_bytes: usize,
     pub vertex_stride: u32,
     pub attributes: &'a [VertexAttribute],
+    /// Colours of all fragments are summed and depth is not looked at.
+    pub sums: bool,
 }
 
 pub struct GraphicsPipeline {
@@ -273,10 +275,17 @@ impl GraphicsPipeline {
         let samples = vk::PipelineMultisampleStateCreateInfo::default()
             .rasterization_samples(vk::SampleCountFlags::TYPE_1);
         let depth = vk::PipelineDepthStencilStateCreateInfo::default()
-            .depth_test_enable(true)
-            .depth_write_enable(true)
+            .depth_test_enable(!state.sums)
+            .depth_write_enable(!state.sums)
             .depth_compare_op(vk::CompareOp::GREATER);
         let blends = [vk::PipelineColorBlendAttachmentState::default()
+            .blend_enable(state.sums)
+            .src_color_blend_factor(vk::BlendFactor::ONE)
+            .dst_color_blend_factor(vk::BlendFactor::ONE)
+            .color_blend_op(vk::BlendOp::ADD)
+            .src_alpha_blend_factor(vk::BlendFactor::ONE)
+            .dst_alpha_blend_factor(vk::BlendFactor::ONE)
+            .alpha_blend_op(vk::BlendOp::ADD)
             .color_write_mask(vk::ColorComponentFlags::RGBA)];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
         let dynamic_states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];

@@ -1,10 +1,12 @@
 //! Small scenes and the device for the tests. Validation is on: one message fails the test that saw it.
 #![allow(dead_code)]
 
+use std::path::Path;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use mesolux::elements::Elements;
+use mesolux::render::{Picture, side_by_side};
 use mesolux::scene::{HeightMap, Material, PointLight, Scene, Triangle};
 use mesolux::solver::ReliefLight;
 use mesolux::solver::{Light, Report, Settings, Solver, open_device};
@@ -24,6 +26,16 @@ pub fn assert_silent() {
         log.is_empty(),
         "validation layers must stay silent: {log:#?}"
     );
+}
+
+/// Writes a picture beside its reference to be looked at, where MESOLUX_TEST_PICTURES names a folder.
+pub fn show(name: &str, ours: &Picture, reference: &Picture) {
+    if let Some(folder) = std::env::var_os("MESOLUX_TEST_PICTURES") {
+        let path = Path::new(&folder).join(format!("{name}.png"));
+        side_by_side(ours, reference)
+            .and_then(|picture| picture.write(&path, None))
+            .expect("a picture file");
+    }
 }
 
 /// A scene made piece by piece. Material 0 reflects half and emits nothing.

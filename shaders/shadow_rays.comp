@@ -1,0 +1,27 @@
+// Ways through the tree of what casts shadows, for tests and timings of shared/shadow_rays.glsl. One invocation a way.
+// src/reference/shadow_rays.rs is the same in f64, without the tree.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "shared/types.glsl"
+
+layout(local_size_x = GROUP) in;
+
+layout(scalar, binding = 0) readonly buffer Nodes { ShadowNode shadow_nodes[]; };
+layout(scalar, binding = 1) readonly buffer Triangles { ShadowTriangle shadow_triangles[]; };
+layout(scalar, binding = 2) readonly buffer Rays { ShadowRay rays[]; };
+layout(scalar, binding = 3) writeonly buffer Hits { uint hits[]; };
+
+layout(push_constant, scalar) uniform Parameters {
+    uint count;
+};
+
+#include "shared/shadow_rays.glsl"
+
+void main() {
+    uint item = gl_GlobalInvocationID.x;
+    if (item < count) {
+        ShadowRay ray = rays[item];
+        hits[item] = blocked(ray.from, ray.to, ray.clear) ? 1 : 0;
+    }
+}

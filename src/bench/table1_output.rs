@@ -1,0 +1,215 @@
+//! The rows of Table 1 as lines, files and charts.
+
+use std::path::Path;
+
+use plotters::style::RGBColor;
+
+use super::Difference;
+use super::bars::{Bar, Bars};
+use super::table1::{Rate, Row};
+use crate::atomic_file::write_atomically;
+use crate::error::{Error, Result};
+
+/// What a bake of relief gains and loses against the same relief as geometry.
+pub(super) fn against_high_poly(row: &Row, high: &Row, difference: &Difference) -> String {
+    format!(
+        "{:<17} {:<10} {:.2} times as fast as high-poly; its {} plain triangles against it: bias {:+.2} %, rms {:.2} %",
+        row.scene,
+        bake_name(&row.kind),
+        high.seconds / row.seconds,
+        difference.triangles,
+        100.0 * difference.bias,
+        100.0 * difference.rms
+    )
+}
+
+pub(super) const HEADER: &str = "scene             bake       elements  meso  hemicubes  seconds  of it relief  over K=16  over lambert  paper, min  fps factored  clusters  paper";
+
+/// A row as it is printed, with its time over those of the same scene's K = 16 and `lambert`.
+pub(super) fn line(row: &Row, scene: &[Row]) -> String {
+    let over = |kind: &str| {
+        scene
+            .iter()
+            .find(|r| r.kind == kind)
+            .map_or("-".into(), |r| format!("{:.3}", row.seconds / r.seconds))
+    };
+    let fps = |rate: Option<Rate>| rate.map_or("-".into(), |r| format!("{:.2}", r.median));
+    format!(
+        "{:<17} {:<10} {:>8} {:>4.0}% {:>10} {:>8.1} {:>13.2} {:>10} {:>13} {:>11} {:>13} {:>9} {:>6}",
+        row.scene,
+        bake_name(&row.kind),
+        row.elements,
+        100.0 * row.meso_elements as f64 / row.elements as f64,
+        row.hemicubes,
+        row.seconds,
+        row.relief_seconds,
+        over("16"),
+        over("lambert"),
+        row.paper_minutes.map_or("-".into(), |m| format!("{m:.1}")),
+        fps(row.fps_factored),
+        fps(row.fps_clusters),
+        row.paper_fps.map_or("-".into(), |f| format!("{f:.0}")),
+    )
+}
+
+pub(super) fn write(rows: &[Row], folder: &Path) -> Result<()> {
+    let bad = |path: &Path, e: String| Error::file(path, e);
+    let json = folder.join("table1.json");
+    let text = serde_json::to_string_pretty(rows).map_err(|e| bad(&json, e.to_string()))?;
+    write_atomically(&json, |out| out.write_all(text.as_bytes()))?;
+    write_atomically(&folder.join("table1.csv"), |out| {
+        writeln!(
+            out,
+            "scene,bake,elements,meso_elements,sources,hemicubes,error_bound,relief_seconds,seconds,paper_minutes,plain_bias,plain_rms,fps_factored,fps_factored_low,fps_factored_high,fps_clusters,fps_clusters_low,fps_clusters_high,paper_fps"
+        )?;
+        for r in rows {
+            let optional = |v: Option<f64>| v.map_or(String::new(), |v| v.to_string());
+            let rate = |rate: Option<Rate>| match rate {
+                Some(r) => format!("{},{},{}", r.median, r.low, r.high),
+                None => ",,".into(),
+            };
+            writeln!(
+                out,
+                "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+                r.scene,
+                r.kind,
+                r.elements,
+                r.meso_elements,
+                r.sources,
+                r.hemicubes,
+                optional(r.error_bound),
+                r.relief_seconds,
+                r.seconds,
+                optional(r.paper_minutes),
+                optional(r.plain.map(|d| d.bias)),
+                optional(r.plain.map(|d| d.rms)),
+                rate(r.fps_factored),
+                rate(r.fps_clusters),
+                optional(r.paper_fps)
+            )?;
+        }
+        Ok(())
+    })?;
+    fps_chart(rows).write(&folder.join("table1-fps.svg"))?;
+    chart(rows).write(&folder.join("table1.svg"))
+}
+
+/// Kinds of bakes with their colours.
+pub(super) const KINDS: [(&str, RGBColor); 5] = [
+    ("lambert", RGBColor(120, 120, 120)),
+    ("16", RGBColor(158, 202, 225)),
+    ("32", RGBColor(66, 146, 198)),
+    ("64", RGBColor(8, 69, 148)),
+    ("high-poly", RGBColor(217, 95, 14)),
+];
+
+/// Names of the scenes, each once.
+fn scenes_of(rows: &[Row]) -> Vec<String> {
+    let mut scenes: Vec<String> = Vec::new();
+    for row in rows {
+        if !scenes.contains(&row.scene) {
+            scenes.push(row.scene.clone());
+        }
+    }
+    scenes
+}
+
+/// Frames a second beside the paper's, one group a scene.
+fn fps_chart(rows: &[Row]) -> Bars<'static> {
+    const SHADINGS: [(&str, [RGBColor; 3]); 3] = [
+        (
+            "factored",
+            [
+                RGBColor(158, 202, 225),
+                RGBColor(66, 146, 198),
+                RGBColor(8, 69, 148),
+            ],
+        ),
+        (
+            "clusters",
+            [
+                RGBColor(199, 233, 192),
+                RGBColor(116, 196, 118),
+                RGBColor(0, 109, 44),
+            ],
+        ),
+        (
+            "paper",
+            [
+                RGBColor(210, 210, 210),
+                RGBColor(160, 160, 160),
+                RGBColor(99, 99, 99),
+            ],
+        ),
+    ];
+    let groups = scenes_of(rows);
+    let directions = &KINDS[1..4];
+    let mut bars = Vec::new();
+    for row in rows {
+        let group = groups.iter().position(|g| *g == row.scene);
+        let k = directions.iter().position(|k| k.0 == row.kind);
+        let Some((group, k)) = group.zip(k) else {
+            continue;
+        };
+        let paper = row.paper_fps.map(|f| Rate {
+            median: f,
+            low: f,
+            high: f,
+        });
+        let rates = [row.fps_factored, row.fps_clusters, paper];
+        for (shading, rate) in rates.into_iter().enumerate() {
+            bars.extend(rate.map(|rate| Bar {
+                group,
+                kind: 3 * shading + k,
+                value: rate.median,
+                spread: Some((rate.low, rate.high)),
+            }));
+        }
+    }
+    Bars {
+        caption: "Frames a second, 1280x720 (paper: size not given)",
+        unit: "frames a second",
+        bars,
+        kinds: SHADINGS
+            .iter()
+            .flat_map(|(name, colours)| {
+                let named = move |(k, colour): (&(&str, RGBColor), &RGBColor)| {
+                    (format!("{name}, K = {}", k.0), *colour)
+                };
+                KINDS[1..4].iter().zip(colours).map(named)
+            })
+            .collect(),
+        groups,
+    }
+}
+
+/// Seconds, one group a scene.
+fn chart(rows: &[Row]) -> Bars<'static> {
+    let groups = scenes_of(rows);
+    let bars = rows.iter().filter_map(|row| {
+        Some(Bar {
+            group: groups.iter().position(|g| *g == row.scene)?,
+            kind: KINDS.iter().position(|k| k.0 == row.kind)?,
+            value: row.seconds,
+            spread: None,
+        })
+    });
+    Bars {
+        caption: "Time of a bake",
+        unit: "seconds",
+        bars: bars.collect(),
+        kinds: KINDS
+            .iter()
+            .map(|(kind, colour)| (bake_name(kind), *colour))
+            .collect(),
+        groups,
+    }
+}
+
+/// A kind of bake as it is shown.
+fn bake_name(kind: &str) -> String {
+    match kind.parse::<u32>() {
+        Ok(k) => format!("K = {k}"),
+        Err(_) => kind.to_owned(),
+    }
+}

@@ -1,0 +1,183 @@
+//! What casts shadows, as a tree of boxes that shaders walk. Shaders: `shared/shadow_rays.glsl`, and `shadow_rays.comp` for
+//! tests; twin: [`crate::reference::shadow_rays`].
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use glam::Vec3;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::builder::build_bvh2;
+use obvhs::{Boundable, BvhBuildParams};
+
+use super::buffers::{download, upload};
+use super::types::{LightPoint, ShadowNode, ShadowRay, ShadowTriangle};
+use super::{groups, shaders};
+use crate::constants::KIND_SURFACE;
+use crate::error::Result;
+use crate::vk::{Bind, Binding, Buffer, BufferUse, Commands, ComputePipeline, Device};
+
+/// Boxes are wider than their triangles by this share of the greatest coordinate, 2⁻²⁰: the walk's places on a ray of at
+/// most twice that length are right to 2⁻²¹ of it.
+const BOX_MARGIN: f32 = 1.0 / (1 << 20) as f32;
+
+/// Triangles in boxes, in the order of `shared/shadow_rays.glsl`.
+#[derive(Debug, Default)]
+pub struct ShadowTree {
+    pub nodes: Vec<ShadowNode>,
+    pub triangles: Vec<ShadowTriangle>,
+}
+
+struct Bounds<'a>(&'a ShadowTriangle, f32);
+
+impl Boundable for Bounds<'_> {
+    fn aabb(&self) -> Aabb {
+        let Self(t, margin) = self;
+        let mut bounds = Aabb::from_points(&[t.a, t.b, t.c].map(Into::into));
+        bounds.min -= *margin;
+        bounds.max += *margin;
+        bounds
+    }
+}
+
+impl ShadowTree {
+    /// Triangles with a corner that is no finite number are left out.
+    pub fn new(mut triangles: Vec<ShadowTriangle>) -> Self {
+        triangles.retain(|t| [t.a, t.b, t.c].iter().all(|v| v.is_finite()));
+        if triangles.is_empty() {
+            return Self::default();
+        }
+        let largest = triangles
+            .iter()
+            .flat_map(|t| [t.a, t.b, t.c])
+            .map(|v| v.abs().max_element())
+            .fold(0.0, f32::max);
+        let margin = BOX_MARGIN * largest;
+        let bounds: Vec<_> = triangles.iter().map(|t| Bounds(t, margin)).collect();
+        let params = BvhBuildParams::medium_build();
+        let bvh = build_bvh2(&bounds, params, &mut Duration::default());
+        Self::flat(&bvh, &triangles)
+    }
+
+    fn flat(bvh: &Bvh2, triangles: &[ShadowTriangle]) -> Self {
+        let mut tree = Self::default();
+        // Nodes still to come, and nodes whose last descendant has just come.
+        enum Step {
+            Enter(u32),
+            Leave(usize),
+        }
+        let mut steps = vec![Step::Enter(0)];
+        while let Some(step) = steps.pop() {
+            match step {
+                Step::Leave(node) => tree.nodes[node].skip = tree.nodes.len() as u32,
+                Step::Enter(node) => {
+                    let node = &bvh.nodes[node as usize];
+                    let place = tree.nodes.len();
+                    tree.nodes.push(ShadowNode {
+                        low: node.aabb.min.into(),
+                        skip: 0,
+                        high: node.aabb.max.into(),
+                        first: tree.triangles.len() as u32,
+                        count: node.prim_count,
+                    });
+                    steps.push(Step::Leave(place));
+                    let first = node.first_index;
+                    if node.is_leaf() {
+                        let own = first as usize..(first + node.prim_count) as usize;
+                        let own = bvh.primitive_indices[own].iter();
+                        tree.triangles.extend(own.map(|&t| triangles[t as usize]));
+                    } else {
+                        steps.extend([Step::Enter(first + 1), Step::Enter(first)]);
+                    }
+                }
+            }
+        }
+        tree
+    }
+}
+
+/// Light points and what casts shadows, on the device; empty where nothing is lit by them.
+pub struct LightBuffers {
+    pub points: Buffer,
+    pub nodes: Buffer,
+    pub triangles: Buffer,
+    /// All light points, and those of emitters.
+    pub counts: [u32; 2],
+}
+
+impl LightBuffers {
+    /// Points of emitters first, LIGHT_SETS · LIGHT_POINTS or none.
+    ///
+    /// # Errors
+    /// A device without the memory.
+    pub fn new(device: &Arc<Device>, points: &[LightPoint], tree: &ShadowTree) -> Result<Self> {
+        let emitters = points.iter().filter(|p| p.kind == KIND_SURFACE).count();
+        // Without triangles, one empty node.
+        let none = [ShadowNode {
+            low: Vec3::ZERO,
+            skip: 0,
+            high: Vec3::ZERO,
+            first: 0,
+            count: 0,
+        }];
+        let nodes = if tree.nodes.is_empty() {
+            &none
+        } else {
+            &tree.nodes[..]
+        };
+        let storage = BufferUse::Storage;
+        Ok(Self {
+            points: upload(device, "light points", points, storage)?,
+            nodes: upload(device, "shadow nodes", nodes, storage)?,
+            triangles: upload(device, "shadow triangles", &tree.triangles, storage)?,
+            counts: [points.len() as u32, emitters as u32],
+        })
+    }
+}
+
+/// Walks ways alone, for tests.
+pub struct ShadowRays {
+    pipeline: ComputePipeline,
+    device: Arc<Device>,
+}
+
+impl ShadowRays {
+    /// # Errors
+    /// A device that fails.
+    pub fn new(device: &Arc<Device>) -> Result<Self> {
+        Ok(Self {
+            pipeline: ComputePipeline::new(
+                device,
+                "shadow rays",
+                shaders::SHADOW_RAYS_COMP,
+                &[Binding::Storage; 4],
+                size_of::<u32>(),
+                &[],
+                false,
+            )?,
+            device: Arc::clone(device),
+        })
+    }
+
+    /// Whether something stands on each way, `[ray]`.
+    ///
+    /// # Errors
+    /// A device that lacks the memory or fails.
+    pub fn run(&self, tree: &ShadowTree, rays: &[ShadowRay]) -> Result<Vec<bool>> {
+        let scene = LightBuffers::new(&self.device, &[], tree)?;
+        let count = rays.len() as u32;
+        let rays = upload(&self.device, "shadow rays", rays, BufferUse::Storage)?;
+        let bytes = u64::from(count) * 4;
+        let hits = Buffer::new(&self.device, "shadow hits", bytes, BufferUse::Storage)?;
+        let set = self.pipeline.bind(
+            "shadow rays",
+            &[&scene.nodes, &scene.triangles, &rays, &hits].map(Bind::Buffer),
+        )?;
+        Commands::run(&self.device, "shadow rays", |cmd| {
+            cmd.dispatch(&self.pipeline, &set, &count, [groups(count), 1, 1]);
+            Ok(())
+        })?;
+        let hits: Vec<u32> = download(&self.device, &hits, count as usize)?;
+        Ok(hits.into_iter().map(|hit| hit != 0).collect())
+    }
+}

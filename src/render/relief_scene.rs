@@ -1,0 +1,90 @@
+//! What of a scene's relief and its light does not depend on the view: made once for a series of pictures.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use super::relief_mesh::Surfaces;
+use super::{Lighting, Show};
+use crate::directions::Directions;
+use crate::elements::Elements;
+use crate::error::Result;
+use crate::meso::{Factors, MesoVertices, Tile, tiles, visibility};
+use crate::passes;
+use crate::passes::shade::Shade;
+use crate::scene::Scene;
+use crate::vk::Device;
+
+/// What the factors may leave out of the light, see [`Factors::error`].
+const FACTOR_ERROR: f64 = 0.01;
+
+/// The relief of a scene, seen from nowhere yet.
+pub struct ReliefScene {
+    pub pass: Arc<passes::relief::Relief>,
+    pub directions: Directions,
+    pub tiles: Vec<Tile>,
+    /// `[triangle]`, its place in `tiles`; `u32::MAX` of those without.
+    pub surface_of: Vec<u32>,
+    /// `[surface]`, as `tiles`.
+    pub factors: Vec<Factors>,
+    pub surfaces: Surfaces,
+    pub vertices: MesoVertices,
+    /// Moments at the vertices, `[vertex][slot][colour]`: all of the light and what is direct.
+    pub all: Vec<[Vec3; 3]>,
+    pub direct: Vec<[Vec3; 3]>,
+}
+
+impl ReliefScene {
+    /// None where nothing with relief is drawn as such.
+    ///
+    /// # Errors
+    /// As [`super::render`].
+    pub fn new(
+        device: &Arc<Device>,
+        shade: &Shade,
+        scene: &Scene,
+        lighting: &Lighting<'_>,
+    ) -> Result<Option<Self>> {
+        let Some((light, _)) = lighting.relief() else {
+            return Ok(None);
+        };
+        let directions = Directions::new(light.directions.len() as u32)?;
+        let elements = Elements::new(scene);
+        let (tiles, _) = tiles(scene, &elements)?;
+        let mut surface_of = vec![u32::MAX; scene.triangles.len()];
+        for (surface, tile) in (0..).zip(&tiles) {
+            for &e in &tile.members {
+                surface_of[elements.input_index[e] as usize] = surface;
+            }
+        }
+        let mut marcher = None;
+        let mut factors = Vec::with_capacity(tiles.len());
+        for tile in &tiles {
+            let (visibility, _) = visibility(device, &tile.field, lighting.cache, &mut marcher)?;
+            factors.push(Factors::new(
+                &directions,
+                &tile.field,
+                &visibility,
+                &tile.shading,
+                FACTOR_ERROR,
+            ));
+        }
+        let vertices = MesoVertices::new(scene, light);
+        let gather = |moments| vertices.gather(&directions, light, moments);
+        Ok(Some(Self {
+            pass: Arc::new(passes::relief::Relief::new(
+                device,
+                shade,
+                lighting.show == Show::Overdraw,
+            )?),
+            surfaces: Surfaces::new(scene, &tiles, &factors),
+            all: gather(&light.incident_moment),
+            direct: gather(&light.incident_moment_direct),
+            directions,
+            tiles,
+            surface_of,
+            factors,
+            vertices,
+        }))
+    }
+}

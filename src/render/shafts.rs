@@ -1,0 +1,301 @@
+//! Triangles that nothing stands between and the lights: their samples follow no ways to light points.
+//!
+//! A shaft (Haines and Wallace 1991) holds every way from a triangle to a lamp. Here it is cut by planes about the convex hull
+//! of where ways begin and end; a triangle wholly outside one of them, or whose own plane has the hull on one side, stands on
+//! no way.
+
+use glam::{DVec3, Vec3};
+
+use super::Projection;
+use crate::passes::shadow_rays::ShadowTree;
+use crate::passes::types::{LitTriangle, ShadowTriangle};
+use crate::scene::Scene;
+
+/// Shafts are as many as lamps; with more of them none are looked at.
+const MOST_LAMPS: usize = 8;
+/// Ways end this share of the greatest coordinate above an emitter: ABOVE of `shared/light_points.glsl`.
+const ABOVE: f64 = 3.8e-6;
+/// What lies outside of a shaft lies so far outside, as a share of the greatest coordinate: the walk through the tree looks at
+/// nothing further from a way, see `BOX_MARGIN`.
+const MARGIN: f64 = 1.0 / (1 << 20) as f64;
+/// The same over planes that ways begin or end above: a share of what they begin above it, 2⁻¹⁸ of coordinates that are
+/// rounded to 2⁻²².
+const MARGIN_ABOVE: f64 = 0.25;
+
+/// Emitters in one plane that face alike, or a point light.
+struct Lamp {
+    /// Ways end in their hull.
+    ends: Vec<DVec3>,
+    plane: Option<LampPlane>,
+}
+
+struct LampPlane {
+    normal: DVec3,
+    offset: f64,
+    /// Of the nearest end.
+    above: f64,
+}
+
+/// n·x ≤ `limit` inside, with the margin.
+struct Side {
+    normal: DVec3,
+    limit: f64,
+}
+
+/// What casts shadows, and lamps before which it may.
+pub struct Shafts {
+    tree: ShadowTree,
+    lamps: Vec<Lamp>,
+    margin: f64,
+}
+
+impl Shafts {
+    /// Of `tree`, whose triangles are `scene`'s as `projection` sees them.
+    pub fn new(tree: ShadowTree, scene: &Scene, projection: &Projection) -> Self {
+        let seen = |p: DVec3| (p - projection.eye) / projection.unit;
+        let mut lamps: Vec<_> = Self::emitters(scene, seen)
+            .iter()
+            .map(|l| l.lamp())
+            .collect();
+        lamps.extend(scene.point_lights.iter().map(|light| Lamp {
+            ends: vec![seen(light.position)],
+            plane: None,
+        }));
+        if lamps.len() > MOST_LAMPS {
+            lamps.clear();
+        }
+        let corners = tree.triangles.iter().flat_map(|t| [t.a, t.b, t.c]);
+        let largest = corners
+            .map(|v| v.abs().max_element())
+            .fold(0.0_f32, f32::max);
+        Self {
+            margin: MARGIN * f64::from(largest),
+            tree,
+            lamps,
+        }
+    }
+
+    /// That finds no triangle open.
+    pub fn closed() -> Self {
+        Self {
+            tree: ShadowTree::default(),
+            lamps: Vec::new(),
+            margin: 0.0,
+        }
+    }
+
+    fn emitters(scene: &Scene, seen: impl Fn(DVec3) -> DVec3) -> Vec<FlatEmitter> {
+        let mut all: Vec<FlatEmitter> = Vec::new();
+        for t in &scene.triangles {
+            if !scene.materials[t.material as usize].emits() {
+                continue;
+            }
+            let corners = scene.corners(t).map(&seen);
+            let [a, b, c] = corners;
+            let normal = (b - a).cross(c - a).normalize_or_zero();
+            if normal == DVec3::ZERO {
+                continue;
+            }
+            match all.iter_mut().find(|l| l.holds(corners, normal)) {
+                Some(lamp) => lamp.corners.extend(corners),
+                None => all.push(FlatEmitter {
+                    normal,
+                    along: [(b - a), (c - b), (a - c)].into_iter().fold(
+                        DVec3::ZERO,
+                        |longest, edge| {
+                            let longer = edge.length_squared() > longest.length_squared();
+                            if longer { edge } else { longest }
+                        },
+                    ),
+                    corners: corners.to_vec(),
+                }),
+            }
+            // A round lamp is as many as its triangles: too many soon.
+            if all.len() > MOST_LAMPS {
+                break;
+            }
+        }
+        all
+    }
+
+    /// Whether nothing stands on any way from the triangle to any light.
+    pub fn is_open(&self, t: &LitTriangle) -> bool {
+        let starts = starts(t);
+        !self.lamps.is_empty()
+            && self
+                .lamps
+                .iter()
+                .all(|lamp| self.is_clear(t, &starts, lamp))
+    }
+
+    fn is_clear(&self, t: &LitTriangle, starts: &[DVec3], lamp: &Lamp) -> bool {
+        if let Some(plane) = &lamp.plane {
+            let behind = |p: &DVec3| plane.normal.dot(*p) < plane.offset - 2.0 * self.margin;
+            if starts.iter().all(behind) {
+                return true;
+            }
+        }
+        let hull: Vec<DVec3> = starts.iter().chain(&lamp.ends).copied().collect();
+        let sides = self.sides(t, lamp, &hull);
+        let nodes = &self.tree.nodes;
+        let mut at = 0;
+        while let Some(node) = nodes.get(at) {
+            let (low, high) = (node.low.as_dvec3(), node.high.as_dvec3());
+            let misses = |side: &Side| {
+                let nearest = DVec3::select(side.normal.cmpgt(DVec3::ZERO), low, high);
+                side.normal.dot(nearest) > side.limit
+            };
+            if sides.iter().any(misses) {
+                at = node.skip as usize;
+                continue;
+            }
+            let own = node.first as usize..(node.first + node.count) as usize;
+            if self.tree.triangles[own]
+                .iter()
+                .any(|t| self.stands_in(t, &sides, &hull))
+            {
+                return false;
+            }
+            at += 1;
+        }
+        true
+    }
+
+    fn stands_in(&self, t: &ShadowTriangle, sides: &[Side], hull: &[DVec3]) -> bool {
+        let corners = [t.a, t.b, t.c].map(|v| v.as_dvec3());
+        let outside = |s: &Side| corners.iter().all(|v| s.normal.dot(*v) > s.limit);
+        if sides.iter().any(outside) {
+            return false;
+        }
+        let [a, b, c] = corners;
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let off = |p: &DVec3| normal.dot(*p - a);
+        !(hull.iter().all(|p| off(p) > self.margin) || hull.iter().all(|p| off(p) < -self.margin))
+    }
+
+    /// Planes that hold the hull: by the axes, the triangle's and the lamp's own, and those along an axis that touch it.
+    fn sides(&self, t: &LitTriangle, lamp: &Lamp, hull: &[DVec3]) -> Vec<Side> {
+        let side = |normal: DVec3, margin: f64| Side {
+            normal,
+            limit: margin + hull.iter().map(|p| normal.dot(*p)).fold(f64::MIN, f64::max),
+        };
+        let mut sides = Vec::with_capacity(32);
+        for axis in DVec3::AXES {
+            sides.extend([side(axis, self.margin), side(-axis, self.margin)]);
+        }
+        let above = f64::from(t.above);
+        sides.push(side(-t.plane.as_dvec3(), MARGIN_ABOVE * above));
+        if let Some(plane) = &lamp.plane {
+            sides.push(side(-plane.normal, MARGIN_ABOVE * plane.above));
+        }
+        for axis in 0..3 {
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            for (from, to) in outline(hull, u, v) {
+                let mut normal = DVec3::ZERO;
+                normal[u] = to[v] - from[v];
+                normal[v] = from[u] - to[u];
+                if let Some(normal) = normal.try_normalize() {
+                    sides.push(side(normal, self.margin));
+                }
+            }
+        }
+        sides
+    }
+}
+
+/// Places in whose hull ways from the triangle begin, see `shade.frag`: up to where the tangent planes of its corners are.
+fn starts(t: &LitTriangle) -> Vec<DVec3> {
+    let corners = [t.a, t.b, t.c].map(|v| v.as_dvec3());
+    let above = f64::from(t.above);
+    let raised = corners.map(|c| c + t.plane.as_dvec3() * above);
+    let mut starts = raised.to_vec();
+    for (corner, normal) in corners
+        .iter()
+        .zip([t.normal_a, t.normal_b, t.normal_c].map(Vec3::as_dvec3))
+    {
+        let lift = corners.map(|c| normal.dot(*corner - c));
+        let lift = lift.into_iter().fold(0.0, f64::max);
+        // Less is rounding, which the margins hold.
+        if lift > MARGIN_ABOVE * above {
+            starts.extend(raised.map(|c| c + normal * lift));
+        }
+    }
+    starts
+}
+
+/// Emitters in a plane, from the eye.
+struct FlatEmitter {
+    normal: DVec3,
+    /// A long edge.
+    along: DVec3,
+    corners: Vec<DVec3>,
+}
+
+/// f64 places of one plane lie so near to it, as a share of the distance from the eye.
+const FLAT: f64 = 1e-9;
+
+impl FlatEmitter {
+    fn holds(&self, corners: [DVec3; 3], normal: DVec3) -> bool {
+        let far = self.corners[0].abs().max_element();
+        let off = |p: DVec3| self.normal.dot(p - self.corners[0]).abs();
+        normal.dot(self.normal) > 1.0 - FLAT && corners.into_iter().all(|p| off(p) < FLAT * far)
+    }
+
+    /// Its rectangle along its longest edge.
+    fn lamp(&self) -> Lamp {
+        let along = self.along.normalize_or_zero();
+        let across = self.normal.cross(along);
+        let extent = |axis: DVec3| {
+            let places = self.corners.iter().map(|p| axis.dot(*p));
+            places.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)))
+        };
+        let (u, v) = (extent(along), extent(across));
+        let offset = self.normal.dot(self.corners[0]);
+        let corner = |u: f64, v: f64| along * u + across * v + self.normal * offset;
+        let corners = [
+            corner(u.0, v.0),
+            corner(u.1, v.0),
+            corner(u.1, v.1),
+            corner(u.0, v.1),
+        ];
+        // The greatest coordinate of any place between the corners lies between these.
+        let low = corners.into_iter().reduce(DVec3::min).unwrap_or_default();
+        let high = corners.into_iter().reduce(DVec3::max).unwrap_or_default();
+        let nearest = low.max(-high).max(DVec3::ZERO).max_element();
+        let furthest = low.abs().max(high.abs()).max_element();
+        let raised = |by: f64| corners.map(|c| c + self.normal * (ABOVE * by));
+        Lamp {
+            ends: [raised(nearest), raised(furthest)].concat(),
+            plane: Some(LampPlane {
+                normal: self.normal,
+                offset,
+                above: ABOVE * nearest,
+            }),
+        }
+    }
+}
+
+/// Edges of the convex outline of the points along two axes, counter-clockwise: Andrew's monotone chain.
+fn outline(points: &[DVec3], u: usize, v: usize) -> Vec<(DVec3, DVec3)> {
+    let mut sorted = points.to_vec();
+    sorted.sort_by(|a, b| a[u].total_cmp(&b[u]).then(a[v].total_cmp(&b[v])));
+    let turns_left = |a: DVec3, b: DVec3, c: DVec3| {
+        (b[u] - a[u]) * (c[v] - a[v]) - (b[v] - a[v]) * (c[u] - a[u]) > 0.0
+    };
+    let half = |points: &mut dyn Iterator<Item = &DVec3>| {
+        let mut chain: Vec<DVec3> = Vec::new();
+        for &p in points {
+            while let [.., a, b] = chain[..]
+                && !turns_left(a, b, p)
+            {
+                chain.pop();
+            }
+            chain.push(p);
+        }
+        chain
+    };
+    let lower = half(&mut sorted.iter());
+    let upper = half(&mut sorted.iter().rev());
+    let edges = |chain: &[DVec3]| -> Vec<_> { chain.windows(2).map(|w| (w[0], w[1])).collect() };
+    [edges(&lower), edges(&upper)].concat()
+}

@@ -1,0 +1,178 @@
+//! The passes between the item buffer and irradiance, by estimator and by whether the scene has relief, bound to the buffers of
+//! one problem.
+
+use std::sync::Arc;
+
+use super::Estimator;
+use super::batch::OnDevice;
+use crate::error::Result;
+use crate::passes::bin_pixels::{self, BinPixels};
+use crate::passes::buffers::Batch;
+use crate::passes::factor_buffers::FactorBuffers;
+use crate::passes::form_factors::{self, FormFactors};
+use crate::passes::gather::{self, Gather, GatherRelief};
+use crate::passes::keep::{self, Keep};
+use crate::passes::measure_relief::MeasureRelief;
+use crate::passes::pixels_relief::{self, PixelsRelief};
+use crate::passes::relief_buffers::ReliefBuffers;
+use crate::passes::send_relief::SendRelief;
+use crate::vk::{Commands, DescriptorSet, Device, Stage};
+
+#[allow(clippy::large_enum_variant)] // one of them lives as long as the solver
+pub(super) enum Estimate {
+    Receivers {
+        form_factors: (FormFactors, form_factors::Sets),
+        /// None where nothing is to be kept.
+        keep: Option<(Keep, keep::Sets)>,
+        gather: GatherBy,
+    },
+    Pixels(BinPixels, bin_pixels::Buffers),
+    PixelsRelief(PixelsRelief, pixels_relief::Buffers),
+}
+
+#[allow(clippy::large_enum_variant)] // as above
+pub(super) enum GatherBy {
+    Plain(Gather, DescriptorSet),
+    Relief(GatherRelief, gather::ReliefSets),
+}
+
+impl Estimate {
+    pub fn new(
+        device: &Arc<Device>,
+        estimator: Estimator,
+        batch: &Batch,
+        on: &OnDevice<'_>,
+    ) -> Result<Self> {
+        let (scene, state) = (on.scene, on.state);
+        let Some(factors) = on.factors.filter(|_| estimator == Estimator::Receiver) else {
+            return Ok(match on.relief {
+                Some(relief) => {
+                    let pass = PixelsRelief::new(device)?;
+                    let buffers = pass.bind(device, scene, state, batch, relief)?;
+                    Self::PixelsRelief(pass, buffers)
+                }
+                None => {
+                    let pass = BinPixels::new(device)?;
+                    let buffers = pass.bind(device, scene, state, batch)?;
+                    Self::Pixels(pass, buffers)
+                }
+            });
+        };
+        let form_factors = FormFactors::new(device, on.relief.is_some())?;
+        let sets = form_factors.bind(scene, batch, factors, on.relief)?;
+        let keep = match factors.keeps() {
+            true => {
+                let keep = Keep::new(device)?;
+                let sets = keep.bind(state, batch, factors)?;
+                Some((keep, sets))
+            }
+            false => None,
+        };
+        let gather = match on.relief {
+            None => {
+                let gather = Gather::new(device)?;
+                let set = gather.bind(scene, state, batch, factors)?;
+                GatherBy::Plain(gather, set)
+            }
+            Some(relief) => {
+                let gather = GatherRelief::new(device)?;
+                let sets = gather.bind(scene, state, batch, factors, relief)?;
+                GatherBy::Relief(gather, sets)
+            }
+        };
+        Ok(Self::Receivers {
+            form_factors: (form_factors, sets),
+            keep,
+            gather,
+        })
+    }
+
+    /// `found` is recorded between form factors and irradiance.
+    pub fn record(&self, cmd: &Commands, batch: &Batch, on: &OnDevice<'_>, found: impl FnOnce()) {
+        match (self, on.factors, on.relief) {
+            (
+                Self::Receivers {
+                    form_factors: (form_factors, sets),
+                    keep,
+                    gather,
+                },
+                Some(factors),
+                relief,
+            ) => {
+                cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
+                form_factors.record(cmd, sets, batch, factors);
+                cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+                found();
+                gather.record(cmd, batch, on, (factors, relief));
+                if let Some((keep, sets)) = keep {
+                    cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+                    keep.record(cmd, sets, batch, factors);
+                }
+            }
+            (Self::Pixels(pass, buffers), ..) => {
+                pass.record(cmd, buffers, on.scene, batch);
+                found();
+            }
+            (Self::PixelsRelief(pass, buffers), _, Some(relief)) => {
+                pass.record(cmd, buffers, relief, batch);
+                found();
+            }
+            _ => unreachable!("made for what is on the device"),
+        }
+    }
+}
+
+impl GatherBy {
+    fn record(
+        &self,
+        cmd: &Commands,
+        batch: &Batch,
+        on: &OnDevice<'_>,
+        (factors, relief): (&FactorBuffers, Option<&ReliefBuffers>),
+    ) {
+        match (self, relief) {
+            (Self::Plain(gather, set), _) => gather.record(cmd, set, on.scene, batch),
+            (Self::Relief(gather, sets), Some(relief)) => {
+                gather.record(cmd, sets, relief, batch, factors);
+            }
+            (Self::Relief(..), None) => unreachable!("made for a scene with relief"),
+        }
+    }
+}
+
+/// What only scenes with relief compile: what their sources have to send, and by which direction they send it.
+pub(super) struct ReliefSources {
+    measure: (MeasureRelief, DescriptorSet),
+    send: (SendRelief, DescriptorSet),
+}
+
+impl ReliefSources {
+    pub fn new(
+        device: &Arc<Device>,
+        batch: &Batch,
+        on: &OnDevice<'_>,
+        relief: &ReliefBuffers,
+    ) -> Result<Self> {
+        let measure = MeasureRelief::new(device)?;
+        let measured = measure.bind(on.scene, on.state, relief)?;
+        let send = SendRelief::new(device)?;
+        let sent = send.bind(on.scene, batch, relief)?;
+        Ok(Self {
+            measure: (measure, measured),
+            send: (send, sent),
+        })
+    }
+
+    /// Unshot light, over what [`crate::passes::measure`] took it for.
+    pub fn measure(&self, cmd: &Commands, relief: &ReliefBuffers) {
+        let (pass, set) = &self.measure;
+        pass.record(cmd, set, relief);
+        cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+    }
+
+    pub fn send(&self, cmd: &Commands, relief: &ReliefBuffers, batch: &Batch) {
+        let (pass, set) = &self.send;
+        pass.record(cmd, set, relief, batch);
+        cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+    }
+}
