@@ -1,5 +1,5 @@
-// Lists the elements that see each source of the batch, by how their form factor is found: by the outline of the source, by its
-// parts as points, or, near it, with more care. Elements that it lies behind, turns its back to or is hidden from are in no
+// Lists the elements that see each source of the batch, by how their form factor is found: as of a point, by the outline of
+// the source, by its parts as points, or, near it, with more care. Elements that it lies behind, turns its back to or is hidden from are in no
 // list, and their form factor is 0.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -41,9 +41,13 @@ void main() {
     bool points = distance_eye - s.radius >= POINT_DISTANCE * s.part_radius;
     bool seen = shows_front(s, ball.xyz) && visible(ball.xyz, n, e, slot, s);
     bool mine = inside && across < s.radius && (near || seen);
-    bool by_outline = !near && (s.kind == KIND_POINT || whole && above);
-    bool by_points = !near && !by_outline && !whole && points;
-    append(slot, RECEIVE_OUTLINE, mine && by_outline, i);
-    append(slot, RECEIVE_POINTS, mine && by_points, i);
-    append(slot, RECEIVE_NEAR, mine && !by_outline && !by_points, i);
+    bool curved = s.cone_sin != 0.0;
+    float far_distance = (curved ? POINT_DISTANCE : FLAT_POINT_DISTANCE) * s.radius;
+    bool far = s.kind == KIND_POINT || whole && length(ball.xyz - s.middle) >= far_distance;
+    bool by_parts = curved && points;
+    uint kind = near ? RECEIVE_NEAR : far ? RECEIVE_FAR : by_parts ? RECEIVE_PARTS
+        : whole && above ? RECEIVE_OUTLINE : RECEIVE_NEAR;
+    for (uint k = 0; k < RECEIVE_KINDS; k++) {
+        append(slot, k, mine && kind == k, i);
+    }
 }

@@ -22,11 +22,13 @@ shared! {
     GROUP = 64;
     /// Invocations of the one workgroup that selects sources.
     SELECT_GROUP = 256;
-    /// How an element's form factor to a source is found: by the source's outline, by its members as points, or near it.
-    RECEIVE_OUTLINE = 0;
-    RECEIVE_POINTS = 1;
-    RECEIVE_NEAR = 2;
-    RECEIVE_KINDS = 3;
+    /// How an element's form factor to a source is found: from afar as a point, by the source's outline, by its parts as
+    /// points, or near it.
+    RECEIVE_FAR = 0;
+    RECEIVE_OUTLINE = 1;
+    RECEIVE_PARTS = 2;
+    RECEIVE_NEAR = 3;
+    RECEIVE_KINDS = 4;
     /// Sources of a batch, at most, whose form factors were kept and need no drawing.
     REPLAYS = 496;
     /// A kept source is shot again once it has this share (one over it) of the power of the strongest source.

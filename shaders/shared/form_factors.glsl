@@ -5,7 +5,7 @@
 #include "shared/lambert.glsl"
 #include "shared/kept.glsl"
 
-// RECEIVE_OUTLINE, RECEIVE_POINTS or RECEIVE_NEAR. A software device works through both sides of every branch, so that each
+// RECEIVE_FAR, RECEIVE_OUTLINE, RECEIVE_PARTS or RECEIVE_NEAR. A software device works through both sides of every branch, so that each
 // kind has a pipeline of its own.
 layout(constant_id = 0) const uint KIND = RECEIVE_OUTLINE;
 
@@ -118,10 +118,16 @@ FLUX form_factor(vec3 p, vec3 n, uint element, Source s) {
         float square = dot(d, d);
         return flux_above(flux(d, n), n) * (inversesqrt(square) / square);
     }
+    if (KIND == RECEIVE_FAR) {
+        vec3 d = s.middle - p;
+        float square = dot(d, d);
+        float projected = -s.facing * dot(s.normal, d);
+        return flux_above(flux(d, n), n) * (projected / (3.14159265 * square * square));
+    }
     if (KIND == RECEIVE_OUTLINE) {
         return outline_above(p, n, s);
     }
-    if (KIND == RECEIVE_POINTS) {
+    if (KIND == RECEIVE_PARTS) {
         return parts_as_points(p, n, s);
     }
     bool whole = shows_whole_front(s, p);
