@@ -17,7 +17,7 @@ use mesolux::directions::Directions;
 use mesolux::meso::{Options, Transport};
 use mesolux::path_tracer::PathTracer;
 use mesolux::render::{
-    Comparison, Light, Lighting, Picture, ReliefShading, SAMPLES, Show, View, render,
+    Comparison, Light, Lighting, Picture, ReliefShading, SAMPLES, Show, View, render, side_by_side,
 };
 use mesolux::scene::{Camera, Scene, Texture, displace};
 use mesolux::solution::{Bake, Origin, Solution};
