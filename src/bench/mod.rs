@@ -5,9 +5,14 @@ mod difference;
 pub mod frame;
 pub mod hemicube;
 pub mod irradiance;
+mod lines;
+mod memory;
+mod power_law;
+pub mod scaling;
 pub mod table1;
 
 pub use difference::{Difference, plain_pairs};
+pub use power_law::PowerLaw;
 
 /// Median, and the 10 % and 90 % points.
 pub fn spread(values: &mut [f64]) -> (f64, f64, f64) {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::{Builtin, DeviceOptions};
-use mesolux::bench::{frame, hemicube, irradiance, table1};
+use mesolux::bench::{frame, hemicube, irradiance, scaling, table1};
 use mesolux::error::{Error, Result};
 use mesolux::solution::Bake;
 
@@ -24,6 +24,8 @@ enum What {
     Hemicube(HemicubeOptions),
     /// Irradiance of bakes of one scene, on what has no relief, against path traced irradiance with the relief as geometry
     Irradiance(IrradianceOptions),
+    /// How time and memory of a bake grow with the number of elements, at one error bound
+    Scaling(ScalingOptions),
     /// The paper's Table 1: three scenes in 16, 32 and 64 directions, without directions, and with the relief as geometry
     Table1(Table1Options),
 }
@@ -86,6 +88,39 @@ struct IrradianceOptions {
 }
 
 #[derive(Args)]
+struct ScalingOptions {
+    /// Folder for scaling.csv, scaling.json and scaling.svg
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Built-in scene that is cut into more and more elements
+    #[arg(long, value_name = "NAME", default_value = "cornell")]
+    scene: String,
+    /// Elements of the first size; each next one has twice as many
+    #[arg(long, value_name = "N", default_value_t = 10_000)]
+    first: usize,
+    /// Elements of the last size; the full range ends at 1000000
+    #[arg(long, value_name = "N", default_value_t = 320_000)]
+    largest: usize,
+    /// Most elements of a source, 0 for no limit; may be given again. The program's own and none if not given
+    #[arg(long, value_name = "N")]
+    max_elements: Vec<usize>,
+    /// Error bound at which a bake is done, as a share of the emitted power
+    #[arg(long, value_name = "X", default_value_t = 0.01)]
+    residual: f64,
+    /// Pixels a side of a hemicube face
+    #[arg(long, value_name = "N", default_value_t = 128)]
+    hemicube: u32,
+    /// Places at which the path tracer tells the error, 0 for none
+    #[arg(long, value_name = "N", default_value_t = 200)]
+    samples: usize,
+    /// Paths of each place
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    paths: u32,
+    #[command(flatten)]
+    device: DeviceOptions,
+}
+
+#[derive(Args)]
 struct HemicubeOptions {
     /// Pixels a side of a hemicube face
     #[arg(long, value_name = "N", default_value_t = 128)]
@@ -104,6 +139,7 @@ pub fn run(options: &Options) -> Result<()> {
         What::Hemicube(options) => run_hemicube(options),
         What::Frame(options) => run_frame(options),
         What::Irradiance(options) => run_irradiance(options),
+        What::Scaling(options) => run_scaling(options),
         What::Table1(options) => run_table1(options),
     }
 }
@@ -186,6 +222,34 @@ fn run_table1(options: &Table1Options) -> Result<()> {
     let device = options.device.open()?;
     super::progress::catch_interrupts();
     table1::run(&device, &wanted, &options.output, || {
+        !super::progress::interrupted()
+    })?;
+    options.device.check()
+}
+
+fn run_scaling(options: &ScalingOptions) -> Result<()> {
+    let own = mesolux::sources::Grouping::default().max_elements;
+    let limits = match options.max_elements.is_empty() {
+        true => vec![Some(own), None],
+        false => options
+            .max_elements
+            .iter()
+            .map(|&n| (n > 0).then_some(n))
+            .collect(),
+    };
+    let wanted = scaling::Options {
+        scene: options.scene.clone(),
+        first: options.first,
+        largest: options.largest,
+        limits,
+        residual: options.residual,
+        hemicube: options.hemicube,
+        samples: options.samples,
+        paths: options.paths,
+    };
+    let device = options.device.open()?;
+    super::progress::catch_interrupts();
+    scaling::run(&device, &wanted, &options.output, || {
         !super::progress::interrupted()
     })?;
     options.device.check()
