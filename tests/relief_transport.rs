@@ -154,7 +154,7 @@ fn walls_about_a_relief_are_lit_as_by_its_geometry() {
     let start = Instant::now();
     let lambert = build.solve(&settings(Transport::Lambert));
     let lambert_time = start.elapsed();
-    let fine = Build { scene: fine_scene };
+    let fine = Build::of(fine_scene);
     let start = Instant::now();
     let truth = fine.solve(&settings(Transport::Lambert));
     let fine_time = start.elapsed();

@@ -9,6 +9,7 @@ mod lines;
 mod memory;
 mod power_law;
 pub mod scaling;
+pub mod stress;
 pub mod table1;
 
 pub use difference::{Difference, plain_pairs};

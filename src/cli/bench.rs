@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::{Builtin, DeviceOptions};
-use mesolux::bench::{frame, hemicube, irradiance, scaling, table1};
+use mesolux::bench::{frame, hemicube, irradiance, scaling, stress, table1};
 use mesolux::error::{Error, Result};
 use mesolux::solution::Bake;
 
@@ -26,6 +26,8 @@ enum What {
     Irradiance(IrradianceOptions),
     /// How time and memory of a bake grow with the number of elements, at one error bound
     Scaling(ScalingOptions),
+    /// Scenes at the ends of what numbers and meshes can do: what was asked, what came out, and the verdict
+    Stress(StressOptions),
     /// The paper's Table 1: three scenes in 16, 32 and 64 directions, without directions, and with the relief as geometry
     Table1(Table1Options),
 }
@@ -121,6 +123,21 @@ struct ScalingOptions {
 }
 
 #[derive(Args)]
+struct StressOptions {
+    /// Folder for stress.csv and stress.json
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Only cases with this in their name
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    only: String,
+    /// Scenes as small as those of the tests
+    #[arg(long)]
+    small: bool,
+    #[command(flatten)]
+    device: DeviceOptions,
+}
+
+#[derive(Args)]
 struct HemicubeOptions {
     /// Pixels a side of a hemicube face
     #[arg(long, value_name = "N", default_value_t = 128)]
@@ -140,6 +157,7 @@ pub fn run(options: &Options) -> Result<()> {
         What::Frame(options) => run_frame(options),
         What::Irradiance(options) => run_irradiance(options),
         What::Scaling(options) => run_scaling(options),
+        What::Stress(options) => run_stress(options),
         What::Table1(options) => run_table1(options),
     }
 }
@@ -252,6 +270,18 @@ fn run_scaling(options: &ScalingOptions) -> Result<()> {
     scaling::run(&device, &wanted, &options.output, || {
         !super::progress::interrupted()
     })?;
+    options.device.check()
+}
+
+fn run_stress(options: &StressOptions) -> Result<()> {
+    let context = stress::Context {
+        device: options.device.open()?,
+        size: match options.small {
+            true => stress::Size::Small,
+            false => stress::Size::Full,
+        },
+    };
+    stress::run(&context, &options.only, options.output.as_deref())?;
     options.device.check()
 }
 
