@@ -5,10 +5,11 @@ use std::f32::consts::PI;
 use glam::DVec3;
 
 use super::shapes::Shapes;
-use super::{Case, Check, Context, Size, furnace_material, settings};
+use super::{Case, Check, Context, Size, furnace_limit, furnace_material, settings};
 use crate::error::Result;
 use crate::path_tracer::{NORMAL_95, PathTracer};
 use crate::render::Light;
+use crate::solver::Settings;
 
 pub(super) const TOUCHING: Case = Case {
     name: "touching",
@@ -36,7 +37,7 @@ pub(super) const ONE_PIXEL: Case = Case {
     run: one_pixel,
 };
 
-/// Contacts at 64² pixels: what tests/furnace.rs holds for the largest error with balls at 128².
+/// Contacts: what tests/furnace.rs holds for the largest error with balls afloat.
 const CONTACT_MOST: f64 = 2e-2;
 /// Elements through which the other ball's surface goes send the mean of a lit and a dark part, and their neighbours see it.
 const CROSSING_MEAN: f64 = 1e-2;
@@ -50,7 +51,6 @@ const SHADOW_BIAS: f64 = 0.02;
 const EITHER_WAY: f64 = 1e-6;
 /// All of the ball lies in one or two pixels; its rms is one of plain and far elements.
 const TINY_RMS: f64 = 1e-2;
-const ROOM_MOST: f64 = 2e-3;
 
 fn touching(context: &Context) -> Result<Vec<Check>> {
     let mut shapes = Shapes::new();
@@ -59,7 +59,7 @@ fn touching(context: &Context) -> Result<Vec<Check>> {
     let low = DVec3::new(0.25, 0.0, 0.25);
     let solid = shapes.solid(low, DVec3::splat(0.5), 4, material);
     let scene = &shapes.scene;
-    let solved = context.solve(scene, &settings())?;
+    let solved = context.solve(scene, &Settings::default())?;
     let covered = |e: usize| {
         let inside = |v: &DVec3| (v.x - 0.5).abs() <= 0.25 && (v.z - 0.5).abs() <= 0.25;
         let floor = sides[0].contains(&e) && scene.corners(&scene.triangles[e]).iter().all(inside);
@@ -176,16 +176,16 @@ fn open_sheet(context: &Context) -> Result<Vec<Check>> {
 }
 
 fn one_pixel(context: &Context) -> Result<Vec<Check>> {
-    // 20,480 or 1,310,720 triangles.
+    // 5,120 or 1,310,720 triangles.
     let levels = match context.size {
-        Size::Small => 5,
+        Size::Small => 4,
         Size::Full => 8,
     };
     let mut shapes = Shapes::new();
     let material = furnace_material(&mut shapes, 0.6);
     let sides = shapes.room(DVec3::ZERO, DVec3::ONE, 6, material);
     // A pixel in the middle of a face is 2/16 of its distance wide.
-    let coarse = crate::solver::Settings {
+    let coarse = Settings {
         hemicube: 16,
         ..settings()
     };
@@ -199,6 +199,6 @@ fn one_pixel(context: &Context) -> Result<Vec<Check>> {
             rms,
             TINY_RMS,
         ),
-        Check::at_most("largest in the room", most, ROOM_MOST),
+        Check::at_most("largest in the room", most, furnace_limit(0.6)),
     ])
 }

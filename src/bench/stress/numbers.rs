@@ -5,7 +5,7 @@ use std::f32::consts::PI;
 use glam::DVec3;
 
 use super::shapes::Shapes;
-use super::{Case, Check, Context, Size, settings, through_files};
+use super::{Case, Check, Context, ROWS, Size, settings, through_files};
 use crate::error::Result;
 use crate::scene::Scene;
 use crate::solver::{Settings, StopReason};
@@ -50,8 +50,8 @@ pub(super) const MANY_SHOTS: Case = Case {
 const REORDERED: f64 = 1e-5;
 /// A sphere of 1,280 flat triangles is not the sphere: its form factors err by some 0.3 % of it.
 const SPHERE: f64 = 3e-3;
-/// Energy on the lid: the residual of 1e-3, and as much for visibility in an empty room.
-const ENERGY: f64 = 2e-3;
+/// Energy on the lid: of six sides one takes light, so that it comes back six times over, and the residual of 1e-3.
+const ENERGY: f64 = 6.0 * ROWS + 1e-3;
 /// Asked for.
 const DRIFT: f64 = 1e-6;
 
