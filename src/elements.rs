@@ -20,6 +20,22 @@ fn snapped(v: DVec3) -> DVec3 {
     (v * STEPS).round() / STEPS
 }
 
+/// Height of a triangle in steps below which snapping may turn its normal by more than 10⁻³, or leave it none.
+const LEAST_STEPS: f64 = 1024.0;
+
+/// Normal times twice the area of a triangle whose corners are snapped; of one that is too small or too thin for the steps,
+/// that of its `own` corners.
+fn cross(snapped: [DVec3; 3], own: impl Fn() -> [DVec3; 3]) -> DVec3 {
+    let of = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a);
+    let [a, b, c] = snapped;
+    let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+    let found = of(snapped);
+    match found.length() >= LEAST_STEPS / STEPS * longest && longest > 0.0 {
+        true => found,
+        false => of(own()),
+    }
+}
+
 /// Structure of arrays, `[element]`, in internal order (see [`Elements::permute`]) and internal units.
 #[derive(Debug, Clone, Default)]
 pub struct Elements {
@@ -57,7 +73,8 @@ impl Elements {
             .par_iter()
             .map(|t| {
                 let [a, b, c] = t.vertices.map(|v| vertices[v as usize]);
-                let cross = (b - a).cross(c - a);
+                let own = || scene.corners(t).map(|v| (v - origin) / unit);
+                let cross = cross([a, b, c], own);
                 let material = &scene.materials[t.material as usize];
                 let texture = material
                     .map_kd

@@ -3,37 +3,14 @@
 
 mod common;
 
-use common::{Build, solve};
-use glam::{DVec3, Vec3};
-use mesolux::elements::Elements;
+use common::solve;
+use mesolux::bench::stress::occluded_elements;
 use mesolux::solver::{Estimator, Settings};
-
-/// A box with two spheres afloat, ρ drawn at random in 0..0.9 for each element.
-fn furnace() -> Elements {
-    let mut build = Build::new();
-    build.room(DVec3::ZERO, DVec3::new(1.0, 1.0, 1.0), 20, 0);
-    build.sphere(DVec3::new(0.32, 0.3, 0.35), 0.2, 3, true, 0);
-    build.sphere(DVec3::new(0.68, 0.62, 0.6), 0.17, 3, true, 0);
-    let mut elements = Elements::new(&build.scene);
-    let mut state = 1u64;
-    let mut random = || {
-        state = state
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
-        (state >> 40) as f32 / (1u64 << 24) as f32
-    };
-    for e in 0..elements.len() {
-        let rho = Vec3::new(random(), random(), random()) * 0.9;
-        elements.reflectance[e] = rho;
-        elements.emitted[e] = Vec3::ONE - rho;
-    }
-    elements
-}
 
 /// Area-weighted rms and largest error of the radiosity.
 fn errors(estimator: Estimator) -> (f64, f64) {
     let solved = solve(
-        furnace(),
+        occluded_elements(20, 3, 0.9),
         &[],
         &Settings {
             estimator,

@@ -121,7 +121,7 @@ fn sheet(n: u32, bend: f64) -> Scene {
         let (x, y) = (v.x - 0.5, v.y - 0.5);
         v.z = -bend * (x * x + y * y);
     }
-    build.scene
+    build.0.scene
 }
 
 /// The faces' clusters under parallel light.

@@ -517,10 +517,10 @@ fn refuses_what_cannot_be_traced() {
     }
     let empty = Scene::default();
     assert!(PathTracer::new(&empty).is_err());
-    let mut broken = lit_room().scene;
+    let mut broken = lit_room().0.scene;
     broken.triangles[3].vertices[1] = 9999;
     assert!(PathTracer::new(&broken).is_err());
-    let mut broken = lit_room().scene;
+    let mut broken = lit_room().0.scene;
     broken.vertices[2].y = f64::NAN;
     assert!(PathTracer::new(&broken).is_err());
 }

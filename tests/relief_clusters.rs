@@ -69,7 +69,7 @@ fn room() -> Scene {
     // Low enough that bumps throw shadows: 27 to 50 degrees above the floor's middle.
     let corner = DVec3::new(1.98, 0.5, 0.7);
     build.quad(corner, DVec3::Z * 0.7, DVec3::Y * 0.7, (3, 3), lamp);
-    build.scene
+    build.0.scene
 }
 
 fn view(camera: &Camera) -> View<'_> {

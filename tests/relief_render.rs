@@ -199,7 +199,7 @@ fn small(height: Option<fn(f64, f64) -> f64>) -> Scene {
     for t in &mut build.scene.triangles[sides[4].clone()] {
         t.material = lamp;
     }
-    build.scene
+    build.0.scene
 }
 
 fn quick() -> Settings {
@@ -301,7 +301,7 @@ fn prisms_have_no_cracks() {
             let corner = DVec3::new(-20.0, y, -20.0);
             build.quad(corner, 40.0 * u, 40.0 * v, (1, 1), lamp);
         }
-        let scene = build.scene;
+        let scene = build.0.scene;
         let solution = baked(
             &scene,
             &Settings {
@@ -401,7 +401,7 @@ fn shining() -> Scene {
         (1, 1),
         card,
     );
-    build.scene
+    build.0.scene
 }
 
 #[test]

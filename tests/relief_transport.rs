@@ -48,8 +48,9 @@ fn furnace() -> Build {
     build.uv(sides[2].clone(), DVec3::Y * 0.25, DVec3::Z * 0.25);
     // Box projection.
     for i in sphere {
-        let t = &mut build.scene.triangles[i];
-        let corners = t.vertices.map(|v| build.scene.vertices[v as usize]);
+        let scene = &mut build.scene;
+        let t = &mut scene.triangles[i];
+        let corners = t.vertices.map(|v| scene.vertices[v as usize]);
         let n = (corners[1] - corners[0])
             .cross(corners[2] - corners[0])
             .abs();
@@ -154,7 +155,7 @@ fn walls_about_a_relief_are_lit_as_by_its_geometry() {
     let start = Instant::now();
     let lambert = build.solve(&settings(Transport::Lambert));
     let lambert_time = start.elapsed();
-    let fine = Build { scene: fine_scene };
+    let fine = Build::of(fine_scene);
     let start = Instant::now();
     let truth = fine.solve(&settings(Transport::Lambert));
     let fine_time = start.elapsed();
@@ -213,11 +214,8 @@ fn flat_maps_and_scenes_without_relief_are_plain() {
     assert_eq!(lambert.radiosity, flat.radiosity);
     // Nearly flat heights take the directional way, and lead to the same light.
     build.relief(white, 8, |x, _| 1e-6 * x);
-    build.uv(
-        0..build.scene.triangles.len(),
-        DVec3::X + 0.1 * DVec3::Y,
-        DVec3::Z + 0.3 * DVec3::Y,
-    );
+    let all = 0..build.scene.triangles.len();
+    build.uv(all, DVec3::X + 0.1 * DVec3::Y, DVec3::Z + 0.3 * DVec3::Y);
     let nearly = build.solve(&quick(Transport::Physical));
     let relief = nearly.relief.as_ref().expect("it has heights");
     let worst = lambert

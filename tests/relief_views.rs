@@ -29,7 +29,7 @@ fn plates() -> Scene {
         build.uv(cells, u, v);
     }
     build.quad(DVec3::new(1.5, 0.2, -0.5), u, DVec3::Y, (1, 1), lamp);
-    build.scene
+    build.0.scene
 }
 
 /// Straight above the middle of the plates, which fill its frame.

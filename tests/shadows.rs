@@ -108,7 +108,7 @@ fn room(relief: bool, lamp_side: f64) -> Scene {
         build.quad(corner, u, v, (2, 2), white);
     }
     build.weld();
-    build.scene
+    build.0.scene
 }
 
 struct Found {
@@ -214,7 +214,7 @@ fn ball(cells: u32) -> Scene {
         *place = DVec3::ONE + 0.25 * DVec3::from_array(even).normalize();
     }
     build.weld();
-    build.scene
+    build.0.scene
 }
 
 /// A fifteenth of the pixels are lit. Among them penumbrae are everywhere: 6 % of the lit pixels' mean, as above, is √15 times

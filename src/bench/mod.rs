@@ -5,12 +5,18 @@ mod difference;
 pub mod frame;
 pub mod hemicube;
 pub mod irradiance;
+mod lines;
+mod memory;
 pub mod pictures;
+mod power_law;
 pub mod relief_room;
+pub mod scaling;
+pub mod stress;
 pub mod table1;
 mod table1_output;
 
 pub use difference::{Difference, plain_pairs};
+pub use power_law::PowerLaw;
 
 /// Median, and the 10 % and 90 % points.
 pub fn spread(values: &mut [f64]) -> (f64, f64, f64) {

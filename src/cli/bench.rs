@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::{Builtin, DeviceOptions};
-use mesolux::bench::{frame, hemicube, irradiance, table1};
+use mesolux::bench::{frame, hemicube, irradiance, scaling, stress, table1};
 use mesolux::error::{Error, Result};
 use mesolux::solution::Bake;
 
@@ -26,6 +26,10 @@ enum What {
     Irradiance(IrradianceOptions),
     /// Pictures of relief against path traced geometry: relMSE, bias and HDR-FLIP by material, view and part of the light
     Pictures(super::bench_pictures::Options),
+    /// How time and memory of a bake grow with the number of elements, at one error bound
+    Scaling(ScalingOptions),
+    /// Scenes at the ends of what numbers and meshes can do: what was asked, what came out, and the verdict
+    Stress(StressOptions),
     /// The paper's Table 1, minutes and frames a second: three scenes in 16, 32 and 64 directions, without directions, and with
     /// the relief as geometry
     Table1(Table1Options),
@@ -92,6 +96,54 @@ struct IrradianceOptions {
 }
 
 #[derive(Args)]
+struct ScalingOptions {
+    /// Folder for scaling.csv, scaling.json and scaling.svg
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Built-in scene that is cut into more and more elements
+    #[arg(long, value_name = "NAME", default_value = "cornell")]
+    scene: String,
+    /// Elements of the first size; each next one has twice as many
+    #[arg(long, value_name = "N", default_value_t = 10_000)]
+    first: usize,
+    /// Elements of the last size; the full range ends at 1000000
+    #[arg(long, value_name = "N", default_value_t = 320_000)]
+    largest: usize,
+    /// Most elements of a source, 0 for no limit; may be given again. The program's own and none if not given
+    #[arg(long, value_name = "N")]
+    max_elements: Vec<usize>,
+    /// Error bound at which a bake is done, as a share of the emitted power
+    #[arg(long, value_name = "X", default_value_t = 0.01)]
+    residual: f64,
+    /// Pixels a side of a hemicube face
+    #[arg(long, value_name = "N", default_value_t = 128)]
+    hemicube: u32,
+    /// Places at which the path tracer tells the error, 0 for none
+    #[arg(long, value_name = "N", default_value_t = 200)]
+    samples: usize,
+    /// Paths of each place
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    paths: u32,
+    #[command(flatten)]
+    device: DeviceOptions,
+}
+
+#[derive(Args)]
+struct StressOptions {
+    /// Folder for stress.csv and stress.json
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Only cases with this in their name
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    only: String,
+    /// Scenes as small as those of the tests
+    #[arg(long)]
+    small: bool,
+    #[command(flatten)]
+    device: DeviceOptions,
+}
+
+#[derive(Args)]
 struct HemicubeOptions {
     /// Pixels a side of a hemicube face
     #[arg(long, value_name = "N", default_value_t = 128)]
@@ -111,6 +163,8 @@ pub fn run(options: &Options) -> Result<()> {
         What::Frame(options) => run_frame(options),
         What::Irradiance(options) => run_irradiance(options),
         What::Pictures(options) => super::bench_pictures::run(options),
+        What::Scaling(options) => run_scaling(options),
+        What::Stress(options) => run_stress(options),
         What::Table1(options) => run_table1(options),
     }
 }
@@ -197,6 +251,46 @@ fn run_table1(options: &Table1Options) -> Result<()> {
     table1::run(&device, &wanted, &options.output, || {
         !super::progress::interrupted()
     })?;
+    options.device.check()
+}
+
+fn run_scaling(options: &ScalingOptions) -> Result<()> {
+    let own = mesolux::sources::Grouping::default().max_elements;
+    let limits = match options.max_elements.is_empty() {
+        true => vec![Some(own), None],
+        false => options
+            .max_elements
+            .iter()
+            .map(|&n| (n > 0).then_some(n))
+            .collect(),
+    };
+    let wanted = scaling::Options {
+        scene: options.scene.clone(),
+        first: options.first,
+        largest: options.largest,
+        limits,
+        residual: options.residual,
+        hemicube: options.hemicube,
+        samples: options.samples,
+        paths: options.paths,
+    };
+    let device = options.device.open()?;
+    super::progress::catch_interrupts();
+    scaling::run(&device, &wanted, &options.output, || {
+        !super::progress::interrupted()
+    })?;
+    options.device.check()
+}
+
+fn run_stress(options: &StressOptions) -> Result<()> {
+    let context = stress::Context {
+        device: options.device.open()?,
+        size: match options.small {
+            true => stress::Size::Small,
+            false => stress::Size::Full,
+        },
+    };
+    stress::run(&context, &options.only, options.output.as_deref())?;
     options.device.check()
 }
 

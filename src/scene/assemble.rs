@@ -1,6 +1,6 @@
-//! Brings meshes together into one scene: welds, drops triangles without area, makes up texture coordinates.
+//! Brings meshes together into one scene: welds, drops triangles without area and duplicates, makes up texture coordinates.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use glam::DVec3;
@@ -55,6 +55,8 @@ const LEAST_HEIGHT: f64 = 1e-10;
 pub(super) struct Assembly {
     pub scene: Scene,
     welded: HashMap<[u64; 3], u32>,
+    /// Corners of each triangle in their order, the least first.
+    known: HashSet<[u32; 3]>,
     projected: usize,
 }
 
@@ -67,6 +69,7 @@ impl Assembly {
                 ..Scene::default()
             },
             welded: HashMap::new(),
+            known: HashSet::new(),
             projected: 0,
         }
     }
@@ -116,11 +119,20 @@ impl Assembly {
                 self.scene.dropped_degenerate += 1;
                 continue;
             }
+            let vertices = corners.map(|p| self.weld(p));
+            // Two of one place would both send the light that falls there: each bounce would double it.
+            let least = (0..3).fold(0, |l, i| if vertices[i] < vertices[l] { i } else { l });
+            if !self
+                .known
+                .insert([0, 1, 2].map(|i| vertices[(least + i) % 3]))
+            {
+                self.scene.dropped_duplicates += 1;
+                continue;
+            }
             let uv = triangle.uv.unwrap_or_else(|| {
                 self.projected += 1;
                 box_projection(corners)
             });
-            let vertices = corners.map(|p| self.weld(p));
             self.scene.triangles.push(Triangle {
                 vertices,
                 uv,

@@ -56,6 +56,12 @@ pub(super) fn finish(mut scene: Scene) -> Result<Scene> {
             scene.dropped_degenerate
         ));
     }
+    if scene.dropped_duplicates > 0 {
+        scene.notes.push(format!(
+            "{} triangles were left out, since earlier ones have the same corners and the same front",
+            scene.dropped_duplicates
+        ));
+    }
     Ok(scene)
 }
 

@@ -58,6 +58,8 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// Triangles without area that were left out.
     pub dropped_degenerate: usize,
+    /// Triangles left out because an earlier one has the same corners and the same front.
+    pub dropped_duplicates: usize,
     /// What was made up or passed over while reading, one sentence each, for the person's eyes.
     pub notes: Vec<String>,
 }

@@ -145,6 +145,11 @@ impl Device {
         &self.limits
     }
 
+    /// Bytes in buffers and images that live now.
+    pub fn allocated_bytes(&self) -> u64 {
+        self.allocator().generate_report().total_allocated_bytes
+    }
+
     pub(super) fn allocator(&self) -> MutexGuard<'_, ManuallyDrop<Allocator>> {
         // A panic elsewhere leaves the allocator's own state whole.
         self.allocator.lock().unwrap_or_else(|e| e.into_inner())
