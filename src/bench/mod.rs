@@ -5,6 +5,8 @@ mod difference;
 pub mod frame;
 pub mod hemicube;
 pub mod irradiance;
+pub mod pareto;
+mod pixels;
 pub mod table1;
 
 pub use difference::{Difference, plain_pairs};

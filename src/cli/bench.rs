@@ -24,6 +24,8 @@ enum What {
     Hemicube(HemicubeOptions),
     /// Irradiance of bakes of one scene, on what has no relief, against path traced irradiance with the relief as geometry
     Irradiance(IrradianceOptions),
+    /// Error against run time of one scene, for the bake's settings and for other methods, against a path traced reference
+    Pareto(super::pareto::Options),
     /// The paper's Table 1: three scenes in 16, 32 and 64 directions, without directions, and with the relief as geometry
     Table1(Table1Options),
 }
@@ -104,6 +106,7 @@ pub fn run(options: &Options) -> Result<()> {
         What::Hemicube(options) => run_hemicube(options),
         What::Frame(options) => run_frame(options),
         What::Irradiance(options) => run_irradiance(options),
+        What::Pareto(options) => super::pareto::run(options),
         What::Table1(options) => run_table1(options),
     }
 }

@@ -5,6 +5,7 @@ mod bench;
 mod camera;
 mod compare;
 mod info;
+mod pareto;
 mod progress;
 mod reference;
 mod render;
