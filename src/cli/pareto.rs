@@ -26,7 +26,7 @@ pub struct Options {
     /// Other places
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u32,
-    /// Hemicubes of the receiver estimator; none with an empty list
+    /// Hemicubes of the receiver estimator; none if the option has no value
     #[arg(long, value_name = "N,...", value_delimiter = ',', default_value = "32,64,128,256", num_args = 0..)]
     hemicube: Vec<u32>,
     /// Hemicubes of the pixel estimator
@@ -79,10 +79,10 @@ fn seconds(name: &str, value: f64) -> Result<Duration> {
 }
 
 pub fn run(options: &Options) -> Result<()> {
-    let sound = |s: &f64| (1e-4..=1e4).contains(s);
+    let sound = |s: &f64| (0.01..=100.0).contains(s);
     if let Some(bad) = options.source_scale.iter().find(|s| !sound(s)) {
         return Err(Error::Usage(format!(
-            "--source-scale {bad}: must be in 0.0001 to 10000"
+            "--source-scale {bad}: must be in 0.01 to 100"
         )));
     }
     let wanted = pareto::Options {

@@ -75,12 +75,7 @@ impl Lights {
             areas: Choice::new(emitters.iter().map(|e| e.area * bright(e.radiance))),
             emitters,
             emitter_of,
-            points: Choice::new(
-                scene
-                    .point_lights
-                    .iter()
-                    .map(|light| f64::from(luminance(light.intensity))),
-            ),
+            points: Choice::new(point_lights.iter().map(|p| bright(p.intensity))),
             point_lights,
         }
     }

@@ -48,14 +48,14 @@ fn colour(method: Method) -> RGBColor {
     }
 }
 
-/// Ends of an axis that holds the values, a little beyond them.
+/// Ends of an axis that holds the values; it begins at a power of ten, where its marks do.
 fn ends(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
     let (low, high) = values
         .filter(|&v| v > 0.0)
         .fold((f64::INFINITY, 0.0_f64), |(low, high), v| {
             (low.min(v), high.max(v))
         });
-    low / 1.3..high * 1.3
+    10_f64.powf((low / 1.1).log10().floor())..high * 1.3
 }
 
 fn draw<B: DrawingBackend>(root: DrawingArea<B, Shift>, rows: &[Row], caption: &str) -> Drawn
@@ -120,8 +120,6 @@ where
         .configure_series_labels()
         .position(SeriesLabelPosition::LowerLeft)
         .label_font(("sans-serif", 20))
-        .background_style(WHITE.mix(0.9))
-        .border_style(BLACK.mix(0.3))
         .draw()?;
     root.present()?;
     Ok(())
