@@ -1,4 +1,4 @@
-//! Presets of a bake: settings that `mesolux bench pareto` found to be the quickest for their error.
+//! Presets of a bake, from coarse and quick to fine and slow; `mesolux bench pareto` measures error against time.
 
 use crate::solver::Settings;
 use crate::sources::Grouping;
