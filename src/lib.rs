@@ -42,6 +42,7 @@ pub mod meshlets;
 pub mod meso;
 pub mod passes;
 pub mod path_tracer;
+pub mod quality;
 pub mod reference;
 pub mod render;
 pub mod scene;

@@ -144,8 +144,8 @@ fn settings() -> Settings {
 #[test]
 fn relighting_equals_a_bake_of_the_same_groups_and_draws_point_lights_alone() {
     let device = device();
-    let first = scene(true).scene;
-    let relit = relit_scene().scene;
+    let first = scene(true).0.scene;
+    let relit = relit_scene().0.scene;
     let folder = tempfile::tempdir().expect("a folder for the test");
     let path = folder.path().join("room.visibility");
     let solve = |scene, kept: Option<&Visibility>| {
@@ -191,7 +191,7 @@ fn relighting_equals_a_bake_of_the_same_groups_and_draws_point_lights_alone() {
 #[test]
 fn kept_form_factors_of_something_else_are_refused() {
     let device = device();
-    let scene = scene(false).scene;
+    let scene = scene(false).0.scene;
     let solve = |scene: &mesolux::scene::Scene, settings: &Settings, kept: Option<&Visibility>| {
         mesolux::bake::solve(&device, scene, settings, kept, |_| true)
     };

@@ -258,7 +258,8 @@ fn contacts_leak_no_light_and_surfaces_do_not_shadow_themselves() {
         intensity: [1.0; 3],
     });
     // A card a millimetre above the floor, a hundredth of a pixel.
-    let mut build = Build { scene };
+    let mut build = Build::new();
+    build.scene = scene;
     build.quad(
         DVec3::new(1.3, 1e-3, 1.3),
         DVec3::Z * 0.3,

@@ -37,8 +37,11 @@ pub struct Sample {
     error: Vec3,
 }
 
-/// The truth at the centroids of triangles without relief, chosen by area, stratified.
-pub fn samples(scene: &Scene, options: &Options) -> Result<Vec<Sample>> {
+/// Triangles with neither relief nor emission, chosen by area, stratified; a large one may come again.
+///
+/// # Errors
+/// A scene without such triangles.
+pub fn places(scene: &Scene, samples: usize, seed: u64) -> Result<Vec<usize>> {
     let plain: Vec<usize> = (0..scene.triangles.len())
         .filter(|&e| {
             let material = &scene.materials[scene.triangles[e].material as usize];
@@ -62,19 +65,29 @@ pub fn samples(scene: &Scene, options: &Options) -> Result<Vec<Sample>> {
         ends.push(whole);
     }
     // The golden ratio's multiples run evenly through the strata's triangles, whatever order those have.
-    let chosen = (0..options.samples).filter_map(|i| {
-        let shift = ((i as u64 + options.seed) as f64 * 0.618_033_988_749_894_9).fract();
-        let at = whole * (i as f64 + shift) / options.samples as f64;
+    let chosen = (0..samples).filter_map(|i| {
+        let shift = ((i as u64 + seed) as f64 * 0.618_033_988_749_894_9).fract();
+        let at = whole * (i as f64 + shift) / samples as f64;
         plain.get(ends.partition_point(|&end| end <= at)).copied()
     });
+    Ok(chosen.collect())
+}
+
+/// Centroid, scene units, and unit normal of a triangle.
+pub fn place_of(scene: &Scene, triangle: usize) -> (DVec3, DVec3) {
+    let [a, b, c] = scene.corners(&scene.triangles[triangle]);
+    ((a + b + c) / 3.0, (b - a).cross(c - a).normalize_or_zero())
+}
+
+/// The truth at the centroids of [`places`].
+pub fn samples(scene: &Scene, options: &Options) -> Result<Vec<Sample>> {
+    let chosen = places(scene, options.samples, options.seed)?;
     let fine = displace(scene);
     let tracer = PathTracer::new(&fine)?;
     Ok(chosen
-        .collect::<Vec<_>>()
         .into_par_iter()
         .map(|e| {
-            let centroid = scene.corners(&scene.triangles[e]).iter().sum::<DVec3>() / 3.0;
-            let normal = cross(e).normalize_or_zero();
+            let (centroid, normal) = place_of(scene, e);
             let (truth, error) =
                 tracer.irradiance(centroid, normal, options.paths, e as u64, Light::Global);
             Sample {

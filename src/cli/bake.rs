@@ -12,9 +12,11 @@ use super::{Builtin, DeviceOptions};
 use mesolux::directions::Directions;
 use mesolux::error::{Error, Result};
 use mesolux::meso::{self, Transport};
+use mesolux::quality::Quality;
 use mesolux::scene::Scene;
 use mesolux::solution::{Origin, Solution};
 use mesolux::solver::{Estimator, Report, Settings, Solver, Update, Visibility};
+use mesolux::sources::Grouping;
 use mesolux::vk::Device;
 
 /// Solve a scene and write the light on every element
@@ -56,12 +58,26 @@ pub struct SolveOptions {
     /// Form factors by Lambert's formula for each receiver, or by the pixels' sums as in the paper
     #[arg(long, value_enum, default_value = "receiver")]
     estimator: EstimatorName,
-    /// Pixels a side of a hemicube face
-    #[arg(long, value_name = "N", default_value_t = 128)]
-    hemicube: u32,
-    /// Stop when the error bound, as a share of the emitted power, is no more than this
-    #[arg(long, value_name = "X", default_value_t = 1e-3)]
-    residual: f64,
+    /// Sets --hemicube, --residual and the sizes of the sources where they are not given; `bench pareto` measures what each gains
+    #[arg(long, value_enum, default_value = "normal")]
+    quality: QualityName,
+    /// Pixels a side of a hemicube face [default: that of --quality, 128 for normal]
+    #[arg(long, value_name = "N")]
+    hemicube: Option<u32>,
+    /// Stop when the error bound, as a share of the emitted power, is no more than this [default: that of --quality, 0.001 for
+    /// normal]
+    #[arg(long, value_name = "X")]
+    residual: Option<f64>,
+    /// Most elements that shoot together from one hemicube [default: that of --quality, 48 for normal]
+    #[arg(long, value_name = "N")]
+    source_elements: Option<usize>,
+    /// Most area that shoots together, as a share of the scene's; larger elements are cut [default: that of --quality, 1/512 for
+    /// normal]
+    #[arg(long, value_name = "X")]
+    source_area: Option<f64>,
+    /// Most emitted power that shoots together, as a share of the scene's [default: that of --quality, 1/128 for normal]
+    #[arg(long, value_name = "X")]
+    source_power: Option<f64>,
     /// Stop after this many seconds
     #[arg(long, value_name = "SECONDS")]
     budget: Option<f64>,
@@ -103,10 +119,22 @@ enum TransportName {
 
 #[derive(Clone, Copy, ValueEnum, Serialize)]
 #[serde(rename_all = "lowercase")]
+enum QualityName {
+    Draft,
+    Normal,
+    High,
+    Reference,
+}
+
+#[derive(Clone, Copy, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
 enum EstimatorName {
     Receiver,
     Pixel,
 }
+
+/// Shares of the scene that a source may have at most: a smaller one would cut a scene into millions of sources.
+const SOURCE_SHARES: std::ops::RangeInclusive<f64> = 1e-6..=1.0;
 
 impl SolveOptions {
     pub fn budget(&self) -> Result<Option<Duration>> {
@@ -121,14 +149,57 @@ impl SolveOptions {
         }
     }
 
+    /// The same with nothing left to the preset, to be kept beside the result.
+    pub fn filled(&self) -> Result<Self> {
+        let settings = self.settings()?;
+        Ok(Self {
+            hemicube: Some(settings.hemicube),
+            residual: Some(settings.residual),
+            source_elements: Some(settings.grouping.max_elements),
+            source_area: Some(settings.grouping.max_area),
+            source_power: Some(settings.grouping.max_power),
+            ..self.clone()
+        })
+    }
+
+    fn grouping(&self, preset: Grouping) -> Result<Grouping> {
+        let share = |name: &str, value: Option<f64>, preset| match value {
+            None => Ok(preset),
+            Some(share) if SOURCE_SHARES.contains(&share) => Ok(share),
+            Some(share) => Err(Error::Usage(format!(
+                "{name} {share}: must be in {} to {}",
+                SOURCE_SHARES.start(),
+                SOURCE_SHARES.end()
+            ))),
+        };
+        if self.source_elements == Some(0) {
+            return Err(Error::Usage(
+                "--source-elements 0: must be at least 1".into(),
+            ));
+        }
+        Ok(Grouping {
+            max_elements: self.source_elements.unwrap_or(preset.max_elements),
+            max_area: share("--source-area", self.source_area, preset.max_area)?,
+            max_power: share("--source-power", self.source_power, preset.max_power)?,
+        })
+    }
+
     pub fn settings(&self) -> Result<Settings> {
+        let preset = match self.quality {
+            QualityName::Draft => Quality::Draft,
+            QualityName::Normal => Quality::Normal,
+            QualityName::High => Quality::High,
+            QualityName::Reference => Quality::Reference,
+        }
+        .settings();
         Ok(Settings {
             estimator: match self.estimator {
                 EstimatorName::Receiver => Estimator::Receiver,
                 EstimatorName::Pixel => Estimator::Pixel,
             },
-            hemicube: self.hemicube,
-            residual: self.residual,
+            hemicube: self.hemicube.unwrap_or(preset.hemicube),
+            residual: self.residual.unwrap_or(preset.residual),
+            grouping: self.grouping(preset.grouping)?,
             budget: self.budget()?,
             shots: self.shots,
             seed: self.seed,
@@ -151,7 +222,7 @@ impl SolveOptions {
                     None => cache_folder(),
                 },
             },
-            ..Settings::default()
+            ..preset
         })
     }
 }
@@ -207,7 +278,7 @@ pub fn run(options: &Options) -> Result<()> {
         }
     }
     let origin = origin(&options.scene, &options.builtin, scene.hash());
-    solution.save(&options.output, &origin, &options.solve)?;
+    solution.save(&options.output, &origin, &options.solve.filled()?)?;
     let report = &solution.report;
     tracing::info!(
         "{}: {} elements, {} sources, {} hemicubes in {:.1} s; unshot {:.3} %, stopped by {:?}",

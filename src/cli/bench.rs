@@ -30,6 +30,8 @@ enum What {
     Scaling(ScalingOptions),
     /// Scenes at the ends of what numbers and meshes can do: what was asked, what came out, and the verdict
     Stress(StressOptions),
+    /// Error against run time of one scene, for the bake's settings and for other methods, against a path traced reference
+    Pareto(super::pareto::Options),
     /// The paper's Table 1, minutes and frames a second: three scenes in 16, 32 and 64 directions, without directions, and with
     /// the relief as geometry
     Table1(Table1Options),
@@ -165,6 +167,7 @@ pub fn run(options: &Options) -> Result<()> {
         What::Pictures(options) => super::bench_pictures::run(options),
         What::Scaling(options) => run_scaling(options),
         What::Stress(options) => run_stress(options),
+        What::Pareto(options) => super::pareto::run(options),
         What::Table1(options) => run_table1(options),
     }
 }

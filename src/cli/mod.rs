@@ -6,6 +6,7 @@ mod bench_pictures;
 mod camera;
 mod compare;
 mod info;
+mod pareto;
 mod progress;
 mod reference;
 mod render;

@@ -122,6 +122,12 @@ impl Geometry {
         (place - self.origin) / self.unit
     }
 
+    /// Of all triangles, internal units squared.
+    pub fn area(&self) -> f64 {
+        let area = |[a, b, c]: &[DVec3; 3]| 0.5 * (*b - *a).cross(*c - *a).length();
+        self.corners.iter().map(area).sum()
+    }
+
     /// Corners of a triangle, internal units.
     pub fn corners(&self, triangle: usize) -> [DVec3; 3] {
         self.corners[triangle]

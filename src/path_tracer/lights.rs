@@ -33,6 +33,15 @@ struct Point {
     intensity: DVec3,
 }
 
+/// Where a light path begins, internal units.
+pub struct Start {
+    pub place: DVec3,
+    /// Of the emitter; none of a point light, which the path leaves in any direction.
+    pub normal: Option<DVec3>,
+    /// Radiant flux over the chance of this start, RGB.
+    pub power: DVec3,
+}
+
 const NONE: u32 = u32::MAX;
 
 impl Lights {
@@ -66,14 +75,41 @@ impl Lights {
             areas: Choice::new(emitters.iter().map(|e| e.area * bright(e.radiance))),
             emitters,
             emitter_of,
-            points: Choice::new(
-                scene
-                    .point_lights
-                    .iter()
-                    .map(|light| f64::from(luminance(light.intensity))),
-            ),
+            points: Choice::new(point_lights.iter().map(|p| bright(p.intensity))),
             point_lights,
         }
+    }
+
+    /// The start of a light path, chosen by power among emitters and point lights; none where nothing shines. `choice` in 0..1
+    /// picks the light, `at` the place on it.
+    pub fn start(&self, choice: f64, at: DVec2) -> Option<Start> {
+        // An emitter sends π Le A, a point light 4π I.
+        let (areas, points) = (PI * self.areas.total(), 4.0 * PI * self.points.total());
+        let from_areas = areas / (areas + points);
+        if choice < from_areas {
+            let (index, probability) = self.areas.choose(choice / from_areas)?;
+            let emitter = &self.emitters[index];
+            let chance = probability * from_areas;
+            return Some(Start {
+                place: on_triangle(emitter.corners, at),
+                normal: Some(emitter.normal),
+                power: emitter.radiance * (PI * emitter.area / chance),
+            });
+        }
+        let (index, probability) = self
+            .points
+            .choose((choice - from_areas) / (1.0 - from_areas))?;
+        let light = &self.point_lights[index];
+        Some(Start {
+            place: light.place,
+            normal: None,
+            power: light.intensity * (4.0 * PI / (probability * (1.0 - from_areas))),
+        })
+    }
+
+    /// Places and radiant intensities of the point lights.
+    pub fn points(&self) -> impl Iterator<Item = (DVec3, DVec3)> + '_ {
+        self.point_lights.iter().map(|p| (p.place, p.intensity))
     }
 
     /// Radiance that the front of a triangle emits.

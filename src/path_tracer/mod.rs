@@ -13,6 +13,7 @@
 
 mod film;
 mod geometry;
+mod instant;
 mod lights;
 mod paths;
 mod sampling;
@@ -24,6 +25,7 @@ use rayon::prelude::*;
 
 pub use film::Film;
 pub(crate) use film::NORMAL_95;
+pub use instant::VirtualLights;
 
 use crate::error::{Error, Result};
 use crate::render::{Light, Projection, View};

@@ -90,7 +90,7 @@ impl PathTracer<'_> {
     }
 
     /// ρ at a hit, textures looked up bilinearly.
-    fn reflectance(&self, hit: &Hit) -> DVec3 {
+    pub(super) fn reflectance(&self, hit: &Hit) -> DVec3 {
         let triangle = &self.scene.triangles[hit.triangle];
         let material = &self.scene.materials[triangle.material as usize];
         let plain = Vec3::from_array(material.kd).as_dvec3();

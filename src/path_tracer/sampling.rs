@@ -42,6 +42,26 @@ pub fn cosine_direction(normal: DVec3, at: DVec2) -> DVec3 {
     (t * (flat * cos) + b * (flat * sin) + normal * (1.0 - at.x).sqrt()).normalize()
 }
 
+/// A direction of uniform density over the sphere.
+pub fn sphere_direction(at: DVec2) -> DVec3 {
+    let height = 1.0 - 2.0 * at.x;
+    let (sin, cos) = (TAU * at.y).sin_cos();
+    let flat = (1.0 - height * height).max(0.0).sqrt();
+    DVec3::new(flat * cos, flat * sin, height)
+}
+
+/// The digits of `index` in a base, mirrored at the point (van der Corput): in 0..1, evenly spread for any first indices.
+pub fn radical_inverse(base: u32, index: u64) -> f64 {
+    let base = u64::from(base);
+    let (mut left, mut scale, mut sum) = (index, 1.0, 0.0);
+    while left > 0 {
+        scale /= base as f64;
+        sum += (left % base) as f64 * scale;
+        left /= base;
+    }
+    sum
+}
+
 /// A place on a triangle, of uniform density.
 pub fn on_triangle([a, b, c]: [DVec3; 3], at: DVec2) -> DVec3 {
     let root = at.x.sqrt();
@@ -84,7 +104,8 @@ impl Choice {
         (index < self.sums.len()).then(|| (index, self.probability(index)))
     }
 
-    fn total(&self) -> f64 {
+    /// Of all weights.
+    pub fn total(&self) -> f64 {
         self.sums.last().copied().unwrap_or(0.0)
     }
 }

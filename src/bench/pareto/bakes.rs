@@ -1,0 +1,168 @@
+//! Bakes over a grid of settings, each looked at while it goes on.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use glam::Vec3;
+
+use super::measure::Measure;
+use super::truth::Truth;
+use super::{Method, Row};
+use crate::bake;
+use crate::directions::Directions;
+use crate::error::Result;
+use crate::meso::Transport;
+use crate::quality::scaled;
+use crate::scene::Scene;
+use crate::solver::{Estimator, Settings, Solver, StopReason};
+use crate::vk::Device;
+
+/// The settings that are tried: each hemicube with each size of sources, for both estimators.
+#[derive(Debug, Clone)]
+pub struct Grid {
+    pub hemicubes: Vec<u32>,
+    /// Sizes of sources over the default ones, see [`scaled`].
+    pub scales: Vec<f64>,
+    /// Hemicubes of the `pixel` estimator, at the default size of sources and at the smallest.
+    pub pixel_hemicubes: Vec<u32>,
+    /// Numbers of directions, at the default hemicube and size of sources; tried where a scene has relief.
+    pub directions: Vec<u32>,
+    /// Each bake goes on to this error bound,
+    pub residual: f64,
+    /// or until it has taken so long.
+    pub limit: Duration,
+}
+
+/// One bake to be made.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Try {
+    pub estimator: Estimator,
+    pub hemicube: u32,
+    pub scale: f64,
+    pub directions: u32,
+}
+
+/// A bake that is done, `[triangle]` in the order of the input.
+pub(super) struct Done {
+    pub rows: Vec<Row>,
+    pub irradiance: Vec<Vec3>,
+    pub direct: Vec<Vec3>,
+}
+
+/// First look at a bake; each further one is twice as late.
+const FIRST_LOOK: Duration = Duration::from_millis(500);
+
+impl Grid {
+    pub(super) fn tries(&self, scene: &Scene) -> Vec<Try> {
+        let plain = Settings::default();
+        let directions = plain.relief.directions.count() as u32;
+        let mut tries = Vec::new();
+        let smallest = self.scales.iter().copied().fold(1.0, f64::min);
+        for &scale in &self.scales {
+            for &hemicube in &self.hemicubes {
+                tries.push(Try {
+                    estimator: Estimator::Receiver,
+                    hemicube,
+                    scale,
+                    directions,
+                });
+            }
+            if scale == 1.0 || scale == smallest {
+                tries.extend(self.pixel_hemicubes.iter().map(|&hemicube| Try {
+                    estimator: Estimator::Pixel,
+                    hemicube,
+                    scale,
+                    directions,
+                }));
+            }
+        }
+        if scene.materials.iter().any(|m| m.has_relief()) {
+            let others = self.directions.iter().filter(|&&k| k != directions);
+            tries.extend(others.map(|&directions| Try {
+                estimator: Estimator::Receiver,
+                hemicube: plain.hemicube,
+                scale: 1.0,
+                directions,
+            }));
+        }
+        tries
+    }
+}
+
+impl Try {
+    fn settings(&self, grid: &Grid) -> Result<Settings> {
+        let mut settings = Settings {
+            estimator: self.estimator,
+            hemicube: self.hemicube,
+            residual: grid.residual,
+            grouping: scaled(self.scale),
+            ..Settings::default()
+        };
+        settings.relief.directions = Directions::new(self.directions)?;
+        if self.estimator == Estimator::Pixel {
+            settings.relief.transport = Transport::Lambert;
+        }
+        Ok(settings)
+    }
+
+    /// Bakes and measures. What a look costs does not count; `go_on` may stop the bake between looks.
+    pub fn bake(
+        &self,
+        (device, scene, grid): (&Arc<Device>, &Scene, &Grid),
+        truth: &Truth,
+        go_on: &impl Fn() -> bool,
+    ) -> Result<Done> {
+        let start = Instant::now();
+        let settings = self.settings(grid)?;
+        let elements = bake::elements(device, scene, &settings)?;
+        let mut solver = Solver::new(device, elements, &scene.point_lights, &settings)?;
+        let mut taken = start.elapsed();
+        let mut done = Done {
+            rows: Vec::new(),
+            irradiance: Vec::new(),
+            direct: Vec::new(),
+        };
+        let mut look = FIRST_LOOK;
+        while look <= taken {
+            look *= 2;
+        }
+        loop {
+            let until = look.min(grid.limit.max(taken));
+            let (turn, before) = (Instant::now(), taken);
+            solver.run(|_| before + turn.elapsed() < until && go_on())?;
+            taken += turn.elapsed();
+            let report = solver.report();
+            let finished = report.stop != StopReason::Interrupted;
+            let light = solver.light()?;
+            done.irradiance = solver.elements.to_input_order(&light.irradiance);
+            done.direct = solver.elements.to_input_order(&light.irradiance_direct);
+            done.rows.push(Row {
+                method: match self.estimator {
+                    Estimator::Receiver => Method::Receiver,
+                    Estimator::Pixel => Method::Pixel,
+                },
+                hemicube: Some(self.hemicube),
+                source_scale: Some(self.scale),
+                directions: solver
+                    .elements
+                    .relief
+                    .as_ref()
+                    .map(|r| r.directions.count() as u32),
+                sources: Some(report.sources),
+                hemicubes: Some(report.hemicubes),
+                paths: None,
+                error_bound: report.error_bound,
+                finished,
+                seconds: taken.as_secs_f64(),
+                measure: Measure::new(&truth.at_places(&done.irradiance), truth),
+                best: false,
+            });
+            if finished || taken >= grid.limit || !go_on() {
+                return Ok(done);
+            }
+            while look <= taken {
+                look *= 2;
+            }
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! Where the error of a bake is: by material and the way that it faces, in direct and indirect light, and the worst elements.
+
+use std::collections::BTreeMap;
+
+use glam::{DVec3, Vec3};
+use serde::Serialize;
+
+use super::bakes::Done;
+use super::measure::{mean, net_squares};
+use super::truth::Truth;
+use crate::bench::irradiance::place_of;
+use crate::scene::Scene;
+
+/// Worst elements that are told.
+const WORST: usize = 10;
+
+/// Error on a part of the scene, over the mean irradiance of all places.
+#[derive(Debug, Clone, Serialize)]
+pub struct Part {
+    pub name: String,
+    pub places: usize,
+    /// Mean of the reference here over that of all places.
+    pub light: f64,
+    pub bias: f64,
+    pub rms: f64,
+    /// Of direct and of indirect light alone.
+    pub rms_direct: f64,
+    pub rms_indirect: f64,
+    /// Of the sum of squares over all places.
+    pub share: f64,
+}
+
+/// An element whose irradiance is far from the reference.
+#[derive(Debug, Clone, Serialize)]
+pub struct Worst {
+    /// In the order of the input.
+    pub triangle: usize,
+    pub material: String,
+    /// Centroid, scene units.
+    pub place: [f64; 3],
+    pub normal: [f64; 3],
+    /// Means over the colours, over the mean of all places.
+    pub truth: f64,
+    pub ours: f64,
+    /// Of the difference, what is of direct light.
+    pub direct: f64,
+}
+
+/// The error of one bake in parts.
+#[derive(Debug, Clone, Serialize)]
+pub struct Breakdown {
+    pub parts: Vec<Part>,
+    pub worst: Vec<Worst>,
+}
+
+/// Values at the places: `[global, direct, indirect]`, each with its truth and the truth's standard error.
+struct Light {
+    ours: Vec<Vec3>,
+    truth: Vec<Vec3>,
+    error: Vec<Vec3>,
+}
+
+impl Breakdown {
+    pub(super) fn new(scene: &Scene, done: &Done, truth: &Truth) -> Self {
+        let pairs = |a: &[Vec3], b: &[Vec3], join: fn(Vec3, Vec3) -> Vec3| -> Vec<Vec3> {
+            a.iter().zip(b).map(|(&a, &b)| join(a, b)).collect()
+        };
+        let global = Light {
+            ours: truth.at_places(&done.irradiance),
+            truth: truth.global.clone(),
+            error: truth.global_error.clone(),
+        };
+        let direct = Light {
+            ours: truth.at_places(&done.direct),
+            truth: truth.direct.clone(),
+            error: truth.direct_error.clone(),
+        };
+        let indirect = Light {
+            ours: pairs(&global.ours, &direct.ours, |a, b| a - b),
+            truth: pairs(&global.truth, &direct.truth, |a, b| a - b),
+            // The two truths are independent.
+            error: pairs(&global.error, &direct.error, |a, b| {
+                (a * a + b * b).map(f32::sqrt)
+            }),
+        };
+        let lights = [&global, &direct, &indirect];
+        let squares = lights.map(|l| net_squares(&l.ours, &l.truth, &l.error));
+        let whole = mean(&global.truth);
+        let mut groups: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+        for (i, &e) in truth.triangles.iter().enumerate() {
+            let name = &scene.materials[scene.triangles[e].material as usize].name;
+            let faces = facing(place_of(scene, e).1);
+            for key in ["all".into(), name.clone(), format!("{name} {faces}")] {
+                groups.entry(key).or_default().push(i);
+            }
+        }
+        let all: f64 = squares[0].iter().sum();
+        let parts = groups.into_iter().map(|(name, members)| {
+            let count = members.len() as f64;
+            let of = |values: &[f64]| members.iter().map(|&i| values[i]).sum::<f64>();
+            let rms = |values: &[f64]| (of(values) / count).max(0.0).sqrt() / whole;
+            let light: f64 = members.iter().map(|&i| grey(global.truth[i])).sum();
+            let apart: f64 = members
+                .iter()
+                .map(|&i| grey(global.ours[i]) - grey(global.truth[i]))
+                .sum();
+            Part {
+                name,
+                places: members.len(),
+                light: light / count / whole,
+                bias: apart / count / whole,
+                rms: rms(&squares[0]),
+                rms_direct: rms(&squares[1]),
+                rms_indirect: rms(&squares[2]),
+                share: of(&squares[0]) / all,
+            }
+        });
+        let mut order: Vec<usize> = (0..truth.triangles.len()).collect();
+        order.sort_by(|&a, &b| squares[0][b].total_cmp(&squares[0][a]));
+        order.dedup_by_key(|&mut i| truth.triangles[i]);
+        let worst = order.iter().take(WORST).map(|&i| {
+            let triangle = truth.triangles[i];
+            let (place, normal) = place_of(scene, triangle);
+            let material = scene.triangles[triangle].material as usize;
+            Worst {
+                triangle,
+                material: scene.materials[material].name.clone(),
+                place: place.to_array(),
+                normal: normal.to_array(),
+                truth: grey(global.truth[i]) / whole,
+                ours: grey(global.ours[i]) / whole,
+                direct: (grey(direct.ours[i]) - grey(direct.truth[i])) / whole,
+            }
+        });
+        Self {
+            parts: parts.collect(),
+            worst: worst.collect(),
+        }
+    }
+
+    pub(super) fn print(&self) {
+        println!(
+            "part            places  light  share of error   bias %    rms %  of direct  of indirect"
+        );
+        for p in &self.parts {
+            println!(
+                "{:<15} {:>6} {:>6.2} {:>13.1} % {:>+8.2} {:>8.2} {:>10.2} {:>12.2}",
+                p.name,
+                p.places,
+                p.light,
+                100.0 * p.share,
+                100.0 * p.bias,
+                100.0 * p.rms,
+                100.0 * p.rms_direct,
+                100.0 * p.rms_indirect
+            );
+        }
+        println!(
+            "worst elements: triangle, material, place, normal, irradiance over the mean, ours less truth %, of it direct %"
+        );
+        for w in &self.worst {
+            let [x, y, z] = w.place;
+            let [nx, ny, nz] = w.normal;
+            println!(
+                "{:>8} {:<10} ({x:.3}, {y:.3}, {z:.3})  ({nx:+.2}, {ny:+.2}, {nz:+.2}) {:>6.3} {:>+7.1} {:>+7.1}",
+                w.triangle,
+                w.material,
+                w.truth,
+                100.0 * (w.ours - w.truth),
+                100.0 * w.direct
+            );
+        }
+    }
+}
+
+/// Mean over the colours.
+fn grey(v: Vec3) -> f64 {
+    v.as_dvec3().element_sum() / 3.0
+}
+
+/// The axis that a normal is nearest to.
+fn facing(normal: DVec3) -> &'static str {
+    let size = normal.abs();
+    let axis = (0..3).fold(0, |best, i| if size[i] > size[best] { i } else { best });
+    [["-x", "+x"], ["-y", "+y"], ["-z", "+z"]][axis][usize::from(normal[axis] > 0.0)]
+}

@@ -1,0 +1,338 @@
+//! `mesolux bench pareto`: error against run time, for settings of the bake and for other methods, against one reference.
+//!
+//! Time is that of having the irradiance of every element, from the scene in memory; opening a device and reading files do not
+//! count. Error is that of irradiance at the centroids of triangles with neither relief nor emission, chosen by area.
+
+mod bakes;
+mod breakdown;
+mod measure;
+mod peers;
+mod plot;
+mod truth;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use serde::Serialize;
+
+pub use bakes::Grid;
+pub use breakdown::{Breakdown, Part, Worst};
+pub use measure::{Measure, front};
+pub use truth::{Truth, Wanted};
+
+use crate::atomic_file::write_atomically;
+use crate::error::{Error, Result};
+use crate::scene::{Scene, displace};
+use crate::vk::Device;
+use bakes::Done;
+use peers::Job;
+
+/// What finds irradiance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// A bake by the estimator of that name.
+    Receiver,
+    Pixel,
+    /// Keller 1997, shadow rays on the CPU.
+    InstantRadiosity,
+    /// The project's own.
+    PathTracer,
+    /// Mitsuba 3, LLVM.
+    Mitsuba,
+}
+
+impl Method {
+    pub const ALL: [Self; 5] = [
+        Self::Receiver,
+        Self::Pixel,
+        Self::InstantRadiosity,
+        Self::PathTracer,
+        Self::Mitsuba,
+    ];
+
+    /// As it is shown.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Receiver => "receiver",
+            Self::Pixel => "pixel",
+            Self::InstantRadiosity => "instant radiosity",
+            Self::PathTracer => "path tracer",
+            Self::Mitsuba => "Mitsuba 3",
+        }
+    }
+
+    fn is_bake(self) -> bool {
+        matches!(self, Self::Receiver | Self::Pixel)
+    }
+}
+
+/// One measurement. Settings that a method does not have are none.
+#[derive(Debug, Clone, Serialize)]
+pub struct Row {
+    pub method: Method,
+    pub hemicube: Option<u32>,
+    /// Size of the sources over the default one, see [`crate::quality::scaled`].
+    pub source_scale: Option<f64>,
+    pub directions: Option<u32>,
+    pub sources: Option<u64>,
+    pub hemicubes: Option<u64>,
+    /// Paths of each element; of instant radiosity, light paths in all.
+    pub paths: Option<u32>,
+    /// At which the bake was looked at: `--residual` of the same bake.
+    pub error_bound: Option<f64>,
+    /// Whether it ended by itself, and not by a look on its way.
+    pub finished: bool,
+    /// For every element of the scene.
+    pub seconds: f64,
+    #[serde(flatten)]
+    pub measure: Measure,
+    /// No other bake is as quick and as near.
+    pub best: bool,
+}
+
+impl Row {
+    fn new(method: Method, measure: Measure) -> Self {
+        Self {
+            method,
+            hemicube: None,
+            source_scale: None,
+            directions: None,
+            sources: None,
+            hemicubes: None,
+            paths: None,
+            error_bound: None,
+            finished: true,
+            seconds: 0.0,
+            measure,
+            best: false,
+        }
+    }
+
+    /// Whether two rows are the same bake at two times, or the same method.
+    fn same_curve(&self, other: &Self) -> bool {
+        let settings = |r: &Self| (r.method, r.hemicube, r.source_scale, r.directions);
+        settings(self) == settings(other)
+    }
+
+    /// Settings in a few words.
+    pub fn settings(&self) -> String {
+        let mut words = Vec::new();
+        words.extend(self.hemicube.map(|n| format!("hemicube {n}")));
+        words.extend(self.source_scale.map(|s| format!("sources x {s}")));
+        words.extend(self.directions.map(|k| format!("K = {k}")));
+        words.extend(self.error_bound.map(|b| format!("residual {b:.1e}")));
+        words.extend(self.paths.map(|n| format!("{n} paths")));
+        words.join(", ")
+    }
+}
+
+/// What is measured.
+#[derive(Debug, Clone)]
+pub struct Options {
+    pub wanted: Wanted,
+    pub grid: Grid,
+    /// Seconds of the places of one measurement of another method; none leaves the others out.
+    pub peers: Option<Duration>,
+    /// The Python that may have Mitsuba.
+    pub python: PathBuf,
+}
+
+/// All that was measured of a scene.
+#[derive(Serialize)]
+struct Found<'a> {
+    scene: &'a str,
+    device: &'a str,
+    elements: usize,
+    places: usize,
+    reference_paths: u32,
+    reference_seconds: f64,
+    reference_noise: f64,
+    rows: &'a [Row],
+    breakdown: Option<&'a Breakdown>,
+}
+
+/// Measures, prints, and writes `pareto.csv`, `pareto.json`, `pareto.svg` and `pareto.png` into `folder` after each bake and
+/// each other method. `go_on` may stop it; what has been measured is kept.
+///
+/// # Errors
+/// A scene without triangles that can be compared, settings that cannot be solved, a folder that cannot be written.
+pub fn run(
+    device: &Arc<Device>,
+    scene: &Scene,
+    options: &Options,
+    folder: &Path,
+    go_on: impl Fn() -> bool,
+) -> Result<()> {
+    std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, e))?;
+    let fine = displace(scene);
+    let Some(truth) = Truth::of((scene, &fine), &options.wanted, folder, &go_on)? else {
+        return Ok(());
+    };
+    println!(
+        "{}: {} elements, {}; {} places without relief and emission, reference of {} paths each in {:.0} s, noise {:.2} %",
+        scene.name,
+        scene.triangles.len(),
+        device.name(),
+        truth.triangles.len(),
+        options.wanted.paths,
+        truth.seconds,
+        100.0 * truth.noise()
+    );
+    println!("{HEADER}");
+    let mut rows: Vec<Row> = Vec::new();
+    let mut closest: Option<(f64, Done)> = None;
+    let mut told = None;
+    for trial in options.grid.tries(scene) {
+        if !go_on() {
+            break;
+        }
+        let done = trial.bake((device, scene, &options.grid), &truth, &go_on)?;
+        rows.extend(done.rows.iter().cloned());
+        mark(&mut rows);
+        if let Some(last) = done.rows.last() {
+            println!("{}", line(last));
+            if closest
+                .as_ref()
+                .is_none_or(|(rms, _)| last.measure.rms < *rms)
+            {
+                told = Some(Breakdown::new(scene, &done, &truth));
+                closest = Some((last.measure.rms, done));
+            }
+        }
+        write(
+            (scene, device, options),
+            &truth,
+            (&rows, told.as_ref()),
+            folder,
+        )?;
+    }
+    if let Some(limit) = options.peers.filter(|_| go_on()) {
+        let job = Job {
+            scene,
+            fine: &fine,
+            truth: &truth,
+            limit,
+        };
+        let mut add = |row: Row| {
+            println!("{}", line(&row));
+            rows.push(row);
+        };
+        job.instant_radiosity(&go_on, &mut add)?;
+        job.path_tracer(&go_on, &mut add)?;
+        if let Some(why) = job.mitsuba(&options.python, &folder.join("mitsuba"), &mut add)? {
+            println!("Mitsuba 3 is left out: {why}");
+        }
+        write(
+            (scene, device, options),
+            &truth,
+            (&rows, told.as_ref()),
+            folder,
+        )?;
+    }
+    println!("\nbest settings, none of which is slower and further off than another:\n{HEADER}");
+    let mut best: Vec<&Row> = rows.iter().filter(|r| r.best).collect();
+    best.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
+    for row in best {
+        println!("{}", line(row));
+    }
+    if let (Some(told), Some((_, done))) = (&told, &closest) {
+        let of = done.rows.last().map_or(String::new(), Row::settings);
+        println!("\nerror of the closest bake ({of}) over the mean irradiance:");
+        told.print();
+    }
+    Ok(())
+}
+
+/// Marks the best bakes.
+fn mark(rows: &mut [Row]) {
+    let bakes: Vec<usize> = (0..rows.len())
+        .filter(|&i| rows[i].method.is_bake())
+        .collect();
+    let points: Vec<(f64, f64)> = bakes
+        .iter()
+        .map(|&i| (rows[i].seconds, rows[i].measure.rms))
+        .collect();
+    for (i, best) in bakes.into_iter().zip(front(&points)) {
+        rows[i].best = best;
+    }
+}
+
+const HEADER: &str =
+    "  method             seconds   rms % (95 % interval)     bias %              settings";
+
+fn line(row: &Row) -> String {
+    let m = &row.measure;
+    format!(
+        "{} {:<17} {:>8.2} {:>7.2} ({:.2} to {:.2}) {:>+9.2} +- {:.2}   {}{}",
+        if row.best { '*' } else { ' ' },
+        row.method.title(),
+        row.seconds,
+        100.0 * m.rms,
+        100.0 * m.rms_interval[0],
+        100.0 * m.rms_interval[1],
+        100.0 * m.bias,
+        100.0 * m.bias_interval,
+        row.settings(),
+        if row.finished { "" } else { " (on its way)" }
+    )
+}
+
+fn write(
+    (scene, device, options): (&Scene, &Device, &Options),
+    truth: &Truth,
+    (rows, breakdown): (&[Row], Option<&Breakdown>),
+    folder: &Path,
+) -> Result<()> {
+    let found = Found {
+        scene: &scene.name,
+        device: device.name(),
+        elements: scene.triangles.len(),
+        places: truth.triangles.len(),
+        reference_paths: options.wanted.paths,
+        reference_seconds: truth.seconds,
+        reference_noise: truth.noise(),
+        rows,
+        breakdown,
+    };
+    let json = folder.join("pareto.json");
+    let text =
+        serde_json::to_string_pretty(&found).map_err(|e| Error::file(&json, e.to_string()))?;
+    write_atomically(&json, |out| out.write_all(text.as_bytes()))?;
+    write_atomically(&folder.join("pareto.csv"), |out| {
+        writeln!(
+            out,
+            "method,hemicube,source_scale,directions,sources,hemicubes,paths,error_bound,finished,seconds,rms,rms_low,rms_high,bias,bias_interval,best"
+        )?;
+        for r in rows {
+            fn cell<T: ToString>(value: Option<T>) -> String {
+                value.map_or(String::new(), |v| v.to_string())
+            }
+            let m = &r.measure;
+            writeln!(
+                out,
+                "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+                r.method.title(),
+                cell(r.hemicube),
+                cell(r.source_scale),
+                cell(r.directions),
+                cell(r.sources),
+                cell(r.hemicubes),
+                cell(r.paths),
+                cell(r.error_bound),
+                r.finished,
+                r.seconds,
+                m.rms,
+                m.rms_interval[0],
+                m.rms_interval[1],
+                m.bias,
+                m.bias_interval,
+                r.best
+            )?;
+        }
+        Ok(())
+    })?;
+    let caption = format!("{}, {} elements", scene.name, scene.triangles.len());
+    plot::write(rows, &caption, folder)
+}

@@ -1,0 +1,237 @@
+//! The same irradiance by other methods: the path tracer, instant radiosity, and Mitsuba 3 where it is installed.
+//!
+//! They find the places alone, so that a small part of the elements' work is done: their time is that for every element, which
+//! grows with the number of places. What is done once, such as walking light paths, counts once.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use glam::Vec3;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::measure::Measure;
+use super::truth::Truth;
+use super::{Method, Row};
+use crate::atomic_file::write_atomically;
+use crate::bench::irradiance::place_of;
+use crate::error::{Error, Result};
+use crate::path_tracer::{PathTracer, VirtualLights};
+use crate::render::Light;
+use crate::scene::{Scene, write_scene};
+
+/// Paths of the first measurement of each method; each further one has four times as many.
+const FIRST_PATHS: u32 = 4;
+
+/// Most paths that are tried.
+const MOST_PATHS: u32 = 1 << 20;
+
+/// Other random numbers than the reference's.
+const SEED: u64 = 0x5eed << 32;
+
+/// The script that asks Mitsuba.
+const MITSUBA: &str = include_str!("../../../tests/peers/mitsuba_irradiance.py");
+
+/// What the peers are given.
+pub(super) struct Job<'a> {
+    /// Whose elements' centroids are the places, and the same with its relief as geometry.
+    pub scene: &'a Scene,
+    pub fine: &'a Scene,
+    pub truth: &'a Truth,
+    /// No measurement is begun that would probably take longer for the places.
+    pub limit: Duration,
+}
+
+impl Job<'_> {
+    /// Elements for each place.
+    fn share(&self) -> f64 {
+        self.scene.triangles.len() as f64 / self.truth.triangles.len() as f64
+    }
+
+    fn row(&self, method: Method, paths: u32, seconds: f64, found: &[Vec3]) -> Row {
+        Row {
+            paths: Some(paths),
+            seconds,
+            ..Row::new(method, Measure::new(found, self.truth))
+        }
+    }
+
+    fn each(&self, find: impl Fn(usize, usize) -> Vec3 + Sync) -> Vec<Vec3> {
+        let places = self.truth.triangles.par_iter().enumerate();
+        places.map(|(i, &e)| find(i, e)).collect()
+    }
+
+    /// The project's own path tracer.
+    pub fn path_tracer(&self, go_on: &impl Fn() -> bool, mut add: impl FnMut(Row)) -> Result<()> {
+        let start = Instant::now();
+        let tracer = PathTracer::new(self.fine)?;
+        let once = start.elapsed().as_secs_f64();
+        let mut paths = FIRST_PATHS;
+        loop {
+            let turn = Instant::now();
+            let found = self.each(|i, e| {
+                let (place, normal) = place_of(self.scene, e);
+                let seed = SEED | i as u64;
+                tracer
+                    .irradiance(place, normal, paths, seed, Light::Global)
+                    .0
+            });
+            let taken = turn.elapsed();
+            let seconds = once + self.share() * taken.as_secs_f64();
+            add(self.row(Method::PathTracer, paths, seconds, &found));
+            paths *= 4;
+            if 4 * taken > self.limit || paths > MOST_PATHS || !go_on() {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Keller's virtual point lights, with shadow rays on the CPU.
+    pub fn instant_radiosity(
+        &self,
+        go_on: &impl Fn() -> bool,
+        mut add: impl FnMut(Row),
+    ) -> Result<()> {
+        let start = Instant::now();
+        let tracer = PathTracer::new(self.fine)?;
+        let built = start.elapsed().as_secs_f64();
+        let mut paths = FIRST_PATHS;
+        loop {
+            let turn = Instant::now();
+            let lights = VirtualLights::new(&tracer, paths, SEED);
+            let once = built + turn.elapsed().as_secs_f64();
+            let turn = Instant::now();
+            let found = self.each(|_, e| {
+                let (place, normal) = place_of(self.scene, e);
+                lights.irradiance(place, normal)
+            });
+            let taken = turn.elapsed();
+            let seconds = once + self.share() * taken.as_secs_f64();
+            add(self.row(Method::InstantRadiosity, paths, seconds, &found));
+            paths *= 4;
+            if 4 * taken > self.limit || paths > MOST_PATHS || !go_on() {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Mitsuba 3 in a process of its own, which reads the scene from `folder`. Where it cannot run, the reason in one line.
+    pub fn mitsuba(
+        &self,
+        python: &Path,
+        folder: &Path,
+        mut add: impl FnMut(Row),
+    ) -> Result<Option<String>> {
+        let textured = |m: &crate::scene::Material| m.map_kd.is_some();
+        if self.fine.materials.iter().any(textured) {
+            return Ok(Some("its script knows no textures".into()));
+        }
+        let ask = Ask::new(self);
+        let obj = write_scene(self.fine, folder)?.with_file_name("scene.obj");
+        let (script, job) = (
+            folder.join("mitsuba_irradiance.py"),
+            folder.join("job.json"),
+        );
+        write_atomically(&script, |out| out.write_all(MITSUBA.as_bytes()))?;
+        let text = serde_json::to_string(&ask).map_err(|e| Error::file(&job, e.to_string()))?;
+        write_atomically(&job, |out| out.write_all(text.as_bytes()))?;
+        let run = Command::new(python)
+            .args([&script, &obj, &job])
+            .stdin(Stdio::null())
+            .output();
+        let output = match run {
+            Ok(output) => output,
+            Err(error) => return Ok(Some(format!("{}: {error}", python.display()))),
+        };
+        let answers = String::from_utf8_lossy(&output.stdout);
+        for line in answers.lines() {
+            let Ok(answer) = serde_json::from_str::<Answer>(line) else {
+                return Ok(Some(format!("an answer that cannot be read: {line:.80}")));
+            };
+            let found: Vec<Vec3> = answer
+                .irradiance
+                .into_iter()
+                .map(Vec3::from_array)
+                .collect();
+            if found.len() != self.truth.triangles.len() {
+                return Ok(Some("not one answer for each place".into()));
+            }
+            let seconds = self.share() * answer.seconds;
+            add(self.row(Method::Mitsuba, answer.paths, seconds, &found));
+        }
+        let said = String::from_utf8_lossy(&output.stderr);
+        let last = said.lines().rfind(|line| !line.trim().is_empty());
+        Ok(match output.status.success() {
+            true => None,
+            false => Some(last.unwrap_or("it failed without a word").to_owned()),
+        })
+    }
+}
+
+/// What Mitsuba's script is told beside the mesh.
+#[derive(Serialize)]
+struct Ask {
+    materials: Vec<Surface>,
+    points: Vec<Point>,
+    /// Scene units, unit normals, `[place]`.
+    places: Vec<[f64; 3]>,
+    normals: Vec<[f64; 3]>,
+    /// Numbers of paths to try while a trial takes no longer than `limit` seconds.
+    paths: Vec<u32>,
+    limit: f64,
+}
+
+#[derive(Serialize)]
+struct Surface {
+    name: String,
+    kd: [f32; 3],
+    ke: [f32; 3],
+}
+
+#[derive(Serialize)]
+struct Point {
+    position: [f64; 3],
+    intensity: [f32; 3],
+}
+
+/// A line of its answer.
+#[derive(Deserialize)]
+struct Answer {
+    paths: u32,
+    seconds: f64,
+    irradiance: Vec<[f32; 3]>,
+}
+
+impl Ask {
+    fn new(job: &Job<'_>) -> Self {
+        let places = job.truth.triangles.iter().map(|&e| place_of(job.scene, e));
+        let (places, normals) = places.map(|(p, n)| (p.to_array(), n.to_array())).unzip();
+        let paths = std::iter::successors(Some(FIRST_PATHS), |p| p.checked_mul(4));
+        Self {
+            materials: job
+                .fine
+                .materials
+                .iter()
+                .map(|m| Surface {
+                    name: m.name.clone(),
+                    kd: m.kd,
+                    ke: m.ke,
+                })
+                .collect(),
+            points: job
+                .fine
+                .point_lights
+                .iter()
+                .map(|l| Point {
+                    position: l.position.to_array(),
+                    intensity: l.intensity,
+                })
+                .collect(),
+            places,
+            normals,
+            paths: paths.take_while(|&p| p <= MOST_PATHS).collect(),
+            limit: job.limit.as_secs_f64(),
+        }
+    }
+}

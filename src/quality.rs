@@ -1,0 +1,68 @@
+//! Presets of a bake, from coarse and quick to fine and slow; `mesolux bench pareto` measures error against time.
+
+use crate::solver::Settings;
+use crate::sources::Grouping;
+
+/// How good a bake is to be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Quality {
+    Draft,
+    #[default]
+    Normal,
+    High,
+    Reference,
+}
+
+impl Quality {
+    pub const ALL: [Self; 4] = [Self::Draft, Self::Normal, Self::High, Self::Reference];
+
+    /// The settings, all others at their defaults.
+    pub fn settings(self) -> Settings {
+        let (hemicube, scale, residual) = match self {
+            Self::Draft => (64, 4.0, 5e-2),
+            Self::Normal => (128, 1.0, 1e-3),
+            Self::High => (256, 1.0, 1e-3),
+            Self::Reference => (512, 0.25, 1e-4),
+        };
+        Settings {
+            hemicube,
+            residual,
+            grouping: scaled(scale),
+            ..Settings::default()
+        }
+    }
+}
+
+/// The default grouping with sources `scale` times as large in elements, area and power.
+pub fn scaled(scale: f64) -> Grouping {
+    let plain = Grouping::default();
+    Grouping {
+        max_elements: ((plain.max_elements as f64 * scale).round() as usize).max(1),
+        max_area: plain.max_area * scale,
+        max_power: plain.max_power * scale,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Who asks for nothing gets `normal`; a better preset is never coarser.
+    #[test]
+    fn presets_are_in_order_about_the_default() {
+        let plain = Settings::default();
+        let normal = Quality::default().settings();
+        assert_eq!(
+            (normal.hemicube, normal.residual, normal.grouping),
+            (plain.hemicube, plain.residual, plain.grouping)
+        );
+        for pair in Quality::ALL.map(Quality::settings).windows(2) {
+            let ([worse, better], [a, b]) =
+                ([&pair[0], &pair[1]], [&pair[0].grouping, &pair[1].grouping]);
+            better.check().expect("settings that can be solved");
+            assert!(better.hemicube >= worse.hemicube && better.residual <= worse.residual);
+            assert!(b.max_elements <= a.max_elements && b.max_area <= a.max_area);
+            assert!(b.max_power <= a.max_power);
+        }
+    }
+}
