@@ -200,7 +200,8 @@ fn flat_maps_and_scenes_without_relief_are_plain() {
         t.material = lamp;
     }
     let quick = |transport| Settings {
-        residual: 1e-2,
+        // What is left unshot may lie anywhere, for equal sources are shot in an order that rounding decides.
+        residual: 1e-6,
         ..settings(transport, 64)
     };
     let lambert = build.solve(&quick(Transport::Lambert));
@@ -228,8 +229,8 @@ fn flat_maps_and_scenes_without_relief_are_plain() {
         "nearly flat relief on {} elements: largest difference of radiosity {worst:.1e}",
         relief.elements.len()
     );
-    // What rounding leaves of a hundred sums in f32.
-    assert!(worst < 1e-5);
+    // Form factors are rounded to 16 bits, to 1/2048 of themselves, and those to relief as vectors, not as numbers.
+    assert!(worst < 1.0 / 2048.0);
 }
 
 /// The same run gives the same bits, directions included.

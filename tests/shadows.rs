@@ -267,7 +267,7 @@ fn contacts_leak_no_light_and_surfaces_do_not_shadow_themselves() {
         (1, 1),
         0,
     );
-    let scene = build.scene;
+    let scene = build.0.scene;
     let camera = camera(DVec3::new(1.9, 0.9, 1.9), DVec3::new(1.2, 0.0, 1.0), 45.0);
     let solution = baked(&scene);
     let lighting = Lighting {
