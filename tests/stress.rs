@@ -46,7 +46,6 @@ cases! {
     slivers
     specks degenerate duplicates shuffled non_manifold
     touching interpenetrating
-    #[ignore = "visibility lets light through where a gap is below a pixel's footprint"]
     thin_gap
     #[ignore = "the sheet's shadow takes 3 % more light than it should"]
     open_sheet

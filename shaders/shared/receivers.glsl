@@ -69,13 +69,14 @@ bool visible(vec3 p, vec3 n, uint element, uint slot, Source s) {
     float along = -eye_height / dot(plane.xyz, world);
     vec3 seen = s.eye + along * world;
     float distance_p = length(d);
-    if (dot(seen - s.eye, d) > distance_p * distance_p) {
-        // The item itself is farther off than p.
-        return true;
-    }
     float apart = length(p - seen);
     float grazing = min(abs(dot(n, d)), abs(dot(plane.xyz, d))) / distance_p;
     float footprint = distance_p * 2.0 / float(face_size) / max(grazing, 0.05);
+    // The item is farther off than p by more than the pixel explains: of two parallel sheets with a thin gap between them, the
+    // near one is seen beyond p in half of the pixels.
+    if (dot(seen - s.eye, d) > distance_p * (distance_p + REACH * footprint)) {
+        return true;
+    }
     float sine = length(cross(n, plane.xyz));
     return apart <= REACH * footprint && depth <= apart * sine + HEIGHT_EPSILON;
 }

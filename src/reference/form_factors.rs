@@ -106,13 +106,13 @@ fn visible(
     let ray = direction_of(pixel, n);
     let ray = source.tangent * ray.x + source.bitangent * ray.y + source.normal * ray.z;
     let seen = source.eye + ray * (-eye_height / plane.dot(ray));
-    if (seen - source.eye).dot(d) > d.length_squared() {
-        return true;
-    }
     let apart = p.distance(seen);
     let normal = elements.normal[element];
     let grazing = normal.dot(d).abs().min(plane.dot(d).abs()) / d.length();
     let footprint = d.length() * 2.0 / f64::from(n) / grazing.max(0.05);
+    if (seen - source.eye).dot(d) > d.length() * (d.length() + REACH * footprint) {
+        return true;
+    }
     apart <= REACH * footprint && depth <= apart * normal.cross(plane).length() + HEIGHT_EPSILON
 }
 
