@@ -8,6 +8,7 @@ mod estimate;
 mod relief_light;
 mod report;
 mod self_test;
+mod settings;
 mod visibility;
 
 use std::sync::Arc;
@@ -18,101 +19,22 @@ use glam::Vec3;
 use crate::charts::Connections;
 use crate::constants::REPLAYS;
 use crate::elements::Elements;
-use crate::error::{Error, Result};
-use crate::meso;
+use crate::error::Result;
 use crate::passes::buffers::{Batch, SceneBuffers, State, download};
-use crate::passes::cull::Culling;
 use crate::passes::factor_buffers::FactorBuffers;
 use crate::passes::item_buffer::ItemBuffer;
 use crate::passes::relief_buffers::ReliefBuffers;
 use crate::passes::types::{KeptState, Progress, Reflected, Slot};
 use crate::scene::{PointLight, Scene};
-use crate::sources::{self, Grouping, Sources};
+use crate::sources::{self, Sources};
 use crate::vk::Device;
 
 use batch::{BatchLoop, OnDevice};
 pub use relief_light::ReliefLight;
 pub use report::{Report, Seconds, Skipped, StopReason};
 pub use self_test::{ids_come_back_right, open_device};
+pub use settings::{Estimator, HEMICUBE_RANGE, Settings, VISIBILITY_MEMORY};
 pub use visibility::Visibility;
-
-/// How form factors are taken from the item buffer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Estimator {
-    /// Lambert's formula for each receiver, visibility from the item buffer.
-    #[default]
-    Receiver,
-    /// The paper's equations (1) and (2): the sum of the pixels' form factors.
-    Pixel,
-}
-
-#[derive(Debug, Clone)]
-pub struct Settings {
-    pub estimator: Estimator,
-    /// Pixels a side of a hemicube's face; even.
-    pub hemicube: u32,
-    /// Stops when the error bound is no more than this.
-    pub residual: f64,
-    /// Stops after this time.
-    pub budget: Option<Duration>,
-    /// Stops after this many shots.
-    pub shots: Option<u32>,
-    pub seed: u64,
-    pub grouping: Grouping,
-    pub culling: Culling,
-    /// Sources of a batch that are drawn, at most.
-    pub batch: u32,
-    /// Bytes on the device for form factors of sources that have been drawn, so that their further shots need no drawing. None:
-    /// [`VISIBILITY_MEMORY`], or a third of the device's memory if that is less. The `pixel` estimator keeps none.
-    pub visibility_memory: Option<u64>,
-    /// How relief takes part; see [`crate::bake::elements`].
-    pub relief: meso::Options,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            estimator: Estimator::default(),
-            hemicube: 128,
-            residual: 1e-3,
-            budget: None,
-            shots: None,
-            seed: 0,
-            grouping: Grouping::default(),
-            culling: Culling::default(),
-            batch: 16,
-            visibility_memory: None,
-            relief: meso::Options::default(),
-        }
-    }
-}
-
-/// Bytes for kept form factors, unless told otherwise.
-pub const VISIBILITY_MEMORY: u64 = 768 << 20;
-
-/// Smallest and largest hemicube.
-pub const HEMICUBE_RANGE: std::ops::RangeInclusive<u32> = 8..=2048;
-
-impl Settings {
-    /// Refuses numbers that make no sense.
-    pub fn check(&self) -> Result<()> {
-        if !HEMICUBE_RANGE.contains(&self.hemicube) || !self.hemicube.is_multiple_of(2) {
-            return Err(Error::Usage(format!(
-                "--hemicube {}: must be even and in {} to {}",
-                self.hemicube,
-                HEMICUBE_RANGE.start(),
-                HEMICUBE_RANGE.end()
-            )));
-        }
-        if !(self.residual.is_finite() && self.residual > 0.0) {
-            return Err(Error::Usage(format!(
-                "--residual {}: must be above 0",
-                self.residual
-            )));
-        }
-        Ok(())
-    }
-}
 
 /// How far a solution has come.
 #[derive(Debug, Clone, Copy)]

@@ -1,0 +1,86 @@
+//! What a bake is asked for.
+
+use std::time::Duration;
+
+use crate::error::{Error, Result};
+use crate::meso;
+use crate::passes::cull::Culling;
+use crate::sources::Grouping;
+
+/// How form factors are taken from the item buffer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Estimator {
+    /// Lambert's formula for each receiver, visibility from the item buffer.
+    #[default]
+    Receiver,
+    /// The paper's equations (1) and (2): the sum of the pixels' form factors.
+    Pixel,
+}
+
+#[derive(Debug, Clone)]
+pub struct Settings {
+    pub estimator: Estimator,
+    /// Pixels a side of a hemicube's face; even.
+    pub hemicube: u32,
+    /// Stops when the error bound is no more than this.
+    pub residual: f64,
+    /// Stops after this time.
+    pub budget: Option<Duration>,
+    /// Stops after this many shots.
+    pub shots: Option<u32>,
+    pub seed: u64,
+    pub grouping: Grouping,
+    pub culling: Culling,
+    /// Sources of a batch that are drawn, at most.
+    pub batch: u32,
+    /// Bytes on the device for form factors of sources that have been drawn, so that their further shots need no drawing. None:
+    /// [`VISIBILITY_MEMORY`], or a third of the device's memory if that is less. The `pixel` estimator keeps none.
+    pub visibility_memory: Option<u64>,
+    /// How relief takes part; see [`crate::bake::elements`].
+    pub relief: meso::Options,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            estimator: Estimator::default(),
+            hemicube: 128,
+            residual: 1e-3,
+            budget: None,
+            shots: None,
+            seed: 0,
+            grouping: Grouping::default(),
+            culling: Culling::default(),
+            batch: 16,
+            visibility_memory: None,
+            relief: meso::Options::default(),
+        }
+    }
+}
+
+/// Bytes for kept form factors, unless told otherwise.
+pub const VISIBILITY_MEMORY: u64 = 768 << 20;
+
+/// Smallest and largest hemicube.
+pub const HEMICUBE_RANGE: std::ops::RangeInclusive<u32> = 8..=2048;
+
+impl Settings {
+    /// Refuses numbers that make no sense.
+    pub fn check(&self) -> Result<()> {
+        if !HEMICUBE_RANGE.contains(&self.hemicube) || !self.hemicube.is_multiple_of(2) {
+            return Err(Error::Usage(format!(
+                "--hemicube {}: must be even and in {} to {}",
+                self.hemicube,
+                HEMICUBE_RANGE.start(),
+                HEMICUBE_RANGE.end()
+            )));
+        }
+        if !(self.residual.is_finite() && self.residual > 0.0) {
+            return Err(Error::Usage(format!(
+                "--residual {}: must be above 0",
+                self.residual
+            )));
+        }
+        Ok(())
+    }
+}
