@@ -13,6 +13,8 @@ layout(scalar, binding = 2) buffer Unshot { vec4 unshot[]; };
 layout(scalar, binding = 3) writeonly buffer Slots { Slot slots[]; };
 layout(scalar, binding = 4) buffer State { Progress progress; };
 layout(scalar, binding = 5) readonly buffer KeptRows { KeptRow kept_rows[]; };
+// Of the passes over elements, without and with relief, and slots that are drawn.
+layout(scalar, binding = 6) buffer Commands { ReceiverList commands[2]; };
 
 layout(push_constant, scalar) uniform Parameters {
     uint source_count;
@@ -156,6 +158,8 @@ void main() {
         slots[fresh_slots + slot].source = NONE;
     }
     if (lane == 0) {
+        commands[0].groups_y = chosen;
+        commands[1].groups_y = chosen;
         progress = Progress(unshot_emitted, unshot_reflected, shots + chosen + replayed, chosen, replayed);
     }
 }

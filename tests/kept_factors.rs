@@ -23,12 +23,12 @@ fn scene(relief: bool) -> Build {
         let wave = |a: f64| (std::f64::consts::TAU * a).sin();
         build.relief(material, 8, |x, y| 0.03 * wave(x) * wave(y));
     }
-    let sides = build.room(DVec3::ZERO, DVec3::ONE, 4, 0);
+    let sides = build.room(DVec3::ZERO, DVec3::ONE, 3, 0);
     for t in &mut build.scene.triangles[sides[0].clone()] {
         t.material = material;
     }
     build.uv(sides[0].clone(), 0.25 * DVec3::X, 0.25 * DVec3::Z);
-    let ball = build.sphere(DVec3::new(0.5, 0.4, 0.5), 0.2, 2, true, material);
+    let ball = build.sphere(DVec3::new(0.5, 0.4, 0.5), 0.2, 1, true, material);
     build.uv(ball, DVec3::new(0.2, 0.05, 0.0), DVec3::new(0.0, 0.1, 0.2));
     let [x, z] = [0.4 * DVec3::X, 0.4 * DVec3::Z];
     build.quad(DVec3::new(0.3, 0.95, 0.3), x, z, (2, 2), lamp);

@@ -132,7 +132,7 @@ fn an_obj_means_what_it_says() {
 fn the_odd_corners_of_the_format_are_read() {
     let text = "\u{feff}# comment\nmtllib lamp.mtl\no thing\nv 0 0 0 1 0 0\nv 2 0 0 2.0\r\nv 1 1 0\nv 1 1 0 # the same\n\
         vn 0 0 1\nvt 0 0\nvt 1 0 0\nvt 1 1\nl 1 2 3\np 1\nl 1/1 2/2 3/3 1/1\nusemtl lamp\n\
-        f -4//-1 -3//1 -2//1\ng other\nf 1/1 2/2 \\\n4/3\nf 1 2 2\n";
+        f -4//-1 -3//1 -2//1\ng other\nf 1/1 4/3 \\\n2/2\nf 1 2 2\n";
     let scene = good(&[("a.obj", text), ("lamp.mtl", LAMP)]);
     assert_eq!(scene.triangles.len(), 2);
     assert_eq!(scene.dropped_degenerate, 1);
@@ -140,8 +140,9 @@ fn the_odd_corners_of_the_format_are_read() {
         scene.vertices,
         [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0)]
     );
-    assert_eq!(scene.triangles[0].vertices, scene.triangles[1].vertices);
-    assert_eq!(scene.triangles[1].uv, [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]);
+    assert_eq!(scene.triangles[0].vertices, [0, 1, 2]);
+    assert_eq!(scene.triangles[1].vertices, [0, 2, 1]);
+    assert_eq!(scene.triangles[1].uv, [[0.0, 0.0], [1.0, 1.0], [1.0, 0.0]]);
 }
 
 #[test]

@@ -6,7 +6,8 @@ use bytemuck::Pod;
 use glam::Vec3;
 
 use super::types::{
-    Component, Draw, KeptRow, Meshlet, Progress, Slot, Source, Triangle, View, contour_corners,
+    Component, Draw, KeptRow, Meshlet, Progress, ReceiverList, Slot, Source, Triangle, View,
+    contour_corners,
 };
 use crate::charts::Connections;
 use crate::constants::{FACES, NONE};
@@ -207,6 +208,8 @@ pub struct Batch {
     /// Pixels a side of a face.
     pub face_size: u32,
     pub slots: Buffer,
+    /// [`ReceiverList`]s: dispatches over the elements without and with relief and the slots that are drawn in this batch.
+    pub commands: Buffer,
     pub views: Buffer,
     pub draws: Buffer,
     pub counts: Buffer,
@@ -289,6 +292,11 @@ impl Batch {
             replay_slots,
             face_size,
             slots: upload(device, "slots", &empty, BufferUse::Storage)?,
+            commands: buffer(
+                "fresh commands",
+                2 * size_of::<ReceiverList>() as u64,
+                BufferUse::Geometry,
+            )?,
             views: buffer(
                 "views",
                 regions * size_of::<View>() as u64,

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::buffers::{Batch, SceneBuffers};
+use super::buffers::{Batch, SceneBuffers, write};
 use super::factor_buffers::{FactorBuffers, ReceiverLists};
 use super::relief_buffers::ReliefBuffers;
 use super::types::ReceiverList;
@@ -96,6 +96,7 @@ impl FormFactors {
 
     pub fn bind(
         &self,
+        device: &Arc<Device>,
         scene: &SceneBuffers,
         batch: &Batch,
         factors: &FactorBuffers,
@@ -127,6 +128,14 @@ impl FormFactors {
                 let kinds = pipelines.iter().map(|p| p.bind("form factors", &binds));
                 Ok::<_, crate::error::Error>((sort, kinds.collect::<Result<Vec<_>>>()?))
             };
+        let command = |elements| ReceiverList {
+            groups_x: groups(elements),
+            groups_y: 0,
+            groups_z: 1,
+            count: 0,
+        };
+        let commands = [factors.plain_count, factors.meso_count].map(command);
+        write(device, &batch.commands, &commands)?;
         let (sort, kinds) = bind(&self.plain, &factors.plain_lists, &factors.fresh, None)?;
         let plain = Range {
             first_element: 0,
@@ -175,9 +184,11 @@ impl FormFactors {
             block_count: factors.blocks(),
             slot,
         };
-        for (range, ..) in ranges() {
-            let size = [groups(range.element_count), batch.slot_count, 1];
-            cmd.dispatch(&self.sort, &range.sort, &parameters(range, 0), size);
+        for (i, (range, ..)) in ranges().enumerate() {
+            // Of as many slots as are drawn: a batch of replays alone sorts nothing.
+            let at = (size_of::<ReceiverList>() * i) as u64;
+            let push = parameters(range, 0);
+            cmd.dispatch_indirect(&self.sort, &range.sort, &push, (&batch.commands, at));
         }
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         // Every element is in one list of a slot at most.

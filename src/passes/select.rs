@@ -33,7 +33,7 @@ impl Select {
                 device,
                 "select",
                 shaders::SELECT_COMP,
-                &[Binding::Storage; 6],
+                &[Binding::Storage; 7],
                 size_of::<Parameters>(),
                 &[],
                 false,
@@ -56,6 +56,7 @@ impl Select {
                 &batch.slots,
                 &state.progress,
                 &state.kept_rows,
+                &batch.commands,
             ]
             .map(Bind::Buffer),
         )

@@ -59,7 +59,7 @@ impl Estimate {
             });
         };
         let form_factors = FormFactors::new(device, on.relief.is_some())?;
-        let sets = form_factors.bind(scene, batch, factors, on.relief)?;
+        let sets = form_factors.bind(device, scene, batch, factors, on.relief)?;
         let keep = match factors.keeps() {
             true => {
                 let keep = Keep::new(device)?;
