@@ -1,7 +1,9 @@
 // Every element adds up what the chosen sources send it: form factor times radiosity, the paper's equation (2) by reciprocity. One
-// invocation an element, sources in slot order: no atomics, the same bits every run. FROM_RELIEF: some sources send by
-// direction. TO_RELIEF: the elements of this dispatch receive by direction.
+// subgroup a block of GROUP elements, sources in slot order: no atomics, the same bits every run and for every size of subgroup.
+// FROM_RELIEF: some sources send by direction. TO_RELIEF: the elements of this dispatch receive by direction.
 
+#extension GL_KHR_shader_subgroup_basic : require
+#extension GL_KHR_shader_subgroup_ballot : require
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
 #include "shared/types.glsl"
@@ -15,7 +17,11 @@
 #define FLUX float
 #endif
 
-layout(local_size_x = GROUP) in;
+// The workgroup is one subgroup. An invocation takes PAIRS pairs of elements, a pair because two kept factors share a word; the
+// pairs of one step lie side by side.
+layout(constant_id = 0) const uint LANES = GROUP / 2;
+layout(local_size_x_id = 0) in;
+const uint PAIRS = LANES < GROUP / 2 ? GROUP / 2 / LANES : 1;
 
 // The batch's sources: fresh_slots that were just drawn, then kept ones.
 layout(scalar, binding = 0) readonly buffer Slots { Slot slots[]; };
@@ -64,25 +70,6 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Wor
 
 #include "shared/accumulate.glsl"
 
-// The form factor (a vector in the element's frame for TO_RELIEF) of a source that was drawn before.
-FLUX replayed(uint source) {
-    KeptRow row = kept_rows[source];
-    Words words = Words(chunks[row.chunk]);
-    uint block = words.word[row.first + first_block + gl_WorkGroupID.x];
-    if (block == 0) {
-        return FLUX(0.0);
-    }
-    uint lane = gl_LocalInvocationID.x;
-    block += row.first;
-    uint pair = words.word[block + lane / 2];
-    float f = kept_factor((lane & 1) == 0 ? pair & 0xffff : pair >> 16);
-#ifdef TO_RELIEF
-    return f == 0.0 ? vec3(0.0) : f * kept_direction(words.word[block + GROUP / 2 + lane]);
-#else
-    return f;
-#endif
-}
-
 #ifdef FROM_RELIEF
 // What a source with a relief sends towards a place: the slot's own light, by direction.
 void send_by_direction(uint slot, Source s, vec3 to, inout vec3 emitted, inout vec3 reflected) {
@@ -103,79 +90,151 @@ void send_by_direction(uint slot, Source s, vec3 to, inout vec3 emitted, inout v
 }
 #endif
 
-void main() {
-    uint i = gl_GlobalInvocationID.x;
-    if (i >= element_count) {
+// What one element has received from the batch.
+struct Received {
+    vec3 direct;
+    vec3 indirect;
+#ifdef TO_RELIEF
+    vec3 reflected;
+#endif
+};
+
+// Light of one source, of which the element sees the share f.
+void receive(inout Received received, FLUX f, uint i, vec3 emitted, vec3 reflected) {
+#ifdef TO_RELIEF
+    if (f == vec3(0.0)) {
         return;
     }
-    uint e = first_element + i;
-    vec3 middle = balls[e].xyz;
-    vec3 n = planes[e].xyz;
-    vec3 add_direct = vec3(0.0);
-    vec3 add_indirect = vec3(0.0);
-    uint behind = 0;
-#ifdef TO_RELIEF
-    MesoElement meso = meso_elements[i];
     uint directions = cells.x * cells.y;
-    vec3 add_reflected = vec3(0.0);
-#endif
-    for (uint slot = 0; slot < slot_count; slot++) {
-        Slot shot = slots[slot];
-        if (shot.source == NONE) {
-            // Fresh and kept ones each fill their slots from the first on.
-            if (slot >= fresh_slots) {
-                break;
-            }
-            slot = fresh_slots - 1;
-            continue;
+    uint k = direction_of(f * inversesqrt(dot(f, f)), cells);
+    uint at = 3 * (i * directions + k);
+    uint response = 3 * (meso_elements[i].response * directions + k);
+    bool emits = emitted != vec3(0.0);
+    bool reflects = reflected != vec3(0.0);
+    for (uint c = 0; c < 3; c++) {
+        if (emits) {
+            moments_direct[at + c] += emitted[c] * f;
         }
-        bool is_fresh = slot < fresh_slots;
-        FLUX f;
-        if (is_fresh) {
-            f = fresh[slot * element_count + i];
-            behind += dot(middle - sources[shot.source].eye, n) >= sources[shot.source].radius ? 1 : 0;
-        } else {
-            f = replayed(shot.source);
+        if (reflects) {
+            moments_indirect[at + c] += reflected[c] * f;
         }
-        if (f == FLUX(0.0)) {
-            continue;
-        }
-        vec3 emitted = shot.emitted;
-        vec3 reflected = shot.reflected;
-#ifdef FROM_RELIEF
-        if (shot.source - first_relief_source < relief_source_count) {
-            send_by_direction(slot, sources[shot.source], middle, emitted, reflected);
-        }
-#endif
-#ifdef TO_RELIEF
-        uint k = direction_of(f * inversesqrt(dot(f, f)), cells);
-        uint at = 3 * (i * directions + k);
-        uint response = 3 * (meso.response * directions + k);
-        bool emits = emitted != vec3(0.0);
-        bool reflects = reflected != vec3(0.0);
-        for (uint c = 0; c < 3; c++) {
-            if (emits) {
-                moments_direct[at + c] += emitted[c] * f;
-            }
-            if (reflects) {
-                moments_indirect[at + c] += reflected[c] * f;
-            }
-            add_reflected[c] += dot(albedos[response + c], f) * (emitted[c] + reflected[c]);
-        }
-        add_direct += f.z * emitted;
-        add_indirect += f.z * reflected;
+        received.reflected[c] += dot(albedos[response + c], f) * (emitted[c] + reflected[c]);
+    }
+    received.direct += f.z * emitted;
+    received.indirect += f.z * reflected;
 #else
-        add_direct += f * emitted;
-        add_indirect += f * reflected;
+    received.direct += f * emitted;
+    received.indirect += f * reflected;
+#endif
+}
+
+// The n-th element of this invocation, of those of the dispatch.
+struct Receiver {
+    uint i;         // NONE: past the last one
+    vec3 middle;
+    uint behind;
+    Received received;
+};
+
+// Place of the n-th element in its block; past the block where there are more lanes than pairs.
+uint in_block(uint n) {
+    return 2 * (gl_LocalInvocationID.x + n / 2 * LANES) + n % 2;
+}
+
+// Light of the source in a slot, of which the element sees the share f.
+void receive_from(uint slot, Slot shot, FLUX f, inout Receiver receiver) {
+#ifdef FROM_RELIEF
+    if (shot.source - first_relief_source < relief_source_count) {
+        send_by_direction(slot, sources[shot.source], receiver.middle, shot.emitted, shot.reflected);
+    }
+#endif
+    receive(receiver.received, f, receiver.i, shot.emitted, shot.reflected);
+}
+
+void main() {
+    Receiver receivers[2 * PAIRS];
+    for (uint n = 0; n < 2 * PAIRS; n++) {
+        uint i = GROUP * gl_WorkGroupID.x + in_block(n);
+        bool inside = in_block(n) < GROUP && i < element_count;
+        receivers[n].i = inside ? i : NONE;
+        receivers[n].middle = inside ? balls[first_element + i].xyz : vec3(0.0);
+        receivers[n].behind = 0;
+        receivers[n].received.direct = vec3(0.0);
+        receivers[n].received.indirect = vec3(0.0);
+#ifdef TO_RELIEF
+        receivers[n].received.reflected = vec3(0.0);
 #endif
     }
-    behind_count[e] += behind;
-    accumulate(e, add_direct, add_indirect);
+
+    // Fresh form factors. These and kept ones each fill their slots from the first on.
+    for (uint slot = 0; slot < fresh_slots && slots[slot].source != NONE; slot++) {
+        Slot shot = slots[slot];
+        vec3 eye = sources[shot.source].eye;
+        float radius = sources[shot.source].radius;
+        for (uint n = 0; n < 2 * PAIRS; n++) {
+            uint i = receivers[n].i;
+            if (i != NONE) {
+                receivers[n].behind += dot(receivers[n].middle - eye, planes[first_element + i].xyz) >= radius ? 1 : 0;
+                receive_from(slot, shot, fresh[slot * element_count + i], receivers[n]);
+            }
+        }
+    }
+
+    // Kept ones. Each lane looks up one slot and shares it with the others; slots of which the block sees nothing are passed over.
+    for (uint first = fresh_slots; first < slot_count && slots[first].source != NONE; first += LANES) {
+        uint mine = first + gl_SubgroupInvocationID;
+        Slot shot = Slot(vec3(0.0), NONE, vec3(0.0));
+        if (mine < slot_count) {
+            shot = slots[mine];
+        }
+        uvec2 address = uvec2(0);
+        uint block = 0;
+        if (shot.source != NONE) {
+            KeptRow row = kept_rows[shot.source];
+            address = chunks[row.chunk];
+            block = Words(address).word[row.first + first_block + gl_WorkGroupID.x];
+            block += block == 0 ? 0 : row.first;
+        }
+        uvec4 seen = subgroupBallot(block != 0);
+        while (any(notEqual(seen, uvec4(0)))) {
+            uint lane = subgroupBallotFindLSB(seen);
+            seen[lane / 32] &= ~(1u << (lane % 32));
+            Words words = Words(subgroupBroadcast(address, lane));
+            uint at = subgroupBroadcast(block, lane);
+            Slot sent = Slot(
+                subgroupBroadcast(shot.emitted, lane),
+                subgroupBroadcast(shot.source, lane),
+                subgroupBroadcast(shot.reflected, lane)
+            );
+            for (uint n = 0; n < 2 * PAIRS; n += 2) {
+                uint pair = in_block(n) < GROUP ? words.word[at + in_block(n) / 2] : 0;
+                for (uint side = 0; side < 2; side++) {
+                    float share = kept_factor(side == 0 ? pair & 0xffff : pair >> 16);
 #ifdef TO_RELIEF
-    precise vec3 y = add_reflected * meso.scale - meso_reflected[i].error;
-    precise vec3 sum = meso_reflected[i].sum;
-    precise vec3 total = sum + y;
-    precise vec3 error = (total - sum) - y;
-    meso_reflected[i] = Reflected(total, error);
+                    FLUX f = share == 0.0 ? vec3(0.0) : share * kept_direction(words.word[at + GROUP / 2 + in_block(n + side)]);
+#else
+                    FLUX f = share;
 #endif
+                    receive_from(first + lane, sent, f, receivers[n + side]);
+                }
+            }
+        }
+    }
+
+    for (uint n = 0; n < 2 * PAIRS; n++) {
+        uint i = receivers[n].i;
+        if (i == NONE) {
+            continue;
+        }
+        Received received = receivers[n].received;
+        behind_count[first_element + i] += receivers[n].behind;
+        accumulate(first_element + i, received.direct, received.indirect);
+#ifdef TO_RELIEF
+        precise vec3 y = received.reflected * meso_elements[i].scale - meso_reflected[i].error;
+        precise vec3 sum = meso_reflected[i].sum;
+        precise vec3 total = sum + y;
+        precise vec3 error = (total - sum) - y;
+        meso_reflected[i] = Reflected(total, error);
+#endif
+    }
 }

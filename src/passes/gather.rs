@@ -58,7 +58,8 @@ fn pipeline<P>(
     bindings: usize,
 ) -> Result<ComputePipeline> {
     let kinds = vec![Binding::Storage; bindings];
-    ComputePipeline::new(device, name, spirv, &kinds, size_of::<P>(), &[], false)
+    let lanes = [device.limits().subgroup_size];
+    ComputePipeline::new(device, name, spirv, &kinds, size_of::<P>(), &lanes, true)
 }
 
 fn binds<'a>(
