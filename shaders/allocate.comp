@@ -71,7 +71,7 @@ void main() {
             row_chunk = fits ? state.chunk : NONE;
             row_first = state.used;
             if (fits) {
-                kept_rows[source] = KeptRow(row_chunk, row_first);
+                kept_rows[source] = KeptRow(row_chunk, row_first, slots[slot].scale);
                 state.used += words;
                 state.rows++;
             }

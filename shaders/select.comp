@@ -53,7 +53,7 @@ void scan(uint lane) {
 void shoot(uint slot, uint source) {
     bool emission_left = shot[source].w == 0.0;
     vec3 of_reflected = unshot[source].rgb;
-    slots[slot] = Slot(emission_left ? sources[source].emitted : vec3(0.0), source, of_reflected);
+    slots[slot] = Slot(emission_left ? sources[source].emitted : vec3(0.0), source, of_reflected, is_kept(source) ? kept_rows[source].scale : 1.0);
     shot[source] = vec4(shot[source].rgb + of_reflected, 1.0);
     unshot[source].w = 0.0;
 }
@@ -158,8 +158,8 @@ void main() {
         slots[fresh_slots + slot].source = NONE;
     }
     if (lane == 0) {
-        commands[0].groups_y = chosen;
-        commands[1].groups_y = chosen;
+        commands[0].groups_y = min(chosen, 1);
+        commands[1].groups_y = min(chosen, 1);
         progress = Progress(unshot_emitted, unshot_reflected, shots + chosen + replayed, chosen, replayed);
     }
 }

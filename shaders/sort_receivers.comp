@@ -5,33 +5,32 @@
 #extension GL_GOOGLE_include_directive : require
 #include "shared/receivers.glsl"
 
+// Lane k of a subgroup makes room in the list of kind k for all lanes.
 void append(uint slot, uint kind, bool mine, uint i) {
-    uvec4 lanes = subgroupBallot(mine);
-    uint count = subgroupBallotBitCount(lanes);
-    uint list = slot * RECEIVE_KINDS + kind;
+    uint count = 0;
+    uint before = 0;
+    for (uint k = 0; k < RECEIVE_KINDS; k++) {
+        uvec4 lanes = subgroupBallot(mine && kind == k);
+        count = gl_SubgroupInvocationID == k ? subgroupBallotBitCount(lanes) : count;
+        before = kind == k ? subgroupBallotExclusiveBitCount(lanes) : before;
+    }
     uint first = 0;
-    if (count > 0 && subgroupElect()) {
+    if (count > 0) {
+        uint list = slot * RECEIVE_KINDS + gl_SubgroupInvocationID;
         first = atomicAdd(lists[list].count, count);
         atomicMax(lists[list].groups_x, (first + count + GROUP - 1) / GROUP);
     }
-    first = subgroupBroadcastFirst(first);
+    for (uint k = 0; k < RECEIVE_KINDS; k++) {
+        uint first_of_kind = subgroupBroadcast(first, k);
+        before += kind == k ? first_of_kind : 0;
+    }
     if (mine) {
-        listed[list * element_count + first + subgroupBallotExclusiveBitCount(lanes)] = i;
+        listed[(slot * RECEIVE_KINDS + kind) * element_count + before] = i;
     }
 }
 
-void main() {
-    uint slot = gl_WorkGroupID.y;
-    uint source = slots[slot].source;
-    if (source == NONE) {
-        return;
-    }
-    bool inside = gl_GlobalInvocationID.x < element_count;
-    uint i = min(gl_GlobalInvocationID.x, element_count - 1);
-    uint e = first_element + i;
-    Source s = load_source(source);
-    vec4 ball = balls[e];
-    vec3 n = planes[e].xyz;
+// How the form factor from an element to a source is found; RECEIVE_KINDS where it is 0.
+uint kind_of(uint slot, Source s, uint e, vec4 ball, vec3 n) {
     vec3 d = ball.xyz - s.eye;
     float distance_eye = length(d);
     float across = dot(d, n);
@@ -40,14 +39,34 @@ void main() {
     bool whole = shows_whole_front(s, ball.xyz);
     bool points = distance_eye - s.radius >= POINT_DISTANCE * s.part_radius;
     bool seen = shows_front(s, ball.xyz) && visible(ball.xyz, n, e, slot, s);
-    bool mine = inside && across < s.radius && (near || seen);
     bool curved = s.cone_sin != 0.0;
     float far_distance = (curved ? POINT_DISTANCE : FLAT_POINT_DISTANCE) * s.radius;
     bool far = s.kind == KIND_POINT || whole && length(ball.xyz - s.middle) >= far_distance;
     bool by_parts = curved && points;
     uint kind = near ? RECEIVE_NEAR : far ? RECEIVE_FAR : by_parts ? RECEIVE_PARTS
         : whole && above ? RECEIVE_OUTLINE : RECEIVE_NEAR;
-    for (uint k = 0; k < RECEIVE_KINDS; k++) {
-        append(slot, k, mine && kind == k, i);
+    return across < s.radius && (near || seen) ? kind : RECEIVE_KINDS;
+}
+
+void main() {
+    vec4 ball[SORT_ELEMENTS];
+    vec3 n[SORT_ELEMENTS];
+    uint first = SORT_ELEMENTS * GROUP * gl_WorkGroupID.x + gl_LocalInvocationID.x;
+    for (uint j = 0; j < SORT_ELEMENTS; j++) {
+        uint e = first_element + min(first + j * GROUP, element_count - 1);
+        ball[j] = balls[e];
+        n[j] = planes[e].xyz;
+    }
+    for (uint slot = 0; slot < slot_count; slot++) {
+        uint source = slots[slot].source;
+        if (source == NONE) {
+            break;
+        }
+        Source s = load_source(source);
+        for (uint j = 0; j < SORT_ELEMENTS; j++) {
+            uint i = first + j * GROUP;
+            uint kind = kind_of(slot, s, first_element + i, ball[j], n[j]);
+            append(slot, kind, i < element_count && kind < RECEIVE_KINDS, i);
+        }
     }
 }

@@ -15,6 +15,8 @@ pub struct Connections {
     pub component: Vec<u32>,
     /// Per part: every edge has its partner, and the volume enclosed is positive (all normals outward).
     pub closed: Vec<bool>,
+    /// One part is closed about all others, its normals inward, and all others are closed: whatever is sent arrives.
+    pub enclosed: bool,
 }
 
 impl Connections {
@@ -41,6 +43,7 @@ impl Connections {
         }
         let mut component = vec![u32::MAX; count];
         let mut closed = Vec::new();
+        let mut rooms = Vec::new();
         let mut queue = VecDeque::new();
         for seed in 0..count {
             if component[seed] != u32::MAX {
@@ -67,11 +70,16 @@ impl Connections {
                 }
             }
             closed.push(whole && volume > 0.0);
+            rooms.extend((whole && volume < 0.0).then_some(id));
         }
+        let enclosed = rooms.len() == 1
+            && closed.iter().filter(|&&closed| !closed).count() == 1
+            && all_within(elements, &component, rooms[0]);
         Self {
             neighbours,
             component,
             closed,
+            enclosed,
         }
     }
 
@@ -92,8 +100,21 @@ impl Connections {
                 .map(|&old| self.component[old as usize])
                 .collect(),
             closed: self.closed.clone(),
+            enclosed: self.enclosed,
         }
     }
+}
+
+/// Whether no element of another part reaches out of the box about this one.
+fn all_within(elements: &Elements, component: &[u32], room: u32) -> bool {
+    let corners = |inside: bool| {
+        (0..elements.len())
+            .filter(move |&e| (component[e] == room) == inside)
+            .flat_map(|e| elements.triangle(e))
+    };
+    let low = corners(true).fold(DVec3::INFINITY, DVec3::min);
+    let high = corners(true).fold(DVec3::NEG_INFINITY, DVec3::max);
+    corners(false).all(|v| v.cmpge(low).all() && v.cmple(high).all())
 }
 
 /// Largest angle of a member's normal to its chart's first normal.

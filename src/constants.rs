@@ -29,6 +29,8 @@ shared! {
     RECEIVE_PARTS = 2;
     RECEIVE_NEAR = 3;
     RECEIVE_KINDS = 4;
+    /// Elements that an invocation sorts: as many share what it loads of each source.
+    SORT_ELEMENTS = 4;
     /// Sources of a batch, at most, whose form factors were kept and need no drawing.
     REPLAYS = 496;
     /// A kept source is shot again once it has this share (one over it) of the power of the strongest source.

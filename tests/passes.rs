@@ -38,8 +38,16 @@ fn scene() -> Build {
     build
 }
 
-fn solver(estimator: Estimator, culling: Culling, shots: u32) -> Solver {
-    let build = scene();
+/// A closed room with a ball that emits.
+fn enclosed() -> Build {
+    let mut build = Build::new();
+    let light = build.material(0.2, 2.0);
+    build.room(DVec3::ZERO, DVec3::new(1.0, 0.9, 1.1), 5, 0);
+    build.sphere(DVec3::new(0.6, 0.35, 0.5), 0.22, 2, true, light);
+    build
+}
+
+fn solver(build: &Build, estimator: Estimator, culling: Culling, shots: u32) -> Solver {
     let settings = Settings {
         estimator,
         culling,
@@ -73,7 +81,7 @@ fn columns(items: &[u32], slots: usize) -> Vec<Vec<u32>> {
 fn item_buffers_equal_rays_and_culling_changes_nothing() {
     let mut first: Option<Vec<u32>> = None;
     for culling in [Culling::Off, Culling::Meshlets, Culling::Triangles] {
-        let mut solver = solver(Estimator::Receiver, culling, 200);
+        let mut solver = solver(&scene(), Estimator::Receiver, culling, 200);
         let mut drawn = Vec::new();
         let mut buffers = Vec::new();
         for _ in 0..8 {
@@ -128,7 +136,7 @@ fn item_buffers_equal_rays_and_culling_changes_nothing() {
 
 #[test]
 fn culling_keeps_every_element_that_owns_a_pixel() {
-    let mut solver = solver(Estimator::Receiver, Culling::Triangles, 6);
+    let mut solver = solver(&scene(), Estimator::Receiver, Culling::Triangles, 6);
     let mut draws = Vec::new();
     solver
         .run_batches(1, |batch| {
@@ -166,9 +174,14 @@ fn culling_keeps_every_element_that_owns_a_pixel() {
 /// One batch of emission: irradiance by the GPU and by the twin from the GPU's own item buffers.
 #[test]
 fn estimators_equal_their_twins() {
-    for estimator in [Estimator::Receiver, Estimator::Pixel] {
+    let mut enclosed_scenes = 0;
+    for (estimator, build) in [
+        (Estimator::Receiver, scene()),
+        (Estimator::Receiver, enclosed()),
+        (Estimator::Pixel, scene()),
+    ] {
         // One batch of sources exactly; the batch after it shoots nothing, so the item buffers are drawn again.
-        let mut solver = solver(estimator, Culling::Triangles, 6);
+        let mut solver = solver(&build, estimator, Culling::Triangles, 6);
         solver.run(|_| true).expect("the batch runs");
         let light = solver.light().expect("the light comes back");
         let elements = &solver.elements;
@@ -184,16 +197,25 @@ fn estimators_equal_their_twins() {
                 reference::item_buffer::item_buffer(elements, &solver.connections, source, FACE);
             let emitted = f64::from(source.emitted.x);
             let sums = reference::bin_pixels::form_factors(elements, source, &items, FACE);
-            for (e, sum) in expected.iter_mut().enumerate() {
-                *sum += emitted
-                    * match estimator {
-                        Estimator::Receiver => {
-                            reference::form_factors::gather(elements, source, &items, FACE, e)
-                        }
-                        Estimator::Pixel => {
-                            reference::bin_pixels::irradiance(source, sums[e], elements.area[e])
-                        }
-                    };
+            let factors: Vec<f64> = (0..elements.len())
+                .map(|e| match estimator {
+                    Estimator::Receiver => {
+                        reference::form_factors::gather(elements, source, &items, FACE, e)
+                    }
+                    Estimator::Pixel => {
+                        reference::bin_pixels::irradiance(source, sums[e], elements.area[e])
+                    }
+                })
+                .collect();
+            let scale = match solver.connections.enclosed {
+                true => {
+                    let elements = elements.area.iter().copied().zip(factors.iter().copied());
+                    reference::normalise::scale(elements, source.area)
+                }
+                false => 1.0,
+            };
+            for (sum, factor) in expected.iter_mut().zip(factors) {
+                *sum += emitted * scale * factor;
             }
         }
         let scale = expected.iter().copied().fold(0.0, f64::max);
@@ -227,6 +249,19 @@ fn estimators_equal_their_twins() {
             (got / want - 1.0).abs() < 2e-3,
             "{estimator:?}: power {got} for {want}"
         );
+        if solver.connections.enclosed {
+            let sent: f64 = chosen
+                .iter()
+                .map(|&s| &solver.sources.list[s as usize])
+                .map(|s| s.area * f64::from(s.emitted.x))
+                .sum();
+            assert!(
+                (got / sent - 1.0).abs() < 1e-6,
+                "{got} of {sent} arrives in an enclosed scene"
+            );
+            enclosed_scenes += 1;
+        }
     }
+    assert_eq!(enclosed_scenes, 1);
     assert_silent();
 }

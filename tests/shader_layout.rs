@@ -103,10 +103,10 @@ fn rust_and_glsl_agree() {
         first_element element_count first_contour contour_count component middle facing part_radius first_part part_count);
     check!(true, Meshlet: centre radius axis cutoff first count component);
     check!(true, Component: low closed high);
-    check!(true, Slot: emitted source reflected);
+    check!(true, Slot: emitted source reflected scale);
     check!(true, View: eye x y w);
     check!(true, Draw: index_count instance_count first_index vertex_offset first_instance);
-    check!(true, KeptRow: chunk first);
+    check!(true, KeptRow: chunk first scale);
     check!(true, ReceiverList: groups_x groups_y groups_z count);
     check!(true, MesoElement: tangent response bitangent scale);
     check!(true, Reflected: sum error);

@@ -148,7 +148,7 @@ void receive_from(uint slot, Slot shot, FLUX f, inout Receiver receiver) {
         send_by_direction(slot, sources[shot.source], receiver.middle, shot.emitted, shot.reflected);
     }
 #endif
-    receive(receiver.received, f, receiver.i, shot.emitted, shot.reflected);
+    receive(receiver.received, shot.scale * f, receiver.i, shot.emitted, shot.reflected);
 }
 
 void main() {
@@ -183,7 +183,7 @@ void main() {
     // Kept ones. Each lane looks up one slot and shares it with the others; slots of which the block sees nothing are passed over.
     for (uint first = fresh_slots; first < slot_count && slots[first].source != NONE; first += LANES) {
         uint mine = first + gl_SubgroupInvocationID;
-        Slot shot = Slot(vec3(0.0), NONE, vec3(0.0));
+        Slot shot = Slot(vec3(0.0), NONE, vec3(0.0), 1.0);
         if (mine < slot_count) {
             shot = slots[mine];
         }
@@ -204,7 +204,8 @@ void main() {
             Slot sent = Slot(
                 subgroupBroadcast(shot.emitted, lane),
                 subgroupBroadcast(shot.source, lane),
-                subgroupBroadcast(shot.reflected, lane)
+                subgroupBroadcast(shot.reflected, lane),
+                subgroupBroadcast(shot.scale, lane)
             );
             for (uint n = 0; n < 2 * PAIRS; n += 2) {
                 uint pair = in_block(n) < GROUP ? words.word[at + in_block(n) / 2] : 0;

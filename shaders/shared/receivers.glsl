@@ -25,6 +25,7 @@ layout(push_constant, scalar) uniform Parameters {
     uint first_element;
     uint element_count;
     uint face_size;
+    uint slot_count;     // of the fresh ones
     // Of form_factors.comp alone:
     uint first_block;
     uint block_count;    // of all elements

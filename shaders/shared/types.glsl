@@ -62,6 +62,7 @@ struct Slot {
     vec3 emitted;
     uint source;
     vec3 reflected;
+    float scale;       // of all its form factors
 };
 
 // VkDispatchIndirectCommand of a list of receivers, and how many they are.
@@ -76,6 +77,7 @@ struct ReceiverList {
 struct KeptRow {
     uint chunk;        // NONE: they are not kept
     uint first;
+    float scale;       // of all of them
 };
 
 // How far the memory for kept form factors is filled.

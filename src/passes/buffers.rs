@@ -26,6 +26,8 @@ pub struct SceneBuffers {
     pub element_count: u32,
     pub source_count: u32,
     pub meshlet_count: u32,
+    /// Whatever is sent arrives: see [`Connections::enclosed`].
+    pub enclosed: bool,
     pub vertices: Buffer,
     /// Three a element, `[element][corner]`.
     pub corners: Buffer,
@@ -106,6 +108,7 @@ impl SceneBuffers {
             element_count: elements.len() as u32,
             source_count: sources.list.len() as u32,
             meshlet_count: meshlets.len() as u32,
+            enclosed: connections.enclosed,
             vertices: upload(device, "vertices", &vertices, BufferUse::Geometry)?,
             corners: upload(device, "corners", &elements.corners, BufferUse::Geometry)?,
             triangles: upload(device, "triangles", &triangles, BufferUse::Storage)?,
@@ -284,6 +287,7 @@ impl Batch {
                 emitted: Vec3::ZERO,
                 source: NONE,
                 reflected: Vec3::ZERO,
+                scale: 1.0,
             };
             (slot_count + replay_slots) as usize
         ];

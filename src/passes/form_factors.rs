@@ -11,7 +11,7 @@ use super::factor_buffers::{FactorBuffers, ReceiverLists};
 use super::relief_buffers::ReliefBuffers;
 use super::types::ReceiverList;
 use super::{groups, shaders};
-use crate::constants::RECEIVE_KINDS;
+use crate::constants::{RECEIVE_KINDS, SORT_ELEMENTS};
 use crate::error::Result;
 use crate::vk::{Bind, Binding, Buffer, Commands, ComputePipeline, DescriptorSet, Device, Stage};
 
@@ -44,6 +44,7 @@ struct Parameters {
     first_element: u32,
     element_count: u32,
     face_size: u32,
+    slot_count: u32,
     first_block: u32,
     block_count: u32,
     slot: u32,
@@ -128,8 +129,8 @@ impl FormFactors {
                 let kinds = pipelines.iter().map(|p| p.bind("form factors", &binds));
                 Ok::<_, crate::error::Error>((sort, kinds.collect::<Result<Vec<_>>>()?))
             };
-        let command = |elements| ReceiverList {
-            groups_x: groups(elements),
+        let command = |elements: u32| ReceiverList {
+            groups_x: groups(elements.div_ceil(SORT_ELEMENTS)),
             groups_y: 0,
             groups_z: 1,
             count: 0,
@@ -180,12 +181,13 @@ impl FormFactors {
             first_element: range.first_element,
             element_count: range.element_count,
             face_size: batch.face_size,
+            slot_count: batch.slot_count,
             first_block: range.first_block,
             block_count: factors.blocks(),
             slot,
         };
         for (i, (range, ..)) in ranges().enumerate() {
-            // Of as many slots as are drawn: a batch of replays alone sorts nothing.
+            // A batch of replays alone sorts nothing.
             let at = (size_of::<ReceiverList>() * i) as u64;
             let push = parameters(range, 0);
             cmd.dispatch_indirect(&self.sort, &range.sort, &push, (&batch.commands, at));

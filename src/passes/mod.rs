@@ -11,6 +11,7 @@ pub mod item_buffer;
 pub mod keep;
 pub mod measure;
 pub mod measure_relief;
+pub mod normalise;
 pub mod pixels_relief;
 pub mod relief;
 pub mod relief_buffers;

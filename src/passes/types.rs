@@ -141,6 +141,8 @@ pub struct Slot {
     pub emitted: Vec3,
     pub source: u32,
     pub reflected: Vec3,
+    /// Of all its form factors.
+    pub scale: f32,
 }
 
 /// The command for a list of receivers, and how many they are.
@@ -155,10 +157,12 @@ pub struct ReceiverList {
 
 /// Where the kept form factors of a source start; `chunk` is `NONE` where they are not kept.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct KeptRow {
     pub chunk: u32,
     pub first: u32,
+    /// Of all of them.
+    pub scale: f32,
 }
 
 /// How far the memory for kept form factors is filled.

@@ -6,6 +6,7 @@ pub mod form_factors;
 pub mod item_buffer;
 pub mod kept;
 pub mod measure;
+pub mod normalise;
 pub mod pixels_relief;
 pub mod relief_rays;
 pub mod relief_visibility;

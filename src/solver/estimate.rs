@@ -13,6 +13,7 @@ use crate::passes::form_factors::{self, FormFactors};
 use crate::passes::gather::{self, Gather, GatherRelief};
 use crate::passes::keep::{self, Keep};
 use crate::passes::measure_relief::MeasureRelief;
+use crate::passes::normalise::Normalise;
 use crate::passes::pixels_relief::{self, PixelsRelief};
 use crate::passes::relief_buffers::ReliefBuffers;
 use crate::passes::send_relief::SendRelief;
@@ -22,6 +23,8 @@ use crate::vk::{Commands, DescriptorSet, Device, Stage};
 pub(super) enum Estimate {
     Receivers {
         form_factors: (FormFactors, form_factors::Sets),
+        /// In enclosed scenes.
+        normalise: Option<(Normalise, DescriptorSet)>,
         /// None where nothing is to be kept.
         keep: Option<(Keep, keep::Sets)>,
         gather: GatherBy,
@@ -60,6 +63,14 @@ impl Estimate {
         };
         let form_factors = FormFactors::new(device, on.relief.is_some())?;
         let sets = form_factors.bind(device, scene, batch, factors, on.relief)?;
+        let normalise = match scene.enclosed {
+            true => {
+                let normalise = Normalise::new(device)?;
+                let set = normalise.bind(scene, batch, factors)?;
+                Some((normalise, set))
+            }
+            false => None,
+        };
         let keep = match factors.keeps() {
             true => {
                 let keep = Keep::new(device)?;
@@ -82,6 +93,7 @@ impl Estimate {
         };
         Ok(Self::Receivers {
             form_factors: (form_factors, sets),
+            normalise,
             keep,
             gather,
         })
@@ -93,6 +105,7 @@ impl Estimate {
             (
                 Self::Receivers {
                     form_factors: (form_factors, sets),
+                    normalise,
                     keep,
                     gather,
                 },
@@ -102,6 +115,10 @@ impl Estimate {
                 cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
                 form_factors.record(cmd, sets, batch, factors);
                 cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+                if let Some((normalise, set)) = normalise {
+                    normalise.record(cmd, set, batch, factors);
+                    cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+                }
                 found();
                 gather.record(cmd, batch, on, (factors, relief));
                 if let Some((keep, sets)) = keep {

@@ -52,7 +52,7 @@ fn key(scene: &Scene, settings: &Settings) -> String {
     hash.update(unlit.hash());
     let flat = settings.relief.transport == Transport::Lambert;
     let (size, seed, grouping) = (settings.hemicube, settings.seed, settings.grouping);
-    hash.update(format!("1 {size} {seed} {grouping:?} {flat}"));
+    hash.update(format!("2 {size} {seed} {grouping:?} {flat}"));
     hexadecimal(hash)
 }
 
@@ -168,7 +168,7 @@ impl Visibility {
         {
             return Err(bad("its length is not what its header says"));
         }
-        let mut rows = vec![KeptRow { chunk: 0, first: 0 }; header.rows];
+        let mut rows = vec![bytemuck::Zeroable::zeroed(); header.rows];
         read(bytemuck::cast_slice_mut(&mut rows))?;
         let mut chunks = Vec::new();
         for &count in &header.words {

@@ -1,0 +1,60 @@
+//! Scales form factors so that all that a source sends in an enclosed scene arrives. Shader: `normalise.comp`; twin:
+//! [`crate::reference::normalise`].
+
+use std::sync::Arc;
+
+use super::buffers::{Batch, SceneBuffers};
+use super::factor_buffers::FactorBuffers;
+use super::shaders;
+use crate::error::Result;
+use crate::vk::{Bind, Binding, Commands, ComputePipeline, DescriptorSet, Device};
+
+pub struct Normalise {
+    pipeline: ComputePipeline,
+}
+
+impl Normalise {
+    pub fn new(device: &Arc<Device>) -> Result<Self> {
+        Ok(Self {
+            pipeline: ComputePipeline::new(
+                device,
+                "normalise",
+                shaders::NORMALISE_COMP,
+                &[Binding::Storage; 5],
+                8,
+                &[],
+                false,
+            )?,
+        })
+    }
+
+    pub fn bind(
+        &self,
+        scene: &SceneBuffers,
+        batch: &Batch,
+        factors: &FactorBuffers,
+    ) -> Result<DescriptorSet> {
+        self.pipeline.bind(
+            "normalise",
+            &[
+                &batch.slots,
+                &scene.sources,
+                &scene.areas,
+                &factors.fresh,
+                &factors.fresh_meso,
+            ]
+            .map(Bind::Buffer),
+        )
+    }
+
+    pub fn record(
+        &self,
+        cmd: &Commands,
+        set: &DescriptorSet,
+        batch: &Batch,
+        factors: &FactorBuffers,
+    ) {
+        let counts = [factors.plain_count, factors.meso_count];
+        cmd.dispatch(&self.pipeline, set, &counts, [batch.slot_count, 1, 1]);
+    }
+}
