@@ -1,6 +1,8 @@
 //! Small scenes and the device for the tests. Validation is on: one message fails the test that saw it.
 #![allow(dead_code)]
 
+pub mod sheet;
+
 use std::path::Path;
 use std::sync::Arc;
 
