@@ -1,6 +1,7 @@
 //! Small scenes and the device for the tests. Validation is on: one message fails the test that saw it.
 #![allow(dead_code)]
 
+pub mod random;
 pub mod sheet;
 
 use std::f64::consts::PI;
