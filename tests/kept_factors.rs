@@ -4,9 +4,10 @@ mod common;
 
 use common::{Build, assert_silent, device};
 use glam::{DVec3, Vec3};
+use mesolux::bake;
 use mesolux::directions::Directions;
 use mesolux::meso::{Options, Transport};
-use mesolux::solver::{Light, Report, Settings, Solver, Visibility};
+use mesolux::solver::{Light, Report, Settings, Visibility};
 
 /// Unshot light that each solution leaves, as a share of all. It lands on elements as large as any other, and half of it and
 /// the rounding of sums in another order are what two solutions differ by.
@@ -24,9 +25,7 @@ fn scene(relief: bool) -> Build {
         build.relief(material, 8, |x, y| 0.03 * wave(x) * wave(y));
     }
     let sides = build.room(DVec3::ZERO, DVec3::ONE, 3, 0);
-    for t in &mut build.scene.triangles[sides[0].clone()] {
-        t.material = material;
-    }
+    build.paint(sides[0].clone(), material);
     build.uv(sides[0].clone(), 0.25 * DVec3::X, 0.25 * DVec3::Z);
     let ball = build.sphere(DVec3::new(0.5, 0.4, 0.5), 0.2, 1, true, material);
     build.uv(ball, DVec3::new(0.2, 0.05, 0.0), DVec3::new(0.0, 0.1, 0.2));
@@ -36,26 +35,28 @@ fn scene(relief: bool) -> Build {
     build
 }
 
-fn solve(relief: bool, visibility_memory: Option<u64>) -> (Light, Report) {
-    let build = scene(relief);
-    let settings = Settings {
+fn settings() -> Settings {
+    Settings {
         hemicube: 32,
         batch: 6,
         residual: RESIDUAL,
-        visibility_memory,
         relief: Options {
             transport: Transport::Physical,
             directions: Directions::new(32).expect("a number of the paper"),
             cache: None,
         },
         ..Settings::default()
+    }
+}
+
+fn solve(relief: bool, visibility_memory: Option<u64>) -> (Light, Report) {
+    let settings = Settings {
+        visibility_memory,
+        ..settings()
     };
-    let device = device();
-    let elements = mesolux::bake::elements(&device, &build.scene, &settings)
-        .expect("the relief fits the device");
-    let mut solver = Solver::new(&device, elements, &build.scene.point_lights, &settings)
-        .expect("the scene fits the device");
-    solver.run(|_| true).expect("it runs");
+    let scene = scene(relief).0.scene;
+    let solver =
+        bake::solve(&device(), &scene, &settings, None, |_| true).expect("the scene is solved");
     let light = solver.light().expect("the light comes back");
     (light, solver.report().clone())
 }
@@ -127,20 +128,6 @@ fn relit_scene() -> Build {
     build
 }
 
-fn settings() -> Settings {
-    Settings {
-        hemicube: 32,
-        batch: 6,
-        residual: RESIDUAL,
-        relief: Options {
-            transport: Transport::Physical,
-            directions: Directions::new(32).expect("a number of the paper"),
-            cache: None,
-        },
-        ..Settings::default()
-    }
-}
-
 #[test]
 fn relighting_equals_a_bake_of_the_same_groups_and_draws_point_lights_alone() {
     let device = device();
@@ -149,8 +136,7 @@ fn relighting_equals_a_bake_of_the_same_groups_and_draws_point_lights_alone() {
     let folder = tempfile::tempdir().expect("a folder for the test");
     let path = folder.path().join("room.visibility");
     let solve = |scene, kept: Option<&Visibility>| {
-        mesolux::bake::solve(&device, scene, &settings(), kept, |_| true)
-            .expect("the scene is solved")
+        bake::solve(&device, scene, &settings(), kept, |_| true).expect("the scene is solved")
     };
     let dark = {
         let solver = solve(&first, None);
@@ -193,7 +179,7 @@ fn kept_form_factors_of_something_else_are_refused() {
     let device = device();
     let scene = scene(false).0.scene;
     let solve = |scene: &mesolux::scene::Scene, settings: &Settings, kept: Option<&Visibility>| {
-        mesolux::bake::solve(&device, scene, settings, kept, |_| true)
+        bake::solve(&device, scene, settings, kept, |_| true)
     };
     let quick = Settings {
         residual: 0.1,

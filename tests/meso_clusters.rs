@@ -2,13 +2,12 @@
 
 mod common;
 
-use common::Build;
+use common::sheet::{light_on, parallel, sheet};
 use glam::{DVec3, Vec3};
 use mesolux::constants::MOST_CLUSTERS;
 use mesolux::directions::Directions;
 use mesolux::meso::{Cluster, FaceClusters, MesoVertices, NEAR_PARALLEL_COS, clusters};
 use mesolux::scene::Scene;
-use mesolux::solution::DirectionalLight;
 
 /// What sums of some hundred f32 lose, thrice over.
 const ROUNDING: f64 = 1e-5;
@@ -111,47 +110,11 @@ fn many_directions_are_laid_together() {
     assert!(given.distance(carried) < ROUNDING * given.length());
 }
 
-/// A sheet of n × n cells over 0..1 × 0..1, bent to z = −bend · (x² + y²) about its middle, its texture along x and y.
-fn sheet(n: u32, bend: f64) -> Scene {
-    let mut build = Build::new();
-    let relief = build.material(0.7, 0.0);
-    let cells = build.quad(DVec3::ZERO, DVec3::X, DVec3::Y, (n, n), relief);
-    build.uv(cells, DVec3::X, DVec3::Y);
-    for v in &mut build.scene.vertices {
-        let (x, y) = (v.x - 0.5, v.y - 0.5);
-        v.z = -bend * (x * x + y * y);
-    }
-    build.0.scene
-}
-
 /// The faces' clusters under parallel light.
 fn lit(scene: &Scene, directions: &Directions, towards: DVec3, strength: Vec3) -> FaceClusters {
-    let frames: Vec<[DVec3; 3]> = scene
-        .triangles
-        .iter()
-        .map(|t| {
-            let [a, b, c] = scene.corners(t);
-            let normal = (b - a).cross(c - a).normalize();
-            let tangent = (DVec3::X - normal * normal.x).normalize();
-            [tangent, normal.cross(tangent), normal]
-        })
-        .collect();
-    let moments = |frame: &[DVec3; 3]| {
-        let local = DVec3::from(frame.map(|axis| axis.dot(towards)));
-        let mut moments = vec![[Vec3::ZERO; 3]; directions.count()];
-        moments[directions.slot_of(local)] = strength.to_array().map(|s| s * local.as_vec3());
-        moments
-    };
-    let light = DirectionalLight {
-        elements: (0..frames.len() as u32).collect(),
-        directions: (0..directions.count())
-            .map(|k| directions.centre(k))
-            .collect(),
-        incident_moment: frames.iter().flat_map(moments).collect(),
-        incident_moment_direct: Vec::new(),
-        exitant: Vec::new(),
-        frames: frames.iter().map(|f| f.map(|v| v.as_vec3())).collect(),
-    };
+    let light = light_on(scene, directions, |frame| {
+        parallel(directions, frame, towards, strength)
+    });
     let vertices = MesoVertices::new(scene, &light);
     let gathered = vertices.gather(directions, &light, &light.incident_moment);
     let faces: Vec<_> = (0..light.elements.len() as u32)

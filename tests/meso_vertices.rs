@@ -2,53 +2,12 @@
 
 mod common;
 
-use common::Build;
+use common::sheet::{light_on, parallel, sheet};
 use glam::{DVec3, Vec3};
 use mesolux::directions::Directions;
 use mesolux::meso::MesoVertices;
 use mesolux::scene::Scene;
 use mesolux::solution::DirectionalLight;
-
-/// A sheet of n × n cells over 0..1 × 0..1, bent to z = −bend · (x² + y²) about its middle, with its texture along x and y.
-fn sheet(n: u32, bend: f64) -> Scene {
-    let mut build = Build::new();
-    let relief = build.material(0.7, 0.0);
-    let cells = build.quad(DVec3::ZERO, DVec3::X, DVec3::Y, (n, n), relief);
-    build.uv(cells, DVec3::X, DVec3::Y);
-    for v in &mut build.scene.vertices {
-        let (x, y) = (v.x - 0.5, v.y - 0.5);
-        v.z = -bend * (x * x + y * y);
-    }
-    build.0.scene
-}
-
-/// The sheet's elements under a light that `moments` tells by the element's frame, `[slot][colour]`.
-fn lit(
-    scene: &Scene,
-    directions: &Directions,
-    moments: impl Fn([DVec3; 3]) -> Vec<[Vec3; 3]>,
-) -> DirectionalLight {
-    let frames: Vec<[DVec3; 3]> = scene
-        .triangles
-        .iter()
-        .map(|t| {
-            let [a, b, c] = scene.corners(t);
-            let normal = (b - a).cross(c - a).normalize();
-            let tangent = (DVec3::X - normal * normal.x).normalize();
-            [tangent, normal.cross(tangent), normal]
-        })
-        .collect();
-    DirectionalLight {
-        elements: (0..frames.len() as u32).collect(),
-        directions: (0..directions.count())
-            .map(|k| directions.centre(k))
-            .collect(),
-        incident_moment: frames.iter().flat_map(|&f| moments(f)).collect(),
-        incident_moment_direct: Vec::new(),
-        exitant: Vec::new(),
-        frames: frames.iter().map(|f| f.map(|v| v.as_vec3())).collect(),
-    }
-}
 
 fn world(frame: [Vec3; 3], v: Vec3) -> Vec3 {
     frame[0] * v.x + frame[1] * v.y + frame[2] * v.z
@@ -63,11 +22,8 @@ fn parallel_light_is_the_same_vector_in_every_frame() {
     let strength = Vec3::new(1.0, 2.0, 0.0);
     for k in [16, 32, 64] {
         let directions = Directions::new(k).expect("a number of the paper");
-        let light = lit(&scene, &directions, |[t, b, n]| {
-            let local = DVec3::new(t.dot(towards), b.dot(towards), n.dot(towards));
-            let mut moments = vec![[Vec3::ZERO; 3]; directions.count()];
-            moments[directions.slot_of(local)] = strength.to_array().map(|s| s * local.as_vec3());
-            moments
+        let light = light_on(&scene, &directions, |frame| {
+            parallel(&directions, frame, towards, strength)
         });
         let vertices = MesoVertices::new(&scene, &light);
         assert_eq!(
@@ -105,7 +61,7 @@ fn parallel_light_is_the_same_vector_in_every_frame() {
 fn slots_of_a_plane_stay_apart() {
     let scene = sheet(2, 0.0);
     let directions = Directions::new(64).expect("a number of the paper");
-    let mut light = lit(&scene, &directions, |_| {
+    let mut light = light_on(&scene, &directions, |_| {
         (0..64)
             .map(|k| [directions.centre(k).as_vec3(); 3])
             .collect()
@@ -151,23 +107,23 @@ fn seams_part_vertices() {
     let whole = sheet(2, 0.0);
     let count =
         |scene: &Scene, light: &DirectionalLight| MesoVertices::new(scene, light).frames.len();
-    assert_eq!(count(&whole, &lit(&whole, &directions, up)), 9);
+    assert_eq!(count(&whole, &light_on(&whole, &directions, up)), 9);
     let mut other = whole.clone();
     other.materials.push(other.materials[1].clone());
     for t in &mut other.triangles[..4] {
         t.material = 2;
     }
-    assert_eq!(count(&other, &lit(&other, &directions, up)), 12);
-    let mut light = lit(&whole, &directions, up);
+    assert_eq!(count(&other, &light_on(&other, &directions, up)), 12);
+    let mut light = light_on(&whole, &directions, up);
     for frame in &mut light.frames[..4] {
         *frame = [frame[1], -frame[0], frame[2]];
     }
     assert_eq!(count(&whole, &light), 12);
-    let mut mirrored = lit(&whole, &directions, up);
+    let mut mirrored = light_on(&whole, &directions, up);
     for frame in &mut mirrored.frames[..4] {
         frame[1] = -frame[1];
     }
     assert_eq!(count(&whole, &mirrored), 12);
     let creased = sheet(2, 4.0);
-    assert!(count(&creased, &lit(&creased, &directions, up)) > 9);
+    assert!(count(&creased, &light_on(&creased, &directions, up)) > 9);
 }

@@ -55,17 +55,8 @@ fn room() -> Scene {
     build.scene.materials[floor as usize].kd = [0.3, 0.5, 0.8];
     build.relief(floor, TEXELS, |x, y| 0.12 * REPEAT * bumps(x, y));
     let sides = build.room(DVec3::ZERO, DVec3::splat(2.0), 16, white);
-    build.uv(sides[0].clone(), DVec3::Z * REPEAT, DVec3::X * REPEAT);
-    for t in &mut build.scene.triangles[sides[0].clone()] {
-        t.material = floor;
-        // Corners of the repeats in the middle of texels, so that `displace` cuts along the cells of the bilinear map.
-        for uv in &mut t.uv {
-            *uv = uv.map(|x| x + 0.5 / TEXELS as f32);
-        }
-    }
-    for t in &mut build.scene.triangles[sides[2].clone()] {
-        t.material = red;
-    }
+    build.cover(sides[0].clone(), floor, (DVec3::Z, DVec3::X));
+    build.paint(sides[2].clone(), red);
     // Low enough that bumps throw shadows: 27 to 50 degrees above the floor's middle.
     let corner = DVec3::new(1.98, 0.5, 0.7);
     build.quad(corner, DVec3::Z * 0.7, DVec3::Y * 0.7, (3, 3), lamp);

@@ -6,11 +6,13 @@ mod common;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::time::Duration;
 
+use common::random::Random;
 use common::{Build, assert_silent, device};
 use glam::{DVec3, Vec3A};
+use mesolux::bake::solve;
 use mesolux::directions::{Directions, FineCell};
 use mesolux::meso::{Options, Transport};
-use mesolux::solver::{Settings, Solver};
+use mesolux::solver::Settings;
 use obvhs::BvhBuildParams;
 use obvhs::cwbvh::CwBvh;
 use obvhs::cwbvh::builder::build_cwbvh_from_tris;
@@ -132,27 +134,14 @@ impl Mesh {
             if cosine > 0.0 && self.hit(above, light).is_none() {
                 sum += carried * f64::from(cosine / light.z);
             }
-            let (s, c) = (TAU * random.next()).sin_cos();
-            let u = random.next();
+            let (s, c) = (TAU * random.unit()).sin_cos();
+            let u = random.unit();
             let (t, b) = n.any_orthonormal_pair();
             let flat = u.sqrt();
             direction = t * (flat * c) as f32 + b * (flat * s) as f32 + n * (1.0 - u).sqrt() as f32;
             from = above;
         }
         sum
-    }
-}
-
-/// SplitMix64, Steele et al. 2014.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 }
 
@@ -196,12 +185,8 @@ fn baked(
         },
         ..Settings::default()
     };
-    let device = device();
-    let elements = mesolux::bake::elements(&device, &build.scene, &settings)
-        .expect("the relief fits the device");
-    let mut solver = Solver::new(&device, elements, &build.scene.point_lights, &settings)
-        .expect("the scene fits the device");
-    solver.run(|_| true).expect("the device solves the scene");
+    let solver = solve(&device(), &build.scene, &settings, None, |_| true)
+        .expect("the device solves the scene");
     let solved = solver.light().expect("the device gives the solution");
     assert_silent();
     let relief = solved.relief.expect("the plate has one");
@@ -254,7 +239,7 @@ fn traced(
             let (mut sum, mut squares, mut cell, mut passed) = (0.0, 0.0, 0, 0.0);
             for i in 0..paths {
                 // Stratified over the cells by their weights.
-                let target = (i as f64 + random.next()) / paths as f64 * total;
+                let target = (i as f64 + random.unit()) / paths as f64 * total;
                 while cell + 1 < cells.len() && passed + cells[cell].1 < target {
                     passed += cells[cell].1;
                     cell += 1;
@@ -284,7 +269,7 @@ fn plate_sends_what_its_displaced_mesh_sends() {
         for light in lights() {
             let ours = mean_of_elements(&baked(directions, light, 4.0, 4));
             let truth = traced(&mesh, directions, light, PATHS, |random| {
-                Vec3A::new(random.next() as f32, random.next() as f32, 0.0)
+                Vec3A::new(random.unit() as f32, random.unit() as f32, 0.0)
             });
             let (mut s2, mut s1, mut e) = (0.0, 0.0, 0.0);
             for (ours, (truth, error)) in ours.iter().zip(&truth) {
@@ -330,8 +315,8 @@ fn elements_of_a_plate_send_what_their_part_of_the_mesh_sends() {
         let (mut o, mut t, mut e) = (0.0, 0.0, 0.0);
         for ([a, b, c], sent) in &plate {
             let truth = traced(&mesh, directions, light, PART_PATHS, |random| {
-                let s = random.next().sqrt();
-                let t = random.next();
+                let s = random.unit().sqrt();
+                let t = random.unit();
                 (*a + (*b - *a) * (s * (1.0 - t)) + (*c - *a) * (s * t)).as_vec3a()
             });
             for ((sent, mean), (truth, error)) in sent.iter().zip(&mean).zip(truth) {

@@ -3,7 +3,6 @@
 
 mod common;
 
-use std::f64::consts::PI;
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -80,14 +79,7 @@ fn room(relief: bool, lamp_side: f64) -> Scene {
         build.relief(floor, TEXELS, |x, y| 0.12 * REPEAT * bumps(x, y));
     }
     let sides = build.room(DVec3::ZERO, DVec3::splat(2.0), 4, white);
-    // Corners of repeats in the middle of texels: `displace` cuts along the cells of the bilinear map.
-    build.uv(sides[0].clone(), DVec3::Z * REPEAT, DVec3::X * REPEAT);
-    for t in &mut build.scene.triangles[sides[0].clone()] {
-        t.material = floor;
-        for uv in &mut t.uv {
-            *uv = uv.map(|x| x + 0.5 / TEXELS as f32);
-        }
-    }
+    build.cover(sides[0].clone(), floor, (DVec3::Z, DVec3::X));
     build.quad(
         DVec3::new(0.3, 1.98, 0.6),
         DVec3::X * lamp_side,
@@ -200,20 +192,7 @@ fn ball(cells: u32) -> Scene {
         (2, 2),
         lamp,
     );
-    let first = build.scene.vertices.len();
-    let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
-    for [u, v] in [[x, y], [y, x], [y, z], [z, y], [z, x], [x, z]] {
-        let side = build.quad(0.5 * (u.cross(v) - u - v), u, v, (cells, cells), skin);
-        build.uv(side.clone(), u, v);
-        for t in &mut build.scene.triangles[side] {
-            t.uv = t.uv.map(|uv| uv.map(|a| a + 0.5));
-        }
-    }
-    for place in &mut build.scene.vertices[first..] {
-        let even = place.to_array().map(|a| (0.5 * PI * a).tan());
-        *place = DVec3::ONE + 0.25 * DVec3::from_array(even).normalize();
-    }
-    build.weld();
+    build.cube_sphere(DVec3::ONE, 0.25, cells, skin);
     build.0.scene
 }
 

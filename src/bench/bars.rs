@@ -4,8 +4,8 @@ use std::path::Path;
 
 use plotters::prelude::*;
 
-use crate::atomic_file::write_atomically;
-use crate::error::{Error, Result};
+use super::lines::{Canvas, Drawn, write_svg};
+use crate::error::Result;
 
 /// One bar: its group, its kind, its height, and the ends of its spread.
 pub struct Bar {
@@ -27,25 +27,20 @@ pub struct Bars<'a> {
 
 impl Bars<'_> {
     pub fn write(&self, path: &Path) -> Result<()> {
-        let mut svg = String::new();
-        self.draw(&mut svg)
-            .map_err(|e| Error::file(path, format!("cannot be drawn: {e}")))?;
-        write_atomically(path, |out| out.write_all(svg.as_bytes()))
+        let width = 320 + 260 * self.groups.len().max(2) as u32;
+        write_svg(path, (width, 480), |root| self.draw(root))
     }
 
-    fn draw(&self, svg: &mut String) -> std::result::Result<(), Box<dyn std::error::Error>> {
+    fn draw(&self, root: &Canvas<'_>) -> Drawn {
         let highest = self
             .bars
             .iter()
             .map(|b| b.spread.map_or(b.value, |s| s.1))
             .fold(1.0, f64::max);
         let count = self.groups.len();
-        let width = 320 + 260 * count.max(2) as u32;
-        let root = SVGBackend::with_string(svg, (width, 480)).into_drawing_area();
-        root.fill(&WHITE)?;
         // The legend stands above the bars, a twelfth of their height a line.
         let room = 1.0 + 0.08 * self.kinds.len().max(5) as f64;
-        let mut chart = ChartBuilder::on(&root)
+        let mut chart = ChartBuilder::on(root)
             .caption(self.caption, ("sans-serif", 22))
             .margin(12)
             .x_label_area_size(34)
@@ -95,7 +90,6 @@ impl Bars<'_> {
             .background_style(WHITE.mix(0.8))
             .border_style(BLACK.mix(0.3))
             .draw()?;
-        root.present()?;
         Ok(())
     }
 }

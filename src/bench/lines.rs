@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use crate::atomic_file::write_atomically;
@@ -28,13 +29,10 @@ impl Lines<'_> {
     /// # Errors
     /// A file that cannot be written; a chart that cannot be drawn.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let mut svg = String::new();
-        self.draw(&mut svg)
-            .map_err(|e| Error::file(path, format!("cannot be drawn: {e}")))?;
-        write_atomically(path, |out| out.write_all(svg.as_bytes()))
+        write_svg(path, (820, 540), |root| self.draw(root))
     }
 
-    fn draw(&self, svg: &mut String) -> std::result::Result<(), Box<dyn std::error::Error>> {
+    fn draw(&self, root: &Canvas<'_>) -> Drawn {
         let points = || self.lines.iter().flat_map(|l| l.points.iter().copied());
         let ends = |values: &mut dyn Iterator<Item = f64>| {
             let (low, high) = values.fold((f64::INFINITY, 0.0), |(l, h), v| (v.min(l), v.max(h)));
@@ -46,9 +44,7 @@ impl Lines<'_> {
         };
         let x = ends(&mut points().map(|p| p.0));
         let y = ends(&mut points().map(|p| p.1));
-        let root = SVGBackend::with_string(svg, (820, 540)).into_drawing_area();
-        root.fill(&WHITE)?;
-        let mut chart = ChartBuilder::on(&root)
+        let mut chart = ChartBuilder::on(root)
             .caption(self.caption, ("sans-serif", 22))
             .margin(14)
             .x_label_area_size(44)
@@ -85,9 +81,34 @@ impl Lines<'_> {
             .background_style(WHITE.mix(0.85))
             .border_style(BLACK.mix(0.3))
             .draw()?;
-        root.present()?;
         Ok(())
     }
+}
+
+/// What a chart is drawn on.
+pub(super) type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+pub(super) type Drawn = std::result::Result<(), Box<dyn std::error::Error>>;
+
+/// Writes what is drawn on a white ground of so many pixels as SVG.
+///
+/// # Errors
+/// A file that cannot be written; a chart that cannot be drawn.
+pub(super) fn write_svg(
+    path: &Path,
+    size: (u32, u32),
+    draw: impl FnOnce(&Canvas<'_>) -> Drawn,
+) -> Result<()> {
+    let mut svg = String::new();
+    let drawn = || -> Drawn {
+        let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
+        root.fill(&WHITE)?;
+        draw(&root)?;
+        root.present()?;
+        Ok(())
+    };
+    drawn().map_err(|e| Error::file(path, format!("cannot be drawn: {e}")))?;
+    write_atomically(path, |out| out.write_all(svg.as_bytes()))
 }
 
 /// A label: thousands as k, millions as M.

@@ -1,12 +1,11 @@
 //! A room whose floor is one of a few reliefs, and views of it: what pictures of relief are judged by.
 
-use std::collections::HashMap;
-use std::ops::Range;
 use std::sync::Arc;
 
 use glam::DVec3;
 
-use crate::scene::{Camera, HeightMap, Material, Scene, Texture, Triangle};
+use super::stress::shapes::Shapes;
+use crate::scene::{Camera, HeightMap, Material, Scene, Texture};
 
 /// Scene units of a repeat of the reliefs.
 pub const REPEAT: f64 = 0.25;
@@ -27,35 +26,36 @@ pub struct Case {
     pub mirrored: bool,
 }
 
+const FLAT: Case = Case {
+    name: "flat",
+    height: |_, _| 0.0,
+    colour: [0.5; 3],
+    lowest: None,
+    mirrored: false,
+};
+
 /// The flat floor, which shows what is not the relief's own error, and three reliefs.
 pub const CASES: [Case; 4] = [
-    Case {
-        name: "flat",
-        height: |_, _| 0.0,
-        colour: [0.5; 3],
-        lowest: None,
-        mirrored: false,
-    },
+    FLAT,
     Case {
         name: "bricks",
         height: |x, y| 0.06 * brick(x, y),
         colour: [0.7, 0.3, 0.2],
         lowest: Some([0.5, 0.5, 0.45]),
-        mirrored: false,
+        ..FLAT
     },
     Case {
         name: "bumps",
         height: |x, y| 0.12 * bumps(x, y),
         colour: [0.3, 0.5, 0.8],
-        lowest: None,
         mirrored: true,
+        ..FLAT
     },
     Case {
         name: "noise",
         height: |x, y| 0.15 * noise(x, y),
         colour: [0.5, 0.7, 0.3],
-        lowest: None,
-        mirrored: false,
+        ..FLAT
     },
 ];
 
@@ -147,7 +147,7 @@ pub fn room(case: &Case) -> Scene {
             }),
         }));
     }
-    let mut scene = Scene {
+    let scene = Scene {
         name: case.name.into(),
         materials: vec![
             material("white", [0.4; 3], 0.0),
@@ -157,28 +157,26 @@ pub fn room(case: &Case) -> Scene {
         ],
         ..Scene::default()
     };
-    let (x, y, z) = (2.0 * DVec3::X, 4.0 * DVec3::Y, 2.0 * DVec3::Z);
-    let below = wall(&mut scene, DVec3::ZERO, [z, x], 8, 3);
-    for (origin, sides, material) in [
-        (y, [x, z], 0),
-        (DVec3::ZERO, [y, z], 1),
-        (x, [z, y], 0),
-        (DVec3::ZERO, [x, y], 0),
-        (z, [y, x], 0),
-    ] {
-        wall(&mut scene, origin, sides, 8, material);
+    let mut shapes = Shapes { scene };
+    let [white, red, lamp, floor] = [0, 1, 2, 3];
+    let size = DVec3::new(2.0, 4.0, 2.0);
+    let [below, _, left, ..] = shapes.room(DVec3::ZERO, size, 8, white);
+    for triangle in &mut shapes.scene.triangles[left] {
+        triangle.material = red;
     }
     let corner = DVec3::new(0.1, 3.98, 0.3);
-    wall(&mut scene, corner, [DVec3::X, DVec3::Z], 3, 2);
+    shapes.quad(corner, DVec3::X, DVec3::Z, (3, 3), lamp);
     let turned = if case.mirrored { -1.0 } else { 1.0 };
-    for triangle in &mut scene.triangles[below] {
+    for triangle in &mut shapes.scene.triangles[below] {
+        triangle.material = floor;
         triangle.uv = triangle.vertices.map(|v| {
-            let at = scene.vertices[v as usize] / REPEAT;
+            let at = shapes.scene.vertices[v as usize] / REPEAT;
             // Corners of the repeats lie in the middle of texels, so that `displace` cuts along the cells of the map.
             [at.z, turned * at.x].map(|a| a as f32 + 0.5 / TEXELS as f32)
         });
     }
-    weld(&mut scene);
+    shapes.weld();
+    let mut scene = shapes.scene;
     let middle = DVec3::new(1.0, 0.0, 1.0);
     let [steep, oblique, grazing] = ANGLES;
     scene.cameras = vec![
@@ -195,54 +193,4 @@ fn texels<T>(value: impl Fn(f64, f64) -> T) -> Vec<T> {
     (0..TEXELS * TEXELS)
         .map(|i| value(centre(i % TEXELS), 1.0 - centre(i / TEXELS)))
         .collect()
-}
-
-/// A parallelogram of n × n cells that faces `u` × `v`.
-fn wall(
-    scene: &mut Scene,
-    origin: DVec3,
-    [u, v]: [DVec3; 2],
-    n: u32,
-    material: u32,
-) -> Range<usize> {
-    let first = scene.triangles.len();
-    let base = scene.vertices.len() as u32;
-    let along = |i: u32| f64::from(i) / f64::from(n);
-    for j in 0..=n {
-        let places = (0..=n).map(|i| origin + u * along(i) + v * along(j));
-        scene.vertices.extend(places);
-    }
-    for j in 0..n {
-        for i in 0..n {
-            let a = base + j * (n + 1) + i;
-            let (b, c, d) = (a + 1, a + n + 2, a + n + 1);
-            // Diagonals alternate, so that the grid has no grain.
-            let halves = match (i + j) % 2 {
-                0 => [[a, b, c], [a, c, d]],
-                _ => [[a, b, d], [b, c, d]],
-            };
-            scene.triangles.extend(halves.map(|vertices| Triangle {
-                vertices,
-                uv: [[0.0; 2]; 3],
-                material,
-            }));
-        }
-    }
-    first..scene.triangles.len()
-}
-
-/// Joins equal positions, as reading a file does.
-fn weld(scene: &mut Scene) {
-    let mut places = HashMap::new();
-    let mut vertices = Vec::new();
-    for v in scene.triangles.iter_mut().flat_map(|t| &mut t.vertices) {
-        let place = scene.vertices[*v as usize];
-        *v = *places
-            .entry(place.to_array().map(f64::to_bits))
-            .or_insert_with(|| {
-                vertices.push(place);
-                vertices.len() as u32 - 1
-            });
-    }
-    scene.vertices = vertices;
 }

@@ -1,10 +1,16 @@
 //! Small scenes and the device for the tests. Validation is on: one message fails the test that saw it.
 #![allow(dead_code)]
 
+pub mod random;
+pub mod sheet;
+
+use std::f64::consts::PI;
+use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
+use mesolux::bench::relief_room::{REPEAT, TEXELS};
 use mesolux::bench::stress::shapes::Shapes;
 use mesolux::elements::Elements;
 use mesolux::render::{Picture, side_by_side};
@@ -66,6 +72,46 @@ impl Build {
         Self(Shapes { scene })
     }
 
+    /// Gives triangles another material.
+    pub fn paint(&mut self, triangles: Range<usize>, material: u32) {
+        for t in &mut self.scene.triangles[triangles] {
+            t.material = material;
+        }
+    }
+
+    /// Gives triangles a material and texture coordinates, one repeat each [`REPEAT`] along two directions.
+    ///
+    /// Corners of the texture's repeats lie in the middle of texels, so that `displace` cuts along the cells of the bilinear
+    /// map.
+    pub fn cover(&mut self, triangles: Range<usize>, material: u32, (u, v): (DVec3, DVec3)) {
+        self.uv(triangles.clone(), u * REPEAT, v * REPEAT);
+        for t in &mut self.scene.triangles[triangles.clone()] {
+            for uv in &mut t.uv {
+                *uv = uv.map(|x| x + 0.5 / TEXELS as f32);
+            }
+        }
+        self.paint(triangles, material);
+    }
+
+    /// A ball made of a cube of n × n cells a side, facing outward, one repeat of the texture a side.
+    pub fn cube_sphere(&mut self, centre: DVec3, radius: f64, n: u32, material: u32) {
+        let first = self.scene.vertices.len();
+        let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+        for [u, v] in [[x, y], [y, x], [y, z], [z, y], [z, x], [x, z]] {
+            let side = self.quad(0.5 * (u.cross(v) - u - v), u, v, (n, n), material);
+            self.uv(side.clone(), u, v);
+            for t in &mut self.scene.triangles[side] {
+                t.uv = t.uv.map(|uv| uv.map(|a| a + 0.5));
+            }
+        }
+        for place in &mut self.scene.vertices[first..] {
+            // Cells of equal angles.
+            let even = place.to_array().map(|a| (0.5 * PI * a).tan());
+            *place = centre + radius * DVec3::from_array(even).normalize();
+        }
+        self.weld();
+    }
+
     pub fn solve(&self, settings: &Settings) -> Solved {
         let device = device();
         let elements = mesolux::bake::elements(&device, &self.scene, settings)
@@ -87,7 +133,7 @@ pub struct Solved {
 
 impl Solved {
     /// Area-weighted mean of a value over a range of triangles.
-    pub fn mean(&self, values: &[Vec3], range: std::ops::Range<usize>) -> f64 {
+    pub fn mean(&self, values: &[Vec3], range: Range<usize>) -> f64 {
         let area: f64 = range.clone().map(|e| self.area[e]).sum();
         range
             .map(|e| self.area[e] * f64::from(values[e].x))

@@ -1,0 +1,128 @@
+//! What the statements of a material ask for, and what is told of it.
+
+use std::f64::consts::TAU;
+
+use super::{folder, grey16, ramp, rgb_float, rgb8, square, square_toml, waves};
+
+#[test]
+fn the_mtl_statements_and_their_factors() {
+    let dir = folder(&[
+        ("my height.png", &ramp()),
+        ("other.png", &grey16(1, 1, |_, _| 7)),
+        ("n.png", &rgb8(1, 1, |_, _| [128, 128, 255])),
+    ]);
+    for (lines, scale) in [
+        ("map_Disp my height.png", 1.0),
+        ("disp -bm -0.25 my height.png", -0.25),
+        ("map_disp -mm 0.3 2 -bm 3 my height.png", 6.0),
+        ("map_Bump -bm 0.5 my height.png", 0.5),
+        ("bump my height.png", 1.0),
+        ("map_bump other.png\nbump -mm 1 4 my height.png", 4.0),
+    ] {
+        let scene = square(&dir, lines).unwrap();
+        let material = &scene.materials[0];
+        assert_eq!(material.height_scale, scale, "{lines}");
+        assert_eq!(material.map_height.as_ref().unwrap().width, 4, "{lines}");
+        assert!(
+            material.has_relief() && scene.notes.len() == 1,
+            "{:?}",
+            scene.notes
+        );
+    }
+    let scene = square(&dir, "bump -bm 9 other.png\ndisp -bm 2 my height.png").unwrap();
+    assert_eq!(scene.materials[0].height_scale, 2.0);
+    assert_eq!(scene.materials[0].map_height.as_ref().unwrap().width, 4);
+    assert!(scene.notes.iter().any(|n| n.contains("disp and bump")));
+
+    let scene = square(&dir, "map_Norm n.png").unwrap();
+    assert!(scene.materials[0].map_normal.is_some() && !scene.materials[0].has_relief());
+    assert!(
+        scene
+            .notes
+            .iter()
+            .any(|n| n.contains("n.png") && n.contains("height map"))
+    );
+
+    let lines = "height_map = 'my height.png'\nheight_scale = 0.125\nnormal_map = 'n.png'";
+    let material = square_toml(&dir, lines).unwrap().materials.remove(0);
+    assert_eq!(material.height_scale, 0.125);
+    assert!(material.has_relief() && material.map_normal.is_some());
+}
+
+#[test]
+fn a_map_without_effect_is_told() {
+    let dir = folder(&[("one.png", &grey16(1, 1, |_, _| 9)), ("a.png", &ramp())]);
+    for (lines, words) in [
+        ("disp one.png", "one.png is flat"),
+        ("disp -bm 0 a.png", "scale is 0"),
+    ] {
+        let scene = square(&dir, lines).unwrap();
+        assert!(!scene.materials[0].has_relief());
+        assert!(
+            scene.notes.iter().any(|n| n.contains(words)),
+            "{:?}",
+            scene.notes
+        );
+    }
+}
+
+#[test]
+fn maps_that_contradict_each_other_are_told_with_the_cure() {
+    for (signs, cure) in [
+        ([1.0, 1.0], None),
+        ([1.0, -1.0], Some("green")),
+        ([-1.0, -1.0], Some("sign of the heights")),
+        ([-1.0, 1.0], Some("red")),
+    ] {
+        let (height, normal) = waves(1.0, signs);
+        let dir = folder(&[("h.png", &height), ("n.exr", &normal)]);
+        let scene = square(&dir, "disp h.png\nnorm n.exr").unwrap();
+        let note = scene.notes.iter().find(|n| n.contains("contradict"));
+        match cure {
+            None => assert_eq!(note, None),
+            Some(cure) => {
+                let note = note.unwrap();
+                assert!(note.contains("h.png") && note.contains("n.exr"), "{note}");
+                assert!(note.contains(cure) && note.contains("degrees"), "{note}");
+            }
+        }
+    }
+    // Another scale is another strength, no contradiction; a flat normal map is one, which no sign mends.
+    let (height, normal) = waves(0.2, [1.0, 1.0]);
+    let flat = rgb_float(4, 4, |_, _| [0.5, 0.5, 1.0]);
+    let dir = folder(&[("h.png", &height), ("n.exr", &normal), ("flat.exr", &flat)]);
+    let scene = square(&dir, "disp -bm 3 h.png\nnorm n.exr").unwrap();
+    assert!(!scene.notes.iter().any(|n| n.contains("contradict")));
+    let scene = square(&dir, "disp h.png\nnorm flat.exr").unwrap();
+    let note = scene
+        .notes
+        .iter()
+        .find(|n| n.contains("contradict"))
+        .unwrap();
+    assert!(!note.contains("they agree"), "{note}");
+}
+
+#[test]
+fn the_mean_angle_is_in_scene_units() {
+    // A tile of 2 by 2 units: the slopes are half of those in texture space.
+    let (height, normal) = waves(1.0, [0.0, 0.0]);
+    let dir = folder(&[("h.png", &height), ("n.exr", &normal)]);
+    let scene = square(&dir, "disp h.png\nnorm n.exr").unwrap();
+    let note = scene
+        .notes
+        .iter()
+        .find(|n| n.contains("contradict"))
+        .unwrap();
+    let mut sum = 0.0;
+    for x in 0..64 {
+        for y in 0..64 {
+            let slope = |c: f64| TAU * 0.25 / 2.0 * (TAU * (c + 0.5) / 64.0).cos();
+            sum += slope(f64::from(x)).hypot(slope(f64::from(y))).atan();
+        }
+    }
+    let angle = (sum / 4096.0).to_degrees();
+    assert!(
+        note.contains(&format!("{angle:.0} degrees")),
+        "{note} {angle}"
+    );
+}
