@@ -209,10 +209,9 @@ fn furnace_of_elements_smaller_than_their_tile() {
     let mut build = Build::new();
     let mut material = |rho: f32| build.material(rho, (1.0 - rho) / std::f32::consts::PI);
     let [plain, floor, wall] = [0.5, 0.8, 0.6].map(&mut material);
-    // A third as steep: rms slope 0.2, as steep as the reliefs of the other furnace. Sources that are near and wide lay their
-    // light into one slot, which an element of steep relief answers as if it came from there alone.
-    build.relief(floor, TEXELS, |x, y| bumps(x, y) / 3.0);
-    build.relief(wall, TEXELS, |x, y| bumps(y, x) / 3.0);
+    // Steep, rms slope 0.6: how a near and wide source's light is spread over the slots matters.
+    build.relief(floor, TEXELS, |x, y| bumps(x, y));
+    build.relief(wall, TEXELS, |x, y| bumps(y, x));
     let sides = build.room(DVec3::ZERO, DVec3::ONE, CELLS, plain);
     for (side, material, u, v) in [
         (&sides[0], floor, DVec3::Z, DVec3::X),

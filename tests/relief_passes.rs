@@ -4,9 +4,10 @@ mod common;
 
 use common::{Build, assert_silent, device};
 use glam::{DVec3, Vec3};
-use mesolux::constants::NONE;
+use mesolux::constants::{KIND_POINT, NONE};
 use mesolux::directions::Directions;
 use mesolux::meso::{Options, Transport};
+use mesolux::reference;
 use mesolux::reference::pixels_relief::{Light, Received};
 use mesolux::reference::send_relief::send_relief;
 use mesolux::solver::{Estimator, Settings, Solver};
@@ -165,6 +166,56 @@ fn sources_send_as_their_twin() {
             "{transport:?}, K = {k}: {seen} sources, {again} not for the first time, {glowing} glowing: largest difference {worst:.1e}"
         );
         assert!(seen > 10 && again > 3 && glowing > 0);
+    }
+    assert_silent();
+}
+
+/// The light of one source: whatever its form factors, it lies in the slots as its twin spreads it.
+#[test]
+fn wide_sources_fill_slots_as_their_twin() {
+    for k in [16, 64] {
+        let mut solver = solver(Transport::Physical, k, Some(1));
+        solver.run(|_| true).expect("the shot runs");
+        let light = solver.light().expect("it comes back").relief;
+        let light = light.expect("it has relief");
+        let directions = Directions::new(k).expect("a number of the paper");
+        // The strongest of all, by the twin of what chose it.
+        let powers = solver.sources.list.iter().map(|s| match s.kind {
+            KIND_POINT => std::f64::consts::TAU * f64::from(s.emitted.x),
+            _ => s.area * f64::from(s.emitted.x),
+        });
+        let strongest = powers
+            .enumerate()
+            .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
+        let emitted = f64::from(
+            solver.sources.list[strongest.expect("some shine").0]
+                .emitted
+                .x,
+        );
+        let (mut wide, mut worst) = (0, 0.0f64);
+        for moments in light.moments.chunks_exact(k as usize) {
+            let red = || moments.iter().map(|m| m[0].as_dvec3());
+            let whole: DVec3 = red().sum();
+            let mut expected = vec![DVec3::ZERO; k as usize];
+            let points = reference::disc::points(whole / emitted);
+            // Rounding decides for points on the border of two slots.
+            let slot = |v: DVec3| directions.slot_of(v.normalize());
+            let nudge = 1e-5 * DVec3::new(0.6, 0.7, 0.4);
+            if points
+                .iter()
+                .any(|&p| slot(p + nudge * p.length()) != slot(p - nudge * p.length()))
+            {
+                continue;
+            }
+            wide += usize::from(points.len() > 1);
+            for point in points {
+                expected[slot(point)] += emitted * point;
+            }
+            let off: f64 = red().zip(&expected).map(|(a, b)| a.distance(*b)).sum();
+            worst = worst.max(off / whole.length().max(1e-9));
+        }
+        println!("K = {k}: {wide} elements see the light wide, {worst:.1e} lies elsewhere");
+        assert!(wide > 20 && worst < 1e-4);
     }
     assert_silent();
 }

@@ -12,6 +12,9 @@
 #include "shared/directions.glsl"
 #endif
 #ifdef TO_RELIEF
+#include "shared/disc.glsl"
+#endif
+#ifdef TO_RELIEF
 #define FLUX vec3
 #else
 #define FLUX float
@@ -99,12 +102,9 @@ struct Received {
 #endif
 };
 
-// Light of one source, of which the element sees the share f.
-void receive(inout Received received, FLUX f, uint i, vec3 emitted, vec3 reflected) {
 #ifdef TO_RELIEF
-    if (f == vec3(0.0)) {
-        return;
-    }
+// Light that comes from about one direction.
+void receive_along(inout Received received, vec3 f, uint i, vec3 emitted, vec3 reflected) {
     uint directions = cells.x * cells.y;
     uint k = direction_of(f * inversesqrt(dot(f, f)), cells);
     uint at = 3 * (i * directions + k);
@@ -119,6 +119,17 @@ void receive(inout Received received, FLUX f, uint i, vec3 emitted, vec3 reflect
             moments_indirect[at + c] += reflected[c] * f;
         }
         received.reflected[c] += dot(albedos[response + c], f) * (emitted[c] + reflected[c]);
+    }
+}
+#endif
+
+// Light of one source, of which the element sees the share f.
+void receive(inout Received received, FLUX f, uint i, vec3 emitted, vec3 reflected) {
+#ifdef TO_RELIEF
+    // A near source fills many slots: it is spread over the disc that sends the same light.
+    Disc disc = disc_of(f);
+    for (uint j = 0; j < disc.points; j++) {
+        receive_along(received, disc_point(disc, j), i, emitted, reflected);
     }
     received.direct += f.z * emitted;
     received.indirect += f.z * reflected;

@@ -2,6 +2,7 @@
 
 pub mod bin_pixels;
 pub mod cull;
+pub mod disc;
 pub mod form_factors;
 pub mod item_buffer;
 pub mod kept;
