@@ -15,7 +15,8 @@ pub struct Connections {
     pub component: Vec<u32>,
     /// Per part: every edge has its partner, and the volume enclosed is positive (all normals outward).
     pub closed: Vec<bool>,
-    /// One part is closed about all others, its normals inward, and all others are closed: whatever is sent arrives.
+    /// One part is closed about all others, its normals inward, and all others are closed and stand apart: whatever is sent
+    /// arrives.
     pub enclosed: bool,
 }
 
@@ -70,11 +71,11 @@ impl Connections {
                 }
             }
             closed.push(whole && volume > 0.0);
-            rooms.extend((whole && volume < 0.0).then_some(id));
+            rooms.extend((whole && volume < 0.0).then_some(id as usize));
         }
         let enclosed = rooms.len() == 1
             && closed.iter().filter(|&&closed| !closed).count() == 1
-            && all_within(elements, &component, rooms[0]);
+            && apart_within(elements, &component, closed.len(), rooms[0]);
         Self {
             neighbours,
             component,
@@ -105,16 +106,25 @@ impl Connections {
     }
 }
 
-/// Whether no element of another part reaches out of the box about this one.
-fn all_within(elements: &Elements, component: &[u32], room: u32) -> bool {
-    let corners = |inside: bool| {
-        (0..elements.len())
-            .filter(move |&e| (component[e] == room) == inside)
-            .flat_map(|e| elements.triangle(e))
-    };
-    let low = corners(true).fold(DVec3::INFINITY, DVec3::min);
-    let high = corners(true).fold(DVec3::NEG_INFINITY, DVec3::max);
-    corners(false).all(|v| v.cmpge(low).all() && v.cmple(high).all())
+/// Whether the boxes about all other parts lie within that of the room and clear of one another. Where bodies cross, elements
+/// count as lit that are half within another, and what arrives is more than was sent.
+fn apart_within(elements: &Elements, component: &[u32], count: usize, room: usize) -> bool {
+    let mut boxes = vec![(DVec3::INFINITY, DVec3::NEG_INFINITY); count];
+    for (e, &c) in component.iter().enumerate() {
+        let (low, high) = &mut boxes[c as usize];
+        for v in elements.triangle(e) {
+            *low = low.min(v);
+            *high = high.max(v);
+        }
+    }
+    let room = boxes.swap_remove(room);
+    let inside = |b: &(DVec3, DVec3)| b.0.cmpgt(room.0).all() && b.1.cmplt(room.1).all();
+    boxes.sort_by(|a, b| a.0.x.total_cmp(&b.0.x));
+    boxes.iter().all(inside)
+        && boxes.iter().enumerate().all(|(i, a)| {
+            let mut after = boxes[i + 1..].iter().take_while(|b| b.0.x <= a.1.x);
+            after.all(|b| b.0.cmpgt(a.1).any() || a.0.cmpgt(b.1).any())
+        })
 }
 
 /// Largest angle of a member's normal to its chart's first normal.

@@ -16,7 +16,7 @@ use crate::scene::PointLight;
 /// Where groups are cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grouping {
-    /// Most elements of a source.
+    /// Most elements of a source that is curved or has a relief: a plane one's outline stands for any number.
     pub max_elements: usize,
     /// Most area of a source, as a share of the scene's.
     pub max_area: f64,
@@ -160,7 +160,10 @@ pub fn build(
         while let Some(mut members) = stack.pop() {
             let area = members.iter().map(|&e| elements.area[e as usize]).sum();
             let emitted = members.iter().map(|&e| power(e as usize)).sum();
-            let large = members.len() > grouping.max_elements || too_much(area, emitted);
+            // A plane group's outline stands for all its members, however many.
+            let many = members.len() > grouping.max_elements
+                && (elements.is_meso(members[0] as usize) || !is_flat(elements, &members));
+            let large = many || too_much(area, emitted);
             if large && members.len() > 1 {
                 let at = bisect(elements, &mut members);
                 stack.push(members.split_off(at));
@@ -242,6 +245,19 @@ fn bisect(elements: &Elements, members: &mut [u32]) -> usize {
 
 /// Largest distance from the mean plane, as a share of the radius, at which a group still counts as plane.
 const FLAT: f64 = 1e-6;
+
+/// Whether all members lie in the first one's plane and face its way.
+fn is_flat(elements: &Elements, members: &[u32]) -> bool {
+    let first = members[0] as usize;
+    let (centre, normal) = (elements.centroid[first], elements.normal[first]);
+    members.iter().all(|&e| {
+        elements.normal[e as usize].dot(normal) > 0.5
+            && elements.triangle(e as usize).iter().all(|&v| {
+                let d = v - centre;
+                d.dot(normal).abs() <= FLAT * d.length()
+            })
+    })
+}
 
 fn group(elements: &Elements, connections: &Connections, range: std::ops::Range<usize>) -> Source {
     let area: f64 = range.clone().map(|e| elements.area[e]).sum();

@@ -39,7 +39,6 @@ macro_rules! cases {
 
 cases! {
     scale offset no_emission emission black white many_shots
-    #[ignore = "form factors of a receiver sum to 1 - 4e-4, which a thousand bounces multiply"]
     nearly_white
     occluders
     #[ignore = "receivers within 1e-6 of a wall get sixty times the light"]

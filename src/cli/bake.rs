@@ -68,7 +68,7 @@ pub struct SolveOptions {
     /// normal]
     #[arg(long, value_name = "X")]
     residual: Option<f64>,
-    /// Most elements that shoot together from one hemicube [default: that of --quality, 48 for normal]
+    /// Most elements of a curved surface or a relief that shoot together from one hemicube [default: that of --quality, 48 for normal]
     #[arg(long, value_name = "N")]
     source_elements: Option<usize>,
     /// Most area that shoots together, as a share of the scene's; larger elements are cut [default: that of --quality, 1/512 for

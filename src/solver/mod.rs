@@ -223,7 +223,7 @@ impl Solver {
                 replayed,
             } = batch.progress;
             let unshot_share = ratio(f64::from(unshot_emitted + unshot_reflected), emitted);
-            let error_bound = factor.map(|f| unshot_share * f.max(1.0));
+            let error_bound = factor.map(|f| bound(f, unshot_share));
             let elapsed = start.elapsed();
             history.push((elapsed.as_secs_f64(), unshot_share));
             report.unshot_share = unshot_share;
@@ -263,7 +263,7 @@ impl Solver {
             f64::from(last.unshot_emitted + last.unshot_reflected),
             emitted,
         );
-        report.error_bound = factor.map(|f| report.unshot_share * f.max(1.0));
+        report.error_bound = factor.map(|f| bound(f, report.unshot_share));
         report.stop = stop.unwrap_or(StopReason::Residual);
         report.seconds.setup = self.setup.as_secs_f64();
         report.seconds.solve_wall += start.elapsed().as_secs_f64();
@@ -384,6 +384,13 @@ pub struct ReliefExits {
 fn bound_factor(elements: &Elements) -> Option<f64> {
     let rho = f64::from(elements.max_reflectance());
     (rho < 1.0).then(|| rho / (1.0 - rho))
+}
+
+/// Light still missing, as a share of the emitted: what is unshot can turn into no more; and sums in f32 may lose half a step of
+/// every shot's light, which lacks as many bounces.
+fn bound(factor: f64, unshot_share: f64) -> f64 {
+    let rounding = f64::from(f32::EPSILON) / 2.0 * (1.0 + factor);
+    (unshot_share + rounding) * factor.max(1.0)
 }
 
 fn ratio(part: f64, whole: f64) -> f64 {

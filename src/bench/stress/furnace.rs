@@ -6,6 +6,7 @@ use super::shapes::Shapes;
 use super::{Case, Check, Context, Size, furnace_material, settings};
 use crate::elements::Elements;
 use crate::error::Result;
+use crate::quality::Quality;
 use crate::solver::Settings;
 use crate::sources::Grouping;
 
@@ -93,16 +94,7 @@ fn occluders(context: &Context) -> Result<Vec<Check>> {
             (occluded_elements(10, 2, 0.95), bake, SMALL_RMS, SMALL_MOST)
         }
         Size::Full => {
-            let bake = Settings {
-                hemicube: 256,
-                residual: 1e-4,
-                grouping: Grouping {
-                    max_elements: 8,
-                    max_area: 1.0 / 2048.0,
-                    ..Grouping::default()
-                },
-                ..Settings::default()
-            };
+            let bake = Quality::High.settings();
             let elements = occluded_elements(20, 3, 0.95);
             (elements, bake, OCCLUDERS_RMS, OCCLUDERS_MOST)
         }
