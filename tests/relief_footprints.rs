@@ -210,7 +210,7 @@ fn furnace_of_elements_smaller_than_their_tile() {
     let mut material = |rho: f32| build.material(rho, (1.0 - rho) / std::f32::consts::PI);
     let [plain, floor, wall] = [0.5, 0.8, 0.6].map(&mut material);
     // Steep, rms slope 0.6: how a near and wide source's light is spread over the slots matters.
-    build.relief(floor, TEXELS, |x, y| bumps(x, y));
+    build.relief(floor, TEXELS, bumps);
     build.relief(wall, TEXELS, |x, y| bumps(y, x));
     let sides = build.room(DVec3::ZERO, DVec3::ONE, CELLS, plain);
     for (side, material, u, v) in [
