@@ -1,4 +1,4 @@
-// Lists the triangles that each face of each chosen hemicube must draw: one subgroup a face, in element order, so that
+// Lists the occluders that each face of each chosen hemicube must draw: one subgroup a face, in their order, so that
 // the list is the same every run. A meshlet falls as a whole where the face's frustum or the shooter's horizon leaves it
 // out or where it shows its back; a triangle falls also where it covers no pixel's centre.
 #version 460
@@ -15,8 +15,10 @@ layout(scalar, binding = 0) readonly buffer Slots { Slot slots[]; };
 layout(scalar, binding = 1) readonly buffer Sources { Source sources[]; };
 layout(scalar, binding = 2) readonly buffer Meshlets { Meshlet meshlets[]; };
 layout(scalar, binding = 3) readonly buffer Components { Component components[]; };
+// Of the occluders.
 layout(scalar, binding = 4) readonly buffer Indices { uint corners[]; };
 layout(scalar, binding = 5) readonly buffer Vertices { vec3 vertices[]; };
+// Of the elements.
 layout(scalar, binding = 6) readonly buffer Planes { vec4 planes[]; };
 layout(scalar, binding = 7) writeonly buffer Drawn { uint drawn_corners[]; };
 layout(scalar, binding = 8) writeonly buffer Items { uint drawn_items[]; };
@@ -24,10 +26,12 @@ layout(scalar, binding = 9) writeonly buffer Draws { Draw draws[]; };
 layout(scalar, binding = 10) writeonly buffer Views { View views[]; };
 // [slot][face]: meshlets kept, triangles looked at.
 layout(scalar, binding = 11) writeonly buffer Counts { uvec2 counts[]; };
+// [occluder]: the element that it is drawn as.
+layout(scalar, binding = 12) readonly buffer OccluderItems { uint items[]; };
 
 layout(push_constant, scalar) uniform Parameters {
     uint meshlet_count;
-    uint element_count;
+    uint occluder_count;
     uint face_size;      // pixels
 };
 
@@ -137,7 +141,7 @@ void main() {
     uint written = 0;
     uint meshlets_kept = 0;
     uint triangles_tested = 0;
-    uint first_out = region * element_count;
+    uint first_out = region * occluder_count;
     if (source_index != NONE) {
         Source s = sources[source_index];
         View view = face_view(s, face);
@@ -160,23 +164,26 @@ void main() {
                 kept[bit / 32] &= ~(1u << (bit % 32));
                 Meshlet m = meshlets[first + bit];
                 bool m_away = faces_away(s, m.component);
-                bool own = s.kind == KIND_SURFACE && m.component == s.component && components[m.component].closed == 1;
+                bool same = s.kind == KIND_SURFACE && m.component == s.component;
+                bool own = same && components[m.component].closed == 1;
                 triangles_tested += m.count;
                 for (uint t = 0; t < m.count; t += gl_SubgroupSize) {
-                    uint element = m.first + t + lane;
+                    uint occluder = m.first + t + lane;
                     bool draw = t + lane < m.count;
                     uvec3 corner = uvec3(0);
+                    uint item = NONE;
                     if (draw) {
-                        corner = uvec3(corners[3 * element], corners[3 * element + 1], corners[3 * element + 2]);
-                        // The member that the eye stands on is seen edge-on, if at all: rounding must not draw it. Nor
-                        // does an eye on a closed part see that part's backs, which its group does not stand behind.
-                        bool member = s.kind == KIND_SURFACE && element - s.first_element < s.element_count;
+                        corner = uvec3(corners[3 * occluder], corners[3 * occluder + 1], corners[3 * occluder + 2]);
+                        item = items[occluder];
+                        // What lies in one plane with the eye, on the part that it stands on, is seen edge-on, if at all:
+                        // rounding must not draw it. Nor does an eye on a closed part see that part's backs, which its
+                        // group does not stand behind.
                         vec4 plane = vec4(0.0);
-                        if (member || own || (CULL_TRIANGLES == 1 && m_away)) {
-                            plane = planes[element];
+                        if (same || (CULL_TRIANGLES == 1 && m_away)) {
+                            plane = planes[item];
                         }
                         float height = dot(plane.xyz, view.eye) - plane.w;
-                        draw = !(member && abs(height) <= EYE_EPSILON) && !(own && height <= 0.0);
+                        draw = !(same && abs(height) <= EYE_EPSILON) && !(own && height <= 0.0);
                         if (CULL_TRIANGLES == 1) {
                             draw = draw && !(m_away && height <= 0.0)
                                 && triangle_seen(view, size, vertices[corner.x], vertices[corner.y], vertices[corner.z]);
@@ -188,7 +195,7 @@ void main() {
                         drawn_corners[3 * at] = corner.x;
                         drawn_corners[3 * at + 1] = corner.y;
                         drawn_corners[3 * at + 2] = corner.z;
-                        drawn_items[at] = element;
+                        drawn_items[at] = item;
                     }
                     written += subgroupBallotBitCount(drawn);
                 }

@@ -35,13 +35,14 @@ impl CachedBake {
             seed,
             grouping,
             culling,
+            merging,
             batch,
             visibility_memory,
             relief,
         } = settings;
         let key = format!(
             "bake cache 1, layout {VERSION}\n{maker}\n{scene_hash}\n{estimator:?} {hemicube} {residual:?} {shots:?} {seed} \
-             {grouping:?} {culling:?} {batch} {visibility_memory:?} {:?} {:?}",
+             {grouping:?} {culling:?} {merging} {batch} {visibility_memory:?} {:?} {:?}",
             relief.transport, relief.directions
         );
         let name: String = Sha256::digest(key)[..16]

@@ -40,6 +40,7 @@ pub mod form_factor;
 pub mod hemicube;
 pub mod meshlets;
 pub mod meso;
+pub mod occluders;
 pub mod passes;
 pub mod path_tracer;
 pub mod quality;

@@ -1,10 +1,13 @@
-//! Meshlets: up to 64 consecutive elements with a ball and a cone of normals, culled as a whole.
+//! Meshlets: up to 64 consecutive occluders with a ball and a cone of normals, culled as a whole.
+
+use std::ops::Range;
 
 use glam::DVec3;
 
 use crate::charts::Connections;
 use crate::constants::MESHLET_TRIANGLES;
 use crate::elements::Elements;
+use crate::occluders::Occluders;
 
 #[derive(Debug, Clone, Copy)]
 pub struct Meshlet {
@@ -19,42 +22,56 @@ pub struct Meshlet {
     pub component: u32,
 }
 
-/// A new chart starts a new meshlet once this many elements are in the last one.
+/// A new chart starts a new meshlet once this many triangles are in the last one.
 const ENOUGH: u32 = MESHLET_TRIANGLES / 3;
 
-/// Cuts the elements, in order, into meshlets of one part each.
-pub fn build(elements: &Elements, connections: &Connections, chart: &[u32]) -> Vec<Meshlet> {
+/// Cuts the occluders, in order, into meshlets of one part each. `chart` is that of each element.
+pub fn build(
+    elements: &Elements,
+    connections: &Connections,
+    occluders: &Occluders,
+    chart: &[u32],
+) -> Vec<Meshlet> {
+    let item = |i: usize| occluders.items[i] as usize;
     let mut meshlets = Vec::new();
     let mut first = 0;
-    for e in 1..=elements.len() {
-        let count = (e - first) as u32;
-        let ends = e == elements.len()
+    for i in 1..=occluders.len() {
+        let count = (i - first) as u32;
+        let ends = i == occluders.len()
             || count == MESHLET_TRIANGLES
-            || (chart[e] != chart[e - 1] && count >= ENOUGH)
-            || connections.component[e] != connections.component[e - 1];
+            || i == occluders.own
+            || (chart[item(i)] != chart[item(i - 1)] && count >= ENOUGH)
+            || connections.component[item(i)] != connections.component[item(i - 1)];
         if ends {
-            meshlets.push(bound(elements, connections, first, e));
-            first = e;
+            let component = connections.component[item(first)];
+            meshlets.push(bound(elements, occluders, first..i, component));
+            first = i;
         }
     }
     meshlets
 }
 
-fn bound(elements: &Elements, connections: &Connections, first: usize, end: usize) -> Meshlet {
-    let corners = || (first..end).flat_map(|e| elements.triangle(e));
+fn bound(
+    elements: &Elements,
+    occluders: &Occluders,
+    range: Range<usize>,
+    component: u32,
+) -> Meshlet {
+    let corners = || range.clone().flat_map(|i| occluders.triangle(elements, i));
+    let normals = || {
+        range
+            .clone()
+            .map(|i| elements.normal[occluders.items[i] as usize])
+    };
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for v in corners() {
         low = low.min(v);
         high = high.max(v);
     }
     let centre = 0.5 * (low + high);
-    let axis = (first..end)
-        .map(|e| elements.normal[e])
-        .sum::<DVec3>()
-        .normalize_or(elements.normal[first]);
-    let cosine = (first..end)
-        .map(|e| elements.normal[e].dot(axis))
-        .fold(1.0, f64::min);
+    let first = elements.normal[occluders.items[range.start] as usize];
+    let axis = normals().sum::<DVec3>().normalize_or(first);
+    let cosine = normals().map(|n| n.dot(axis)).fold(1.0, f64::min);
     Meshlet {
         centre,
         // A little more than it is, for the rounding to f32.
@@ -65,8 +82,8 @@ fn bound(elements: &Elements, connections: &Connections, first: usize, end: usiz
         } else {
             2.0
         },
-        first: first as u32,
-        count: (end - first) as u32,
-        component: connections.component[first],
+        first: range.start as u32,
+        count: range.len() as u32,
+        component,
     }
 }

@@ -101,6 +101,7 @@ fn item_buffers_equal_rays_and_culling_changes_nothing() {
                 let wrong = reference::item_buffer::disagreements(
                     &solver.elements,
                     &solver.connections,
+                    &solver.occluders,
                     source,
                     FACE,
                     column,
@@ -122,8 +123,8 @@ fn item_buffers_equal_rays_and_culling_changes_nothing() {
             }
         }
         if culling == Culling::Off {
-            // All but the members that an eye stands on.
-            let least = 3 * (solver.elements.len() - solver.sources.list.len().min(48)) as u32;
+            // All but what lies in one plane with an eye on its own part.
+            let least = 3 * (solver.occluders.len() - solver.sources.list.len().min(48)) as u32;
             assert!(
                 drawn
                     .iter()
@@ -154,8 +155,14 @@ fn culling_keeps_every_element_that_owns_a_pixel() {
     for (slot, &source) in reference::select::select(&powers, 6).iter().enumerate() {
         let source = &solver.sources.list[source as usize];
         for face in 0..5 {
-            let shown: BTreeSet<u32> =
-                reference::cull::shown(&solver.elements, &solver.connections, source, face, FACE);
+            let shown: BTreeSet<u32> = reference::cull::shown(
+                &solver.elements,
+                &solver.connections,
+                &solver.occluders,
+                source,
+                face,
+                FACE,
+            );
             let drawn = draws[slot * 5 + face as usize].index_count / 3;
             assert!(
                 drawn as usize >= shown.len(),
@@ -163,7 +170,7 @@ fn culling_keeps_every_element_that_owns_a_pixel() {
                 shown.len()
             );
             assert!(
-                (drawn as usize) < solver.elements.len(),
+                (drawn as usize) < solver.occluders.len(),
                 "something is culled"
             );
         }
@@ -193,8 +200,13 @@ fn estimators_equal_their_twins() {
         let mut expected = vec![0.0; elements.len()];
         for &s in &chosen {
             let source = &solver.sources.list[s as usize];
-            let items =
-                reference::item_buffer::item_buffer(elements, &solver.connections, source, FACE);
+            let items = reference::item_buffer::item_buffer(
+                elements,
+                &solver.connections,
+                &solver.occluders,
+                source,
+                FACE,
+            );
             let emitted = f64::from(source.emitted.x);
             let sums = reference::bin_pixels::form_factors(elements, source, &items, FACE);
             let factors: Vec<f64> = (0..elements.len())

@@ -1,4 +1,4 @@
-//! `mesolux bench hemicube`: how fast item buffers are drawn, culled and not.
+//! `mesolux bench hemicube`: how fast item buffers are drawn, culled and not, of merged elements and of all.
 
 use std::sync::Arc;
 
@@ -10,19 +10,21 @@ use crate::scene::Scene;
 use crate::solver::{Settings, Solver};
 use crate::vk::Device;
 
-/// Batches of each kind in a round.
-const BATCHES: [(Culling, usize); 3] = [
-    (Culling::Triangles, 4),
-    (Culling::Meshlets, 2),
-    (Culling::Off, 1),
+/// What is culled, whether elements are merged, and the batches of each kind in a round.
+const BATCHES: [(&str, Culling, bool, usize); 4] = [
+    ("elements merged too", Culling::Triangles, true, 4),
+    ("triangles culled too", Culling::Triangles, false, 4),
+    ("meshlets culled", Culling::Meshlets, false, 2),
+    ("no culling", Culling::Off, false, 1),
 ];
 
 /// Prints hemicubes a second, drawing alone (culling and item buffer) and with everything (choosing and binning too).
 pub fn run(device: &Arc<Device>, scene: &Scene, hemicube: u32, rounds: usize) -> Result<()> {
     let mut solvers = Vec::new();
-    for (culling, _) in BATCHES {
+    for (_, culling, merging, _) in BATCHES {
         let settings = Settings {
             culling,
+            merging,
             hemicube,
             // Never reached: the benchmark stops by itself.
             residual: 1e-12,
@@ -35,10 +37,10 @@ pub fn run(device: &Arc<Device>, scene: &Scene, hemicube: u32, rounds: usize) ->
             &settings,
         )?);
     }
-    let mut draw = [const { Vec::new() }; 3];
-    let mut whole = [const { Vec::new() }; 3];
+    let mut draw = [const { Vec::new() }; BATCHES.len()];
+    let mut whole = [const { Vec::new() }; BATCHES.len()];
     for _ in 0..rounds.max(1) {
-        for (i, (_, batches)) in BATCHES.iter().enumerate() {
+        for (i, (.., batches)) in BATCHES.iter().enumerate() {
             solvers[i].run_batches(*batches, |batch| {
                 let stages = batch.stages;
                 let count = f64::from(batch.progress.selected);
@@ -56,14 +58,9 @@ pub fn run(device: &Arc<Device>, scene: &Scene, hemicube: u32, rounds: usize) ->
         device.name()
     );
     println!("hemicubes a second      drawn (10 % to 90 %)         with choosing and binning");
-    for (i, (culling, _)) in BATCHES.iter().enumerate() {
+    for (i, (name, ..)) in BATCHES.iter().enumerate() {
         let (d, d10, d90) = spread(&mut draw[i]);
         let (w, w10, w90) = spread(&mut whole[i]);
-        let name = match culling {
-            Culling::Off => "no culling",
-            Culling::Meshlets => "meshlets culled",
-            Culling::Triangles => "triangles culled too",
-        };
         println!("{name:<22}{d:>8.1} ({d10:.1} to {d90:.1}){w:>18.1} ({w10:.1} to {w90:.1})");
     }
     Ok(())

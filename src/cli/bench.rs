@@ -20,7 +20,7 @@ pub struct Options {
 enum What {
     /// Milliseconds a frame of the three scenes, by shading of the relief, number of directions and size
     Frame(FrameOptions),
-    /// Hemicubes a second in the Cornell box, with and without culling, side by side
+    /// Hemicubes a second in the Cornell box, with and without merging and culling, side by side
     Hemicube(HemicubeOptions),
     /// Irradiance of bakes of one scene, on what has no relief, against path traced irradiance with the relief as geometry
     Irradiance(IrradianceOptions),

@@ -15,6 +15,7 @@ use crate::elements::Elements;
 use crate::error::Result;
 use crate::hemicube::pixel_count;
 use crate::meshlets;
+use crate::occluders::Occluders;
 use crate::sources::Sources;
 use crate::vk::{
     Buffer, BufferUse, Commands, Device, Format, Framebuffer, Image, ImageUse, RenderPass, Sampler,
@@ -24,6 +25,7 @@ use crate::vk::{
 /// The scene in internal units: read by the passes, never written.
 pub struct SceneBuffers {
     pub element_count: u32,
+    pub occluder_count: u32,
     pub source_count: u32,
     pub meshlet_count: u32,
     /// Whatever is sent arrives: see [`Connections::enclosed`].
@@ -31,6 +33,10 @@ pub struct SceneBuffers {
     pub vertices: Buffer,
     /// Three a element, `[element][corner]`.
     pub corners: Buffer,
+    /// `[occluder][corner]`.
+    pub occluder_corners: Buffer,
+    /// The element that each is drawn as.
+    pub occluder_items: Buffer,
     pub triangles: Buffer,
     /// Of curved sources: centroid and sum of area times normal, eight words a part.
     pub parts: Buffer,
@@ -52,6 +58,7 @@ impl SceneBuffers {
         elements: &Elements,
         sources: &Sources,
         connections: &Connections,
+        occluders: &Occluders,
     ) -> Result<Self> {
         let vertices: Vec<Vec3> = elements.vertices.iter().map(|v| v.as_vec3()).collect();
         let planes: Vec<[f32; 4]> = (0..elements.len())
@@ -100,17 +107,31 @@ impl SceneBuffers {
                 [x, y, z, u, v, w, 0.0, 0.0]
             }));
         }
-        let meshlets: Vec<Meshlet> = meshlets::build(elements, connections, &sources.chart)
-            .iter()
-            .map(Meshlet::from)
-            .collect();
+        let meshlets: Vec<Meshlet> =
+            meshlets::build(elements, connections, occluders, &sources.chart)
+                .iter()
+                .map(Meshlet::from)
+                .collect();
         Ok(Self {
             element_count: elements.len() as u32,
+            occluder_count: occluders.len() as u32,
             source_count: sources.list.len() as u32,
             meshlet_count: meshlets.len() as u32,
             enclosed: connections.enclosed,
             vertices: upload(device, "vertices", &vertices, BufferUse::Geometry)?,
             corners: upload(device, "corners", &elements.corners, BufferUse::Geometry)?,
+            occluder_corners: upload(
+                device,
+                "occluder corners",
+                &occluders.corners,
+                BufferUse::Storage,
+            )?,
+            occluder_items: upload(
+                device,
+                "occluder items",
+                &occluders.items,
+                BufferUse::Storage,
+            )?,
             triangles: upload(device, "triangles", &triangles, BufferUse::Storage)?,
             parts: upload(device, "parts", &parts, BufferUse::Storage)?,
             planes: upload(device, "planes", &planes, BufferUse::Storage)?,
@@ -216,7 +237,7 @@ pub struct Batch {
     pub views: Buffer,
     pub draws: Buffer,
     pub counts: Buffer,
-    /// `[slot][face][element]`: room for every triangle in every face.
+    /// `[slot][face][occluder]`: room for every triangle in every face.
     pub drawn_corners: Buffer,
     pub drawn_items: Buffer,
     /// Columns of N × 3 N texels side by side, one a slot.
@@ -226,7 +247,7 @@ pub struct Batch {
     _depth: Image,
 }
 
-/// Bytes of the lists of drawn triangles, for one element in one face of one slot.
+/// Bytes of the lists of drawn triangles, for one occluder in one face of one slot.
 const DRAWN_BYTES: u64 = 16;
 
 impl Batch {
@@ -244,7 +265,7 @@ impl Batch {
         wanted: u32,
     ) -> u32 {
         let limits = device.limits();
-        let region = u64::from(FACES) * u64::from(scene.element_count);
+        let region = u64::from(FACES) * u64::from(scene.occluder_count);
         let by_buffer = limits.max_storage_buffer_range / (12 * region).max(1);
         let by_memory =
             limits.heap_bytes / 8 / (DRAWN_BYTES * region + 8 * pixel_count(face_size) as u64);
@@ -265,7 +286,7 @@ impl Batch {
         (slot_count, replay_slots): (u32, u32),
     ) -> Result<Self> {
         let regions = u64::from(slot_count * FACES);
-        let drawn = regions * u64::from(scene.element_count);
+        let drawn = regions * u64::from(scene.occluder_count);
         let buffer = |name, bytes, usage| Buffer::new(device, name, bytes, usage);
         let size = (slot_count * face_size, 3 * face_size);
         let items = Image::new(

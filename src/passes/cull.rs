@@ -30,7 +30,7 @@ pub struct Cull {
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 struct Parameters {
     meshlet_count: u32,
-    element_count: u32,
+    occluder_count: u32,
     face_size: u32,
 }
 
@@ -47,7 +47,7 @@ impl Cull {
                 device,
                 "cull",
                 shaders::CULL_COMP,
-                &[Binding::Storage; 12],
+                &[Binding::Storage; 13],
                 size_of::<Parameters>(),
                 &constants,
                 true,
@@ -63,7 +63,7 @@ impl Cull {
                 &scene.sources,
                 &scene.meshlets,
                 &scene.components,
-                &scene.corners,
+                &scene.occluder_corners,
                 &scene.vertices,
                 &scene.planes,
                 &batch.drawn_corners,
@@ -71,6 +71,7 @@ impl Cull {
                 &batch.draws,
                 &batch.views,
                 &batch.counts,
+                &scene.occluder_items,
             ]
             .map(Bind::Buffer),
         )
@@ -79,7 +80,7 @@ impl Cull {
     pub fn record(&self, cmd: &Commands, set: &DescriptorSet, scene: &SceneBuffers, batch: &Batch) {
         let parameters = Parameters {
             meshlet_count: scene.meshlet_count,
-            element_count: scene.element_count,
+            occluder_count: scene.occluder_count,
             face_size: batch.face_size,
         };
         cmd.dispatch(

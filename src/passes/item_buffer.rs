@@ -80,7 +80,7 @@ impl ItemBuffer {
                     &self.pipeline,
                     &Parameters {
                         region,
-                        first_item: region * scene.element_count,
+                        first_item: region * scene.occluder_count,
                         near: NEAR,
                         half_size: [width as f32 / 2.0, height as f32 / 2.0],
                     },

@@ -1,4 +1,4 @@
-//! Twin of the culling pass: which elements a hemicube's item buffer shows. Whatever is culled, these must be drawn.
+//! Twin of the culling pass: which items a hemicube's item buffer shows. Whatever is culled, these must be drawn.
 
 use std::collections::BTreeSet;
 
@@ -6,18 +6,20 @@ use crate::charts::Connections;
 use crate::constants::NONE;
 use crate::elements::Elements;
 use crate::hemicube::{Pixel, face_rectangle};
+use crate::occluders::Occluders;
 use crate::sources::Source;
 
-/// Elements that own a pixel of a face.
+/// Elements as which the pixels of a face are drawn.
 pub fn shown(
     elements: &Elements,
     connections: &Connections,
+    occluders: &Occluders,
     source: &Source,
     face: u32,
     n: u32,
 ) -> BTreeSet<u32> {
     let [x0, y0, width, height] = face_rectangle(face, n);
-    let items = super::item_buffer::item_buffer(elements, connections, source, n);
+    let items = super::item_buffer::item_buffer(elements, connections, occluders, source, n);
     (y0..y0 + height)
         .flat_map(|row| (x0..x0 + width).map(move |column| Pixel { column, row }))
         .map(|p| items[(p.row * n + p.column) as usize])

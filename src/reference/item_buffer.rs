@@ -6,6 +6,7 @@ use crate::charts::Connections;
 use crate::constants::{KIND_SURFACE, NONE};
 use crate::elements::Elements;
 use crate::hemicube::{Pixel, direction_of};
+use crate::occluders::Occluders;
 use crate::sources::Source;
 
 /// Distance of the near plane, as in the pass; a ray's largest component in the source's frame is 1.
@@ -44,10 +45,11 @@ pub fn ray(source: &Source, pixel: Pixel, n: u32) -> DVec3 {
     source.tangent * d.x + source.bitangent * d.y + source.normal * d.z
 }
 
-/// The element that each pixel sees, `[row][column]` of the hemicube's column, or [`NONE`].
+/// The item that each pixel sees, `[row][column]` of the hemicube's column, or [`NONE`].
 pub fn item_buffer(
     elements: &Elements,
     connections: &Connections,
+    occluders: &Occluders,
     source: &Source,
     n: u32,
 ) -> Vec<u32> {
@@ -55,32 +57,48 @@ pub fn item_buffer(
     for row in 0..3 * n {
         for column in 0..n {
             let ray = ray(source, Pixel { column, row }, n);
-            let nearest = (0..elements.len())
-                .filter(|&e| above(elements, connections, source, e))
-                .filter_map(|e| {
-                    let hit = intersect(source.eye, ray, elements.triangle(e))?;
-                    (hit.inside >= 0.0).then_some((hit.along, e))
-                })
-                .min_by(|a, b| a.0.total_cmp(&b.0));
-            items.push(nearest.map_or(NONE, |(_, e)| e as u32));
+            items.push(first(elements, connections, occluders, source, ray));
         }
     }
     items
 }
 
-/// Whether an element can be seen at all: it rises above the source's own plane, is not the member that the eye stands
-/// on, and is no back of the closed part that the eye stands on.
-fn above(elements: &Elements, connections: &Connections, source: &Source, e: usize) -> bool {
-    let first = source.first_element as usize;
-    let surface = source.kind == KIND_SURFACE;
-    let member = surface && (first..first + source.element_count as usize).contains(&e);
-    let component = connections.component[e];
-    let own = surface && component == source.component && connections.closed[component as usize];
-    let height = (source.eye - elements.centroid[e]).dot(elements.normal[e]);
+/// The item of the occluder that a ray from the eye meets first, or [`NONE`].
+fn first(
+    elements: &Elements,
+    connections: &Connections,
+    occluders: &Occluders,
+    source: &Source,
+    ray: DVec3,
+) -> u32 {
+    (0..occluders.len())
+        .filter(|&i| above(elements, connections, occluders, source, i))
+        .filter_map(|i| {
+            let hit = intersect(source.eye, ray, occluders.triangle(elements, i))?;
+            (hit.inside >= 0.0).then_some((hit.along, i))
+        })
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map_or(NONE, |(_, i)| occluders.items[i])
+}
+
+/// Whether an occluder can be seen at all: it rises above the source's own plane, does not lie in one plane with the eye on
+/// the part that it stands on, and is no back of that part where it is closed.
+fn above(
+    elements: &Elements,
+    connections: &Connections,
+    occluders: &Occluders,
+    source: &Source,
+    i: usize,
+) -> bool {
+    let item = occluders.items[i] as usize;
+    let component = connections.component[item];
+    let same = source.kind == KIND_SURFACE && component == source.component;
+    let own = same && connections.closed[component as usize];
+    let height = (source.eye - elements.centroid[item]).dot(elements.normal[item]);
     let rises = |v: &DVec3| (*v - source.eye).dot(source.normal) > 1e-9;
-    let edge_on = member && height.abs() <= 1e-6;
+    let edge_on = same && height.abs() <= 1e-6;
     let own_back = own && height <= 0.0;
-    !edge_on && !own_back && elements.triangle(e).iter().any(rises)
+    !edge_on && !own_back && occluders.triangle(elements, i).iter().any(rises)
 }
 
 /// How far outside a triangle, in pixels, a pixel's centre may lie and still be drawn: a rasteriser with 4 subpixel bits
@@ -92,11 +110,12 @@ const SNAP: f64 = 1.0 / 16.0;
 pub fn disagreements(
     elements: &Elements,
     connections: &Connections,
+    occluders: &Occluders,
     source: &Source,
     n: u32,
     drawn: &[u32],
 ) -> Vec<(Pixel, u32, u32)> {
-    let expected = item_buffer(elements, connections, source, n);
+    let expected = item_buffer(elements, connections, occluders, source, n);
     (0..)
         .zip(expected.iter().zip(drawn))
         .map(|(i, (&want, &got))| {
@@ -107,7 +126,7 @@ pub fn disagreements(
             (pixel, want, got)
         })
         .filter(|&(pixel, want, got)| {
-            want != got && !explained(elements, connections, source, n, pixel, got)
+            want != got && !explained(elements, connections, occluders, source, n, pixel, got)
         })
         .collect()
 }
@@ -117,6 +136,7 @@ pub fn disagreements(
 fn explained(
     elements: &Elements,
     connections: &Connections,
+    occluders: &Occluders,
     source: &Source,
     n: u32,
     pixel: Pixel,
@@ -124,16 +144,6 @@ fn explained(
 ) -> bool {
     let centre = direction_of(pixel, n);
     let step = 2.0 / f64::from(n) * SNAP;
-    let first = |ray: DVec3| {
-        (0..elements.len())
-            .filter(|&e| above(elements, connections, source, e))
-            .filter_map(|e| {
-                let hit = intersect(source.eye, ray, elements.triangle(e))?;
-                (hit.inside >= 0.0).then_some((hit.along, e))
-            })
-            .min_by(|a, b| a.0.total_cmp(&b.0))
-            .map_or(NONE, |(_, e)| e as u32)
-    };
     (0..16).any(|i| {
         let angle = f64::from(i) * std::f64::consts::TAU / 16.0;
         let (du, dv) = (step * angle.cos(), step * angle.sin());
@@ -146,6 +156,6 @@ fn explained(
             DVec3::new(centre.x + du, centre.y, centre.z + dv)
         };
         let ray = source.tangent * d.x + source.bitangent * d.y + source.normal * d.z;
-        first(ray) == got
+        first(elements, connections, occluders, source, ray) == got
     })
 }

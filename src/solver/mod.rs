@@ -20,6 +20,7 @@ use crate::charts::Connections;
 use crate::constants::REPLAYS;
 use crate::elements::Elements;
 use crate::error::Result;
+use crate::occluders::Occluders;
 use crate::passes::buffers::{Batch, SceneBuffers, State, download};
 use crate::passes::factor_buffers::FactorBuffers;
 use crate::passes::item_buffer::ItemBuffer;
@@ -67,6 +68,7 @@ pub struct Solver {
     pub elements: Elements,
     pub sources: Sources,
     pub connections: Connections,
+    pub occluders: Occluders,
     // Before the buffers that its commands use.
     batches: BatchLoop,
     scene: SceneBuffers,
@@ -125,7 +127,11 @@ impl Solver {
                 (sources, connections)
             }
         };
-        let scene = SceneBuffers::new(device, &elements, &sources, &connections)?;
+        let occluders = match settings.estimator {
+            Estimator::Receiver if settings.merging => Occluders::merged(&elements, &connections),
+            _ => Occluders::elements(&elements),
+        };
+        let scene = SceneBuffers::new(device, &elements, &sources, &connections, &occluders)?;
         let state = State::new(device, &scene)?;
         let item_buffer = ItemBuffer::new(device)?;
         let wanted = settings.batch.clamp(1, scene.source_count.max(1));
@@ -186,12 +192,14 @@ impl Solver {
         )?;
         let mut report = Report::new(device, settings, &elements, &sources, slots.0);
         report.set_meshlets(scene.meshlet_count);
+        report.skipped.triangles_merged = (elements.len() - occluders.len()) as u64;
         Ok(Self {
             device: Arc::clone(device),
             settings: settings.clone(),
             elements,
             sources,
             connections,
+            occluders,
             batches,
             scene,
             state,

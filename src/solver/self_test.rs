@@ -7,6 +7,7 @@ use glam::DVec3;
 use super::Settings;
 use crate::elements::Elements;
 use crate::error::{Error, Result};
+use crate::occluders::Occluders;
 use crate::passes::buffers::{Batch, SceneBuffers, State};
 use crate::passes::item_buffer::ItemBuffer;
 use crate::scene::{Material, Scene, Triangle};
@@ -64,7 +65,8 @@ pub fn ids_come_back_right(device: &Arc<Device>) -> Result<bool> {
     let mut elements = Elements::new(&open_box());
     let settings = Settings::default();
     let (sources, connections) = sources::build(&mut elements, &[], &settings.grouping, 0);
-    let scene = SceneBuffers::new(device, &elements, &sources, &connections)?;
+    let occluders = Occluders::elements(&elements);
+    let scene = SceneBuffers::new(device, &elements, &sources, &connections, &occluders)?;
     let state = State::new(device, &scene)?;
     let item_buffer = ItemBuffer::new(device)?;
     let batch = Batch::new(device, &item_buffer.pass, &scene, SIZE, (1, 0))?;
@@ -106,16 +108,15 @@ pub fn ids_come_back_right(device: &Arc<Device>) -> Result<bool> {
         .iter()
         .find(|s| s.emitted.max_element() > 0.0)
         .expect("the test scene has a light");
-    Ok(
-        crate::reference::item_buffer::disagreements(
-            &elements,
-            &connections,
-            emitter,
-            SIZE,
-            &drawn,
-        )
-        .is_empty(),
+    Ok(crate::reference::item_buffer::disagreements(
+        &elements,
+        &connections,
+        &occluders,
+        emitter,
+        SIZE,
+        &drawn,
     )
+    .is_empty())
 }
 
 /// Five walls of a box, an emitter in the floor, and a triangle afloat.

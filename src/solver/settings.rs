@@ -31,6 +31,9 @@ pub struct Settings {
     pub seed: u64,
     pub grouping: Grouping,
     pub culling: Culling,
+    /// Draws connected elements of one plane as few triangles; see [`crate::occluders`]. The `pixel` estimator asks for every
+    /// element and does without.
+    pub merging: bool,
     /// Sources of a batch that are drawn, at most.
     pub batch: u32,
     /// Bytes on the device for form factors of sources that have been drawn, so that their further shots need no drawing. None:
@@ -51,6 +54,7 @@ impl Default for Settings {
             seed: 0,
             grouping: Grouping::default(),
             culling: Culling::default(),
+            merging: true,
             batch: 16,
             visibility_memory: None,
             relief: meso::Options::default(),

@@ -1,0 +1,114 @@
+//! Occluders: the triangles that item buffers are drawn from.
+//!
+//! The `receiver` estimator asks an item for its plane alone. So neighbouring elements of one plane are drawn as the few
+//! triangles that their outline needs, each as one element of that plane. No corner is new, and one is left out of an outline
+//! only where every outline that passes it goes straight on: neighbours share whole edges, and no crack opens between them.
+
+mod outline;
+mod region;
+mod triangulate;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::charts::Connections;
+use crate::elements::Elements;
+use outline::{Outline, outlines};
+use region::{Region, regions};
+
+/// Structure of arrays, `[occluder]`.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Occluders {
+    /// Corners, as of [`Elements::corners`].
+    pub corners: Vec<[u32; 3]>,
+    /// The element that each is drawn as, in whose plane and connected part it lies.
+    pub items: Vec<u32>,
+    /// How many, at the beginning, are elements as they are, in their order.
+    pub own: usize,
+}
+
+impl Occluders {
+    /// The elements themselves.
+    pub fn elements(elements: &Elements) -> Self {
+        Self {
+            corners: elements.corners.clone(),
+            items: (0..elements.len() as u32).collect(),
+            own: elements.len(),
+        }
+    }
+
+    /// Elements of one plane merged, wherever that gives fewer triangles.
+    pub fn merged(elements: &Elements, connections: &Connections) -> Self {
+        let mut regions = regions(elements, connections);
+        loop {
+            let drawn: Vec<(Region, Outline)> = {
+                let outlines = outlines(elements, connections, &regions);
+                // One that keeps all its corners pins them already, so that its going changes no other outline.
+                let pairs = regions.into_iter().zip(outlines);
+                pairs
+                    .filter(|(region, outline)| outline.corners() < region.corners(elements))
+                    .collect()
+            };
+            let triangles: Vec<_> = drawn
+                .par_iter()
+                .map(|(region, outline)| triangulate::triangulate(elements, region, outline))
+                .collect();
+            // Neighbours of one that fails must keep the corners that its elements have.
+            if triangles.iter().all(Option::is_some) {
+                let triangles = triangles.into_iter().flatten();
+                let regions: Vec<_> = drawn.into_iter().map(|(region, _)| region).collect();
+                return Self::from_regions(elements, connections, &regions, triangles);
+            }
+            regions = drawn
+                .into_iter()
+                .zip(&triangles)
+                .filter_map(|((region, _), triangles)| triangles.is_some().then_some(region))
+                .collect();
+        }
+    }
+
+    fn from_regions(
+        elements: &Elements,
+        connections: &Connections,
+        regions: &[Region],
+        triangles: impl Iterator<Item = Vec<[u32; 3]>>,
+    ) -> Self {
+        let mut merged = vec![false; elements.len()];
+        for &e in regions.iter().flat_map(|region| &region.members) {
+            merged[e as usize] = true;
+        }
+        let mut items: Vec<_> = (0..elements.len() as u32)
+            .filter(|&e| !merged[e as usize])
+            .collect();
+        let mut corners: Vec<_> = items
+            .iter()
+            .map(|&e| elements.corners[e as usize])
+            .collect();
+        let own = items.len();
+        // Part by part, for meshlets are of one part each.
+        let mut pairs: Vec<_> = regions.iter().zip(triangles).collect();
+        pairs.sort_by_key(|(region, _)| connections.component[region.item as usize]);
+        for (region, triangles) in pairs {
+            items.extend(std::iter::repeat_n(region.item, triangles.len()));
+            corners.extend(triangles);
+        }
+        Self {
+            corners,
+            items,
+            own,
+        }
+    }
+
+    pub fn len(&self) -> usize {
+        self.items.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.items.is_empty()
+    }
+
+    /// Corner positions of an occluder.
+    pub fn triangle(&self, elements: &Elements, occluder: usize) -> [DVec3; 3] {
+        self.corners[occluder].map(|v| elements.vertices[v as usize])
+    }
+}

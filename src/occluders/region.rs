@@ -1,0 +1,141 @@
+//! Regions: elements connected over edges that lie in one plane to rounding.
+
+use glam::DVec3;
+
+use crate::charts::Connections;
+use crate::constants::NONE;
+use crate::elements::Elements;
+
+/// Elements of one plane.
+pub struct Region {
+    /// The member whose plane is meant.
+    pub item: u32,
+    /// Two or more, ascending.
+    pub members: Vec<u32>,
+}
+
+impl Region {
+    /// How many vertices its elements have.
+    pub fn corners(&self, elements: &Elements) -> usize {
+        let corners = |&e: &u32| elements.corners[e as usize];
+        let mut vertices: Vec<_> = self.members.iter().flat_map(corners).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        vertices.len()
+    }
+}
+
+/// Farthest that a corner may lie from the item's plane: a fifth of what passes tell heights apart by, for heights in f32 take
+/// their share of that.
+const PLANE: f64 = 2e-7;
+/// Largest sine of the angle between a member's normal and the item's, beside what rounding explains.
+const SINE: f64 = 1e-6;
+/// How far two corners' rounding (see [`crate::elements`]) may lift one over the other: √3 steps of 2⁻²⁶, and some room.
+const ROUNDING: f64 = 4e-8;
+
+/// All regions of two elements or more, by their first members; none overlaps another. Each member fits the plane of the
+/// item itself, not that of the neighbour it was reached from: no bend is too gentle to end a region.
+pub fn regions(elements: &Elements, connections: &Connections) -> Vec<Region> {
+    let mut growth = Growth {
+        elements,
+        connections,
+        taken: vec![false; elements.len()],
+        reached: vec![NONE; elements.len()],
+        round: 0,
+    };
+    let mut regions = Vec::new();
+    for e in 0..elements.len() as u32 {
+        // A better item may leave the first one out.
+        while !growth.taken[e as usize] {
+            let (item, mut members) = growth.best(e);
+            for &m in &members {
+                growth.taken[m as usize] = true;
+            }
+            if members.len() > 1 {
+                members.sort_unstable();
+                regions.push(Region { item, members });
+            }
+        }
+    }
+    regions.sort_by_key(|region| region.members[0]);
+    regions
+}
+
+struct Growth<'a> {
+    elements: &'a Elements,
+    connections: &'a Connections,
+    taken: Vec<bool>,
+    /// In which round each was reached last.
+    reached: Vec<u32>,
+    round: u32,
+}
+
+impl Growth<'_> {
+    /// The item and the members of the region about an element. Normals of small elements are rough where no axis is at right
+    /// angles to them: the member whose normal is nearest to the mean is tried until the region grows no more.
+    fn best(&mut self, seed: u32) -> (u32, Vec<u32>) {
+        let normal = |e: u32| self.elements.normal[e as usize];
+        let area = |e: u32| self.elements.area[e as usize];
+        let mut item = seed;
+        let mut members = self.grow(seed);
+        loop {
+            let weighed = members.iter().map(|&e| normal(e) * area(e));
+            let mean = weighed.sum::<DVec3>().normalize_or(normal(item));
+            let off = |e: u32| normal(e).distance_squared(mean);
+            let best = members
+                .iter()
+                .copied()
+                .min_by(|&a, &b| off(a).total_cmp(&off(b)))
+                .filter(|&best| off(best) < off(item));
+            let Some(best) = best else {
+                return (item, members);
+            };
+            let again = self.grow(best);
+            if again.len() <= members.len() {
+                return (item, members);
+            }
+            (item, members) = (best, again);
+        }
+    }
+
+    /// The free elements that are connected to `item` through others of its plane.
+    fn grow(&mut self, item: u32) -> Vec<u32> {
+        self.round += 1;
+        self.reached[item as usize] = self.round;
+        let mut members = vec![item];
+        let mut next = 0;
+        while next < members.len() {
+            let neighbours = self.connections.neighbours[members[next] as usize];
+            for n in neighbours.into_iter().flatten() {
+                let i = n as usize;
+                if self.reached[i] != self.round && !self.taken[i] {
+                    self.reached[i] = self.round;
+                    if fits(self.elements, item as usize, i) {
+                        members.push(n);
+                    }
+                }
+            }
+            next += 1;
+        }
+        members
+    }
+}
+
+fn fits(elements: &Elements, item: usize, e: usize) -> bool {
+    let normal = elements.normal[item];
+    let sine = SINE + ROUNDING / altitude(elements, item) + ROUNDING / altitude(elements, e);
+    let height = |v: DVec3| (v - elements.centroid[item]).dot(normal);
+    normal.dot(elements.normal[e]) > 0.0
+        && normal.cross(elements.normal[e]).length() <= sine
+        && elements
+            .triangle(e)
+            .into_iter()
+            .all(|v| height(v).abs() <= PLANE)
+}
+
+/// Of a triangle over its longest edge.
+fn altitude(elements: &Elements, e: usize) -> f64 {
+    let [a, b, c] = elements.triangle(e);
+    let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+    2.0 * elements.area[e] / longest
+}
