@@ -121,8 +121,9 @@ fn a_wall_with_corners_and_a_hole_needs_its_outline_alone() {
         let (u, v) = (turn * DVec3::X * 3.0, turn * DVec3::Y * 2.0);
         build.quad(DVec3::new(5.0, 1.0, -2.0), u, v, (n as u32, n as u32), 0);
         let hole = |i: usize| (n / 8..n / 4).contains(&i);
+        let notch = |i: usize| i >= n / 2;
         cut(&mut build, n, |i, j| {
-            !(i >= n / 2 && j >= n / 2) && !(hole(i) && hole(j))
+            !(notch(i) && notch(j) || hole(i) && hole(j))
         });
         let merged = Merged::new(&build);
         // An L has 6 corners, its hole 4: V + 2 holes − 2.
