@@ -93,13 +93,14 @@ fn replayed_sources_light_as_drawn_ones_do() {
                 let moments = |light: &mesolux::solver::ReliefLight| -> Vec<Vec3> {
                     light.moments.iter().flatten().copied().collect()
                 };
-                // Plain sums in f32: the strongest slot's rounding counts.
+                // Plain sums in f32, in another order: the strongest slot's rounding, half a step of random sign a shot.
+                let rounding = 0.5 * f32::EPSILON * (every.shots as f32).sqrt();
                 let (a, b) = (moments(a), moments(b));
                 let largest = a.iter().map(|v| v.abs().max_element()).fold(0.0, f32::max);
                 let apart = a.iter().zip(&b).map(|(a, b)| (a - b).abs().max_element());
                 let difference = apart.fold(0.0, f32::max) / largest;
-                println!("moments: {difference:.1e} of the largest");
-                assert!(difference <= TOLERANCE);
+                println!("moments: {difference:.1e} of the largest, rounding {rounding:.1e}");
+                assert!(difference <= rounding);
             }
         }
     }

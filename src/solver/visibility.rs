@@ -159,7 +159,7 @@ impl Visibility {
         let words: usize = header.words.iter().fold(0, |sum, &n| sum.saturating_add(n));
         let told = words
             .saturating_mul(4)
-            .saturating_add(header.rows.saturating_mul(8));
+            .saturating_add(header.rows.saturating_mul(size_of::<KeptRow>()));
         if told as u64 != length - header_length - 24
             || header
                 .words
