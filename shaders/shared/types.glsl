@@ -39,7 +39,7 @@ struct Triangle {
     float unused;
 };
 
-// Up to MESHLET_TRIANGLES consecutive elements.
+// Up to MESHLET_TRIANGLES consecutive occluders.
 struct Meshlet {
     vec3 centre;
     float radius;
