@@ -1,8 +1,8 @@
 //! Occluders: the triangles that item buffers are drawn from.
 //!
 //! The `receiver` estimator asks an item for its plane alone. So neighbouring elements of one plane are drawn as the few
-//! triangles that their outline needs, each as one element of that plane. No corner is new, and one is left out of an outline
-//! only where every outline that passes it goes straight on: neighbours share whole edges, and no crack opens between them.
+//! triangles that their outline needs, each as one element of that plane. The outline keeps all its corners, those at which it goes
+//! straight on as well: neighbours share whole edges, no crack opens, and the same pixels are covered.
 
 mod outline;
 mod region;
@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use crate::charts::Connections;
 use crate::elements::Elements;
-use outline::{Outline, outlines};
+use outline::outlines;
 use region::{Region, regions};
 
 /// Structure of arrays, `[occluder]`.
@@ -39,42 +39,26 @@ impl Occluders {
 
     /// Elements of one plane merged, wherever that gives fewer triangles.
     pub fn merged(elements: &Elements, connections: &Connections) -> Self {
-        let mut regions = regions(elements, connections);
-        loop {
-            let drawn: Vec<(Region, Outline)> = {
-                let outlines = outlines(elements, connections, &regions);
-                // One that keeps all its corners pins them already, so that its going changes no other outline.
-                let pairs = regions.into_iter().zip(outlines);
-                pairs
-                    .filter(|(region, outline)| outline.corners() < region.corners(elements))
-                    .collect()
-            };
-            let triangles: Vec<_> = drawn
-                .par_iter()
-                .map(|(region, outline)| triangulate::triangulate(elements, region, outline))
-                .collect();
-            // Neighbours of one that fails must keep the corners that its elements have.
-            if triangles.iter().all(Option::is_some) {
-                let triangles = triangles.into_iter().flatten();
-                let regions: Vec<_> = drawn.into_iter().map(|(region, _)| region).collect();
-                return Self::from_regions(elements, connections, &regions, triangles);
-            }
-            regions = drawn
-                .into_iter()
-                .zip(&triangles)
-                .filter_map(|((region, _), triangles)| triangles.is_some().then_some(region))
-                .collect();
-        }
+        let regions = regions(elements, connections);
+        let outlines = outlines(elements, connections, &regions);
+        let drawn: Vec<_> = regions
+            .into_par_iter()
+            .zip(outlines)
+            .filter_map(|(region, outline)| {
+                let triangles = triangulate::triangulate(elements, &region, &outline)?;
+                Some((region, triangles))
+            })
+            .collect();
+        Self::from_regions(elements, connections, &drawn)
     }
 
     fn from_regions(
         elements: &Elements,
         connections: &Connections,
-        regions: &[Region],
-        triangles: impl Iterator<Item = Vec<[u32; 3]>>,
+        drawn: &[(Region, Vec<[u32; 3]>)],
     ) -> Self {
         let mut merged = vec![false; elements.len()];
-        for &e in regions.iter().flat_map(|region| &region.members) {
+        for &e in drawn.iter().flat_map(|(region, _)| &region.members) {
             merged[e as usize] = true;
         }
         let mut items: Vec<_> = (0..elements.len() as u32)
@@ -86,7 +70,7 @@ impl Occluders {
             .collect();
         let own = items.len();
         // Part by part, for meshlets are of one part each.
-        let mut pairs: Vec<_> = regions.iter().zip(triangles).collect();
+        let mut pairs: Vec<_> = drawn.iter().collect();
         pairs.sort_by_key(|(region, _)| connections.component[region.item as usize]);
         for (region, triangles) in pairs {
             items.extend(std::iter::repeat_n(region.item, triangles.len()));

@@ -14,17 +14,6 @@ pub struct Region {
     pub members: Vec<u32>,
 }
 
-impl Region {
-    /// How many vertices its elements have.
-    pub fn corners(&self, elements: &Elements) -> usize {
-        let corners = |&e: &u32| elements.corners[e as usize];
-        let mut vertices: Vec<_> = self.members.iter().flat_map(corners).collect();
-        vertices.sort_unstable();
-        vertices.dedup();
-        vertices.len()
-    }
-}
-
 /// Farthest that a corner may lie from the item's plane: a fifth of what passes tell heights apart by, for heights in f32 take
 /// their share of that.
 const PLANE: f64 = 2e-7;

@@ -1,7 +1,7 @@
 //! Triangles of a region from its outline.
 //!
-//! By a constrained Delaunay triangulation, since it keeps the corners at which an outline goes straight on and a neighbour
-//! needs one; ear clipping drops them.
+//! By a constrained Delaunay triangulation, since it keeps the corners at which an outline goes straight on; ear clipping drops
+//! them.
 
 use std::collections::HashSet;
 
