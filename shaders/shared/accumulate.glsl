@@ -13,3 +13,14 @@ void accumulate(uint e, vec3 add_direct, vec3 add_indirect) {
     indirect_error[e] = error;
     indirect[e] = t;
 }
+
+#ifdef TO_RELIEF
+// The same of the light that a relief reflects; binding meso_reflected.
+void accumulate_reflected(uint m, vec3 add) {
+    precise vec3 y = add - meso_reflected[m].error;
+    precise vec3 sum = meso_reflected[m].sum;
+    precise vec3 total = sum + y;
+    precise vec3 error = (total - sum) - y;
+    meso_reflected[m] = Reflected(total, error);
+}
+#endif

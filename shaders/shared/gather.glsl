@@ -72,25 +72,8 @@ layout(push_constant, scalar) uniform Parameters {
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Words { uint word[]; };
 
 #include "shared/accumulate.glsl"
-
 #ifdef FROM_RELIEF
-// What a source with a relief sends towards a place: the slot's own light, by direction.
-void send_by_direction(uint slot, Source s, vec3 to, inout vec3 emitted, inout vec3 reflected) {
-    vec3 d = to - s.middle;
-    vec3 local = vec3(dot(d, s.tangent), dot(d, s.bitangent), dot(d, s.normal)) * inversesqrt(max(dot(d, d), 1e-38));
-    Look at = look(local, cells);
-    uint count = cells.x * cells.y;
-    uint first = 2 * slot * count;
-    bool emits = emitted != vec3(0.0);
-    emitted = vec3(0.0);
-    reflected = vec3(0.0);
-    for (uint i = 0; i < 4; i++) {
-        if (emits) {
-            emitted += at.weight[i] * exits[first + at.k[i]];
-        }
-        reflected += at.weight[i] * exits[first + count + at.k[i]];
-    }
-}
+#include "shared/sent.glsl"
 #endif
 
 // What one element has received from the batch.
@@ -156,7 +139,10 @@ uint in_block(uint n) {
 void receive_from(uint slot, Slot shot, FLUX f, inout Receiver receiver) {
 #ifdef FROM_RELIEF
     if (shot.source - first_relief_source < relief_source_count) {
-        send_by_direction(slot, sources[shot.source], receiver.middle, shot.emitted, shot.reflected);
+        Source s = sources[shot.source];
+        vec3 d = receiver.middle - s.middle;
+        vec3 local = vec3(dot(d, s.tangent), dot(d, s.bitangent), dot(d, s.normal)) * inversesqrt(max(dot(d, d), 1e-38));
+        send_by_direction(slot, local, shot.emitted, shot.reflected);
     }
 #endif
     receive(receiver.received, shot.scale * f, receiver.i, shot.emitted, shot.reflected);
@@ -242,11 +228,7 @@ void main() {
         behind_count[first_element + i] += receivers[n].behind;
         accumulate(first_element + i, received.direct, received.indirect);
 #ifdef TO_RELIEF
-        precise vec3 y = received.reflected * meso_elements[i].scale - meso_reflected[i].error;
-        precise vec3 sum = meso_reflected[i].sum;
-        precise vec3 total = sum + y;
-        precise vec3 error = (total - sum) - y;
-        meso_reflected[i] = Reflected(total, error);
+        accumulate_reflected(i, received.reflected * meso_elements[i].scale);
 #endif
     }
 }

@@ -56,6 +56,7 @@ layout(push_constant, scalar) uniform Parameters {
 };
 
 #include "shared/accumulate.glsl"
+#include "shared/sent.glsl"
 
 // A triangle is cut off where it comes this near to the plane of the eye that a face looks along.
 const float NEAR = 1e-6;
@@ -186,17 +187,7 @@ void main() {
                     vec3 emitted = shot.emitted;
                     vec3 reflected = shot.reflected;
                     if (by_direction) {
-                        Look at = look(ray, cells);
-                        uint first = 2 * slot * directions;
-                        bool emits = emitted != vec3(0.0);
-                        emitted = vec3(0.0);
-                        reflected = vec3(0.0);
-                        for (uint i = 0; i < 4; i++) {
-                            if (emits) {
-                                emitted += at.weight[i] * exits[first + at.k[i]];
-                            }
-                            reflected += at.weight[i] * exits[first + directions + at.k[i]];
-                        }
+                        send_by_direction(slot, ray, emitted, reflected);
                     }
                     float weight = deltas[table + uint(row) * face_size + uint(column)] * power;
                     emitted *= weight;
@@ -239,10 +230,6 @@ void main() {
     }
     accumulate(e, add_direct, add_indirect);
 #ifdef TO_RELIEF
-    precise vec3 y = add_reflected - meso_reflected[m].error;
-    precise vec3 sum = meso_reflected[m].sum;
-    precise vec3 total = sum + y;
-    precise vec3 error = (total - sum) - y;
-    meso_reflected[m] = Reflected(total, error);
+    accumulate_reflected(m, add_reflected);
 #endif
 }
