@@ -13,8 +13,6 @@
 #endif
 #ifdef TO_RELIEF
 #include "shared/disc.glsl"
-#endif
-#ifdef TO_RELIEF
 #define FLUX vec3
 #else
 #define FLUX float

@@ -4,14 +4,19 @@
 //! elements' order, so that a source is a range of elements. An element that is itself too large or too bright is cut into
 //! several sources. A point light is two sources, one for each half of its sphere.
 
+mod group;
+mod single;
+
 use glam::{DVec3, Vec3};
 
 use crate::charts::{Connections, charts, morton_order};
-use crate::constants::{KIND_POINT, KIND_SURFACE, NONE};
-use crate::contour::{Loop, contour};
+use crate::constants::KIND_POINT;
+use crate::contour::Loop;
 use crate::elements::Elements;
 use crate::error::{Error, Result};
 use crate::scene::PointLight;
+use group::{Shape, bisect, group};
+use single::{halves, part, point};
 
 /// Where groups are cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -149,6 +154,10 @@ pub fn build(
         area > grouping.max_area * total_area
             || (emitted > 0.0 && emitted > grouping.max_power * total_power)
     };
+    let is_flat = |members: &[u32]| {
+        let members = members.iter().map(|&e| e as usize);
+        Shape::new(elements, members).flat
+    };
     let mut order = Vec::with_capacity(elements.len());
     let mut groups = Vec::new();
     let mut chart_of = Vec::with_capacity(elements.len());
@@ -162,7 +171,7 @@ pub fn build(
             let emitted = members.iter().map(|&e| power(e as usize)).sum();
             // A plane group's outline stands for all its members, however many.
             let many = members.len() > grouping.max_elements
-                && (elements.is_meso(members[0] as usize) || !is_flat(elements, &members));
+                && (elements.is_meso(members[0] as usize) || !is_flat(&members));
             let large = many || too_much(area, emitted);
             if large && members.len() > 1 {
                 let at = bisect(elements, &mut members);
@@ -220,217 +229,8 @@ pub fn build(
     (sources, connections)
 }
 
-/// Sorts the members along their longest extent and says where to cut: at the widest gap between neighbours in the middle
-/// third, which on a grid is a line of the grid.
-fn bisect(elements: &Elements, members: &mut [u32]) -> usize {
-    let centroid = |e: u32| elements.centroid[e as usize];
-    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for &e in members.iter() {
-        low = low.min(centroid(e));
-        high = high.max(centroid(e));
-    }
-    let extent = high - low;
-    let axis = (0..3).fold(0, |best, i| if extent[i] > extent[best] { i } else { best });
-    members.sort_by(|&a, &b| centroid(a)[axis].total_cmp(&centroid(b)[axis]));
-    let count = members.len();
-    let middle = (count / 3).max(1)..=(count - count / 3).min(count - 1);
-    let gap = |i: usize| centroid(members[i])[axis] - centroid(members[i - 1])[axis];
-    // Gaps of a grid agree to rounding only: among the widest, the one nearest to the middle.
-    let widest = middle.clone().map(gap).fold(0.0, f64::max) * (1.0 - 1e-6);
-    middle
-        .filter(|&i| gap(i) >= widest)
-        .min_by_key(|&i| i.abs_diff(count / 2))
-        .unwrap_or(count / 2)
-}
-
-/// Largest distance from the mean plane, as a share of the radius, at which a group still counts as plane.
-const FLAT: f64 = 1e-6;
-
-/// Whether all members lie in the first one's plane and face its way.
-fn is_flat(elements: &Elements, members: &[u32]) -> bool {
-    let first = members[0] as usize;
-    let (centre, normal) = (elements.centroid[first], elements.normal[first]);
-    members.iter().all(|&e| {
-        elements.normal[e as usize].dot(normal) > 0.5
-            && elements.triangle(e as usize).iter().all(|&v| {
-                let d = v - centre;
-                d.dot(normal).abs() <= FLAT * d.length()
-            })
-    })
-}
-
-fn group(elements: &Elements, connections: &Connections, range: std::ops::Range<usize>) -> Source {
-    let area: f64 = range.clone().map(|e| elements.area[e]).sum();
-    let weigh = |values: &[DVec3]| -> DVec3 {
-        range
-            .clone()
-            .map(|e| values[e] * elements.area[e])
-            .sum::<DVec3>()
-            / area
-    };
-    let centroid = weigh(&elements.centroid);
-    let mean = weigh(&elements.normal);
-    let facing = area * mean.length();
-    let mean = mean.normalize_or(elements.normal[range.start]);
-    let corners = || range.clone().flat_map(|e| elements.triangle(e));
-    let extent = corners().map(|v| v.distance(centroid)).fold(0.0, f64::max);
-    let flat = corners().all(|v| (v - centroid).dot(mean).abs() <= FLAT * extent)
-        && range.clone().all(|e| elements.normal[e].dot(mean) > 0.5);
-    let inside = flat
-        && range
-            .clone()
-            .any(|e| holds(elements.triangle(e), centroid, mean));
-    let eye = if inside {
-        centroid
-    } else {
-        let nearest = range
-            .clone()
-            .min_by(|&a, &b| {
-                let to = |e: usize| elements.centroid[e].distance_squared(centroid);
-                to(a).total_cmp(&to(b))
-            })
-            .unwrap_or(range.start);
-        elements.centroid[nearest]
-    };
-    let cone = if flat {
-        0.0
-    } else {
-        let cosine = range
-            .clone()
-            .map(|e| elements.normal[e].dot(mean))
-            .fold(1.0, f64::min);
-        cosine.clamp(-1.0, 1.0).acos().max(1e-6)
-    };
-    let emitted = range
-        .clone()
-        .map(|e| elements.emitted[e].as_dvec3() * elements.area[e])
-        .sum::<DVec3>()
-        / area;
-    Source {
-        kind: KIND_SURFACE,
-        eye,
-        centroid,
-        normal: mean,
-        tangent: DVec3::ZERO,
-        bitangent: DVec3::ZERO,
-        area,
-        facing,
-        parts: if flat {
-            Vec::new()
-        } else {
-            parts(elements, range.clone())
-        },
-        radius: corners().map(|v| v.distance(eye)).fold(0.0, f64::max),
-        cone,
-        emitted: emitted.as_vec3(),
-        first_element: range.start as u32,
-        element_count: range.len() as u32,
-        contour: contour(elements, range.clone()),
-        component: connections.component[range.start],
-    }
-}
-
-/// Most members of a part.
-const PART: usize = 6;
-
-fn parts(elements: &Elements, range: std::ops::Range<usize>) -> Vec<Part> {
-    let mut parts = Vec::new();
-    let mut stack = vec![range.map(|e| e as u32).collect::<Vec<_>>()];
-    while let Some(mut members) = stack.pop() {
-        if members.len() > PART {
-            let at = bisect(elements, &mut members);
-            stack.push(members.split_off(at));
-            stack.push(members);
-            continue;
-        }
-        let of = |e: &u32| *e as usize;
-        let area: f64 = members.iter().map(|e| elements.area[of(e)]).sum();
-        let weigh = |values: &[DVec3]| -> DVec3 {
-            let sum = members.iter().map(|e| values[of(e)] * elements.area[of(e)]);
-            sum.sum()
-        };
-        let centroid = weigh(&elements.centroid) / area;
-        let corners = members.iter().flat_map(|e| elements.triangle(of(e)));
-        parts.push(Part {
-            centroid,
-            vector_area: weigh(&elements.normal),
-            radius: corners.map(|v| v.distance(centroid)).fold(0.0, f64::max),
-        });
-    }
-    parts
-}
-
-/// An element, or a piece of one.
-fn part(elements: &Elements, connections: &Connections, e: usize, triangle: [DVec3; 3]) -> Source {
-    let eye = triangle.into_iter().sum::<DVec3>() / 3.0;
-    Source {
-        kind: KIND_SURFACE,
-        eye,
-        centroid: eye,
-        normal: elements.normal[e],
-        tangent: DVec3::ZERO,
-        bitangent: DVec3::ZERO,
-        area: triangle_area(triangle),
-        facing: triangle_area(triangle),
-        parts: Vec::new(),
-        radius: triangle
-            .into_iter()
-            .map(|v| v.distance(eye))
-            .fold(0.0, f64::max),
-        cone: 0.0,
-        emitted: elements.emitted[e],
-        first_element: e as u32,
-        element_count: 1,
-        contour: vec![triangle.to_vec()],
-        component: connections.component[e],
-    }
-}
-
-fn point(light: &PointLight, elements: &Elements) -> [Source; 2] {
-    let eye = (light.position - elements.origin) / elements.unit;
-    let half = |normal: DVec3, cone: f64| Source {
-        kind: KIND_POINT,
-        eye,
-        centroid: eye,
-        normal,
-        tangent: DVec3::ZERO,
-        bitangent: DVec3::ZERO,
-        area: 0.0,
-        facing: 0.0,
-        parts: Vec::new(),
-        radius: 0.0,
-        // The shader gives the plane between the halves to the one whose cone is 0.
-        cone,
-        emitted: (DVec3::from_array(light.intensity.map(f64::from))
-            / (elements.unit * elements.unit))
-            .as_vec3(),
-        first_element: 0,
-        element_count: 0,
-        contour: Vec::new(),
-        component: NONE,
-    };
-    [half(DVec3::Y, 0.0), half(DVec3::NEG_Y, 1.0)]
-}
-
 pub(crate) fn triangle_area([a, b, c]: [DVec3; 3]) -> f64 {
     0.5 * (b - a).cross(c - a).length()
-}
-
-/// Cut at the middle of the longest edge.
-fn halves(triangle: [DVec3; 3]) -> [[DVec3; 3]; 2] {
-    let length = |i: usize| triangle[i].distance_squared(triangle[(i + 1) % 3]);
-    let longest = (0..3).fold(0, |best, i| if length(i) > length(best) { i } else { best });
-    let [a, b, c] = [0, 1, 2].map(|i| triangle[(longest + i) % 3]);
-    let middle = 0.5 * (a + b);
-    [[a, middle, c], [middle, b, c]]
-}
-
-/// Whether a point of the plane with normal `n` lies in a triangle, its edges included.
-fn holds(triangle: [DVec3; 3], p: DVec3, n: DVec3) -> bool {
-    (0..3).all(|i| {
-        let (a, b) = (triangle[i], triangle[(i + 1) % 3]);
-        (b - a).cross(p - a).dot(n) >= -1e-9 * (b - a).length_squared()
-    })
 }
 
 /// Tangent and bitangent about `normal` (Duff et al. 2017), turned by an angle drawn from the seed and the index.
@@ -449,4 +249,29 @@ fn unit_random(seed: u64, index: u64) -> f64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bench::stress::shapes::Shapes;
+
+    /// However fine, and at right angles to no axis: coordinates are rounded.
+    #[test]
+    fn finer_planes_make_no_more_sources() {
+        let turn = glam::DQuat::from_euler(glam::EulerRot::XYZ, 0.3, 0.5, 0.7);
+        let mut shapes = Shapes::new();
+        let (x, y) = (turn * DVec3::X, turn * DVec3::Y);
+        shapes.quad(DVec3::ZERO, x, y, (200, 200), 0);
+        shapes.weld();
+        let count = |max_elements| {
+            let grouping = Grouping {
+                max_elements,
+                ..Grouping::default()
+            };
+            let mut elements = Elements::new(&shapes.scene);
+            build(&mut elements, &[], &grouping, 0).0.list.len()
+        };
+        assert_eq!(count(48), count(usize::MAX));
+    }
 }
