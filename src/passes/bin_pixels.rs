@@ -62,14 +62,12 @@ impl BinPixels {
                 &[],
                 false,
             )?,
-            apply: ComputePipeline::new(
+            apply: ComputePipeline::storage(
                 device,
                 "apply pixels",
                 shaders::APPLY_PIXELS_COMP,
-                &[Binding::Storage; 8],
+                8,
                 push,
-                &[],
-                false,
             )?,
         })
     }

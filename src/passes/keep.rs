@@ -7,7 +7,7 @@ use super::buffers::{Batch, State};
 use super::factor_buffers::FactorBuffers;
 use super::shaders;
 use crate::error::Result;
-use crate::vk::{Bind, Binding, Commands, ComputePipeline, DescriptorSet, Device, Stage};
+use crate::vk::{Bind, Commands, ComputePipeline, DescriptorSet, Device, Stage};
 
 pub struct Keep {
     allocate: ComputePipeline,
@@ -22,10 +22,8 @@ pub struct Sets {
 
 impl Keep {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
-        let make = |name, spirv, words: usize| {
-            let kinds = [Binding::Storage; 5];
-            ComputePipeline::new(device, name, spirv, &kinds, 4 * words, &[], false)
-        };
+        let make =
+            |name, spirv, words: usize| ComputePipeline::storage(device, name, spirv, 5, 4 * words);
         Ok(Self {
             allocate: make("allocate", shaders::ALLOCATE_COMP, 5)?,
             keep: make("keep", shaders::KEEP_COMP, 3)?,

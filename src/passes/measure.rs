@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::buffers::{SceneBuffers, State};
 use super::{groups, shaders};
 use crate::error::Result;
-use crate::vk::{Bind, Binding, Commands, ComputePipeline, DescriptorSet, Device};
+use crate::vk::{Bind, Commands, ComputePipeline, DescriptorSet, Device};
 
 pub struct Measure {
     pipeline: ComputePipeline,
@@ -14,15 +14,7 @@ pub struct Measure {
 impl Measure {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
         Ok(Self {
-            pipeline: ComputePipeline::new(
-                device,
-                "measure",
-                shaders::MEASURE_COMP,
-                &[Binding::Storage; 7],
-                4,
-                &[],
-                false,
-            )?,
+            pipeline: ComputePipeline::storage(device, "measure", shaders::MEASURE_COMP, 7, 4)?,
         })
     }
 

@@ -7,7 +7,7 @@ use super::buffers::{SceneBuffers, State};
 use super::relief_buffers::ReliefBuffers;
 use super::{groups, shaders};
 use crate::error::Result;
-use crate::vk::{Bind, Binding, Commands, ComputePipeline, DescriptorSet, Device};
+use crate::vk::{Bind, Commands, ComputePipeline, DescriptorSet, Device};
 
 pub struct MeasureRelief {
     pipeline: ComputePipeline,
@@ -16,14 +16,12 @@ pub struct MeasureRelief {
 impl MeasureRelief {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
         Ok(Self {
-            pipeline: ComputePipeline::new(
+            pipeline: ComputePipeline::storage(
                 device,
                 "measure relief",
                 shaders::MEASURE_RELIEF_COMP,
-                &[Binding::Storage; 5],
+                5,
                 12,
-                &[],
-                false,
             )?,
         })
     }

@@ -7,7 +7,7 @@ use super::buffers::{Batch, SceneBuffers};
 use super::factor_buffers::FactorBuffers;
 use super::shaders;
 use crate::error::Result;
-use crate::vk::{Bind, Binding, Commands, ComputePipeline, DescriptorSet, Device};
+use crate::vk::{Bind, Commands, ComputePipeline, DescriptorSet, Device};
 
 pub struct Normalise {
     pipeline: ComputePipeline,
@@ -16,15 +16,7 @@ pub struct Normalise {
 impl Normalise {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
         Ok(Self {
-            pipeline: ComputePipeline::new(
-                device,
-                "normalise",
-                shaders::NORMALISE_COMP,
-                &[Binding::Storage; 5],
-                8,
-                &[],
-                false,
-            )?,
+            pipeline: ComputePipeline::storage(device, "normalise", shaders::NORMALISE_COMP, 5, 8)?,
         })
     }
 

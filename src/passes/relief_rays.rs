@@ -8,7 +8,7 @@ use super::buffers::{download, upload};
 use super::types::{HeightHit, HeightRay, HeightTile};
 use super::{groups, shaders};
 use crate::error::Result;
-use crate::vk::{Bind, Binding, Buffer, BufferUse, Commands, ComputePipeline, Device};
+use crate::vk::{Bind, Buffer, BufferUse, Commands, ComputePipeline, Device};
 
 pub struct ReliefRays {
     pipeline: ComputePipeline,
@@ -28,14 +28,12 @@ const SUBMISSION: u32 = 1 << 18;
 impl ReliefRays {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
         Ok(Self {
-            pipeline: ComputePipeline::new(
+            pipeline: ComputePipeline::storage(
                 device,
                 "relief rays",
                 shaders::RELIEF_RAYS_COMP,
-                &[Binding::Storage; 4],
+                4,
                 size_of::<Parameters>(),
-                &[],
-                false,
             )?,
             device: Arc::clone(device),
         })

@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 use super::buffers::{Batch, SceneBuffers, State};
 use super::shaders;
 use crate::error::Result;
-use crate::vk::{Bind, Binding, Commands, ComputePipeline, DescriptorSet, Device};
+use crate::vk::{Bind, Commands, ComputePipeline, DescriptorSet, Device};
 
 pub struct Select {
     pipeline: ComputePipeline,
@@ -29,14 +29,12 @@ pub struct Parameters {
 impl Select {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
         Ok(Self {
-            pipeline: ComputePipeline::new(
+            pipeline: ComputePipeline::storage(
                 device,
                 "select",
                 shaders::SELECT_COMP,
-                &[Binding::Storage; 7],
+                7,
                 size_of::<Parameters>(),
-                &[],
-                false,
             )?,
         })
     }

@@ -7,7 +7,7 @@ use super::buffers::{Batch, SceneBuffers};
 use super::relief_buffers::ReliefBuffers;
 use super::shaders;
 use crate::error::Result;
-use crate::vk::{Bind, Binding, Commands, ComputePipeline, DescriptorSet, Device};
+use crate::vk::{Bind, Commands, ComputePipeline, DescriptorSet, Device};
 
 pub struct SendRelief {
     pipeline: ComputePipeline,
@@ -16,14 +16,12 @@ pub struct SendRelief {
 impl SendRelief {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
         Ok(Self {
-            pipeline: ComputePipeline::new(
+            pipeline: ComputePipeline::storage(
                 device,
                 "send relief",
                 shaders::SEND_RELIEF_COMP,
-                &[Binding::Storage; 15],
+                15,
                 28,
-                &[],
-                false,
             )?,
         })
     }

@@ -15,7 +15,7 @@ use super::types::{LightPoint, ShadowNode, ShadowRay, ShadowTriangle};
 use super::{groups, shaders};
 use crate::constants::KIND_SURFACE;
 use crate::error::Result;
-use crate::vk::{Bind, Binding, Buffer, BufferUse, Commands, ComputePipeline, Device};
+use crate::vk::{Bind, Buffer, BufferUse, Commands, ComputePipeline, Device};
 
 /// Boxes are wider than their triangles by this share of the greatest coordinate, 2⁻²⁰: the walk's places on a ray of at
 /// most twice that length are right to 2⁻²¹ of it.
@@ -146,14 +146,12 @@ impl ShadowRays {
     /// A device that fails.
     pub fn new(device: &Arc<Device>) -> Result<Self> {
         Ok(Self {
-            pipeline: ComputePipeline::new(
+            pipeline: ComputePipeline::storage(
                 device,
                 "shadow rays",
                 shaders::SHADOW_RAYS_COMP,
-                &[Binding::Storage; 4],
+                4,
                 size_of::<u32>(),
-                &[],
-                false,
             )?,
             device: Arc::clone(device),
         })

@@ -81,6 +81,18 @@ impl ComputePipeline {
         Ok(pipeline)
     }
 
+    /// Of storage buffers alone, without constants.
+    pub fn storage(
+        device: &Arc<Device>,
+        name: &str,
+        spirv: &[u32],
+        buffers: usize,
+        push_bytes: usize,
+    ) -> Result<Self> {
+        let bindings = vec![Binding::Storage; buffers];
+        Self::new(device, name, spirv, &bindings, push_bytes, &[], false)
+    }
+
     pub fn bind(&self, name: &str, binds: &[Bind<'_>]) -> Result<DescriptorSet> {
         self.descriptors.bind(name, binds)
     }

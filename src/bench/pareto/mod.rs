@@ -184,6 +184,9 @@ pub fn run(
     let mut rows: Vec<Row> = Vec::new();
     let mut closest: Option<(f64, Done)> = None;
     let mut told = None;
+    let save = |rows: &[Row], told: Option<&Breakdown>| {
+        write((scene, device, options), &truth, (rows, told), folder)
+    };
     for trial in options.grid.tries(scene) {
         if !go_on() {
             break;
@@ -201,12 +204,7 @@ pub fn run(
                 closest = Some((last.measure.rms, done));
             }
         }
-        write(
-            (scene, device, options),
-            &truth,
-            (&rows, told.as_ref()),
-            folder,
-        )?;
+        save(&rows, told.as_ref())?;
     }
     if let Some(limit) = options.peers.filter(|_| go_on()) {
         let job = Job {
@@ -224,12 +222,7 @@ pub fn run(
         if let Some(why) = job.mitsuba(&options.python, &folder.join("mitsuba"), &mut add)? {
             println!("Mitsuba 3 is left out: {why}");
         }
-        write(
-            (scene, device, options),
-            &truth,
-            (&rows, told.as_ref()),
-            folder,
-        )?;
+        save(&rows, told.as_ref())?;
     }
     println!("\nbest settings, none of which is slower and further off than another:\n{HEADER}");
     let mut best: Vec<&Row> = rows.iter().filter(|r| r.best).collect();
