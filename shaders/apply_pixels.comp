@@ -48,5 +48,6 @@ void main() {
         add_direct += weight * shot.emitted;
         add_indirect += weight * shot.reflected;
     }
-    accumulate(e, add_direct, add_indirect);
+    accumulate(direct[e], direct_error[e], add_direct);
+    accumulate(indirect[e], indirect_error[e], add_indirect);
 }

@@ -13,8 +13,9 @@ layout(scalar, binding = 2) buffer Unshot { vec4 unshot[]; };
 layout(scalar, binding = 3) writeonly buffer Slots { Slot slots[]; };
 layout(scalar, binding = 4) buffer State { Progress progress; };
 layout(scalar, binding = 5) readonly buffer KeptRows { KeptRow kept_rows[]; };
-// Of the passes over elements, without and with relief, and slots that are drawn.
-layout(scalar, binding = 6) buffer Commands { ReceiverList commands[2]; };
+// Of the passes over elements, without and with relief, for slots that are drawn, and for light that is emitted.
+layout(scalar, binding = 6) buffer DrawnCommands { ReceiverList drawn_commands[2]; };
+layout(scalar, binding = 7) buffer EmittingCommands { ReceiverList emitting_commands[2]; };
 
 layout(push_constant, scalar) uniform Parameters {
     uint source_count;
@@ -30,6 +31,7 @@ shared float sum_emitted[SELECT_GROUP];
 shared float sum_reflected[SELECT_GROUP];
 shared float best_kept[SELECT_GROUP];
 shared uint replays_before[SELECT_GROUP];
+shared uint emitting;
 
 bool is_kept(uint s) {
     return kept_rows[s].chunk != NONE;
@@ -53,6 +55,9 @@ void scan(uint lane) {
 void shoot(uint slot, uint source) {
     bool emission_left = shot[source].w == 0.0;
     vec3 of_reflected = unshot[source].rgb;
+    if (emission_left && sources[source].emitted != vec3(0.0)) {
+        atomicOr(emitting, 1);
+    }
     slots[slot] = Slot(emission_left ? sources[source].emitted : vec3(0.0), source, of_reflected, is_kept(source) ? kept_rows[source].scale : 1.0);
     shot[source] = vec4(shot[source].rgb + of_reflected, 1.0);
     unshot[source].w = 0.0;
@@ -73,6 +78,7 @@ void main() {
     best_kept[lane] = kept;
     sum_emitted[lane] = emitted;
     sum_reflected[lane] = reflected;
+    emitting = 0;
     scan(lane);
     barrier();
     for (uint half_count = SELECT_GROUP / 2; half_count > 0; half_count /= 2) {
@@ -157,9 +163,12 @@ void main() {
     for (uint slot = replayed + lane; slot < replay_slots; slot += SELECT_GROUP) {
         slots[fresh_slots + slot].source = NONE;
     }
+    barrier();
     if (lane == 0) {
-        commands[0].groups_y = min(chosen, 1);
-        commands[1].groups_y = min(chosen, 1);
+        for (uint i = 0; i < 2; i++) {
+            drawn_commands[i].groups_y = min(chosen, 1);
+            emitting_commands[i].groups_y = emitting;
+        }
         progress = Progress(unshot_emitted, unshot_reflected, shots + chosen + replayed, chosen, replayed);
     }
 }

@@ -5,6 +5,9 @@
 #extension GL_GOOGLE_include_directive : require
 #include "shared/receivers.glsl"
 
+// Form factors that were passed over because the source lies behind the element's plane.
+layout(scalar, binding = 7) buffer Behind { uint behind_count[]; };
+
 // Lane k of a subgroup makes room in the list of kind k for all lanes.
 void append(uint slot, uint kind, bool mine, uint i) {
     uint count = 0;
@@ -29,8 +32,9 @@ void append(uint slot, uint kind, bool mine, uint i) {
     }
 }
 
-// How the form factor from an element to a source is found; RECEIVE_KINDS where it is 0.
-uint kind_of(uint slot, Source s, uint e, vec4 ball, vec3 n) {
+// How the form factor from an element to a source is found; RECEIVE_KINDS where it is 0, and `behind` says whether for that the
+// source lies behind the element.
+uint kind_of(uint slot, Source s, uint e, vec4 ball, vec3 n, out bool behind) {
     vec3 d = ball.xyz - s.eye;
     float distance_eye = length(d);
     float across = dot(d, n);
@@ -45,17 +49,20 @@ uint kind_of(uint slot, Source s, uint e, vec4 ball, vec3 n) {
     bool by_parts = curved && points;
     uint kind = near ? RECEIVE_NEAR : far ? RECEIVE_FAR : by_parts ? RECEIVE_PARTS
         : whole && above ? RECEIVE_OUTLINE : RECEIVE_NEAR;
-    return across < s.radius && (near || seen) ? kind : RECEIVE_KINDS;
+    behind = across >= s.radius;
+    return !behind && (near || seen) ? kind : RECEIVE_KINDS;
 }
 
 void main() {
     vec4 ball[SORT_ELEMENTS];
     vec3 n[SORT_ELEMENTS];
+    uint passed_over[SORT_ELEMENTS];
     uint first = SORT_ELEMENTS * GROUP * gl_WorkGroupID.x + gl_LocalInvocationID.x;
     for (uint j = 0; j < SORT_ELEMENTS; j++) {
         uint e = first_element + min(first + j * GROUP, element_count - 1);
         ball[j] = balls[e];
         n[j] = planes[e].xyz;
+        passed_over[j] = 0;
     }
     for (uint slot = 0; slot < slot_count; slot++) {
         uint source = slots[slot].source;
@@ -65,8 +72,16 @@ void main() {
         Source s = load_source(source);
         for (uint j = 0; j < SORT_ELEMENTS; j++) {
             uint i = first + j * GROUP;
-            uint kind = kind_of(slot, s, first_element + i, ball[j], n[j]);
+            bool behind;
+            uint kind = kind_of(slot, s, first_element + i, ball[j], n[j], behind);
             append(slot, kind, i < element_count && kind < RECEIVE_KINDS, i);
+            passed_over[j] += behind ? 1 : 0;
+        }
+    }
+    for (uint j = 0; j < SORT_ELEMENTS; j++) {
+        uint i = first + j * GROUP;
+        if (i < element_count) {
+            behind_count[first_element + i] += passed_over[j];
         }
     }
 }

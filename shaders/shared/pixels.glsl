@@ -187,7 +187,8 @@ void main() {
                     vec3 emitted = shot.emitted;
                     vec3 reflected = shot.reflected;
                     if (by_direction) {
-                        send_by_direction(slot, ray, emitted, reflected);
+                        emitted = shot.emitted == vec3(0.0) ? vec3(0.0) : sent_towards(slot, 0, ray);
+                        reflected = sent_towards(slot, 1, ray);
                     }
                     float weight = deltas[table + uint(row) * face_size + uint(column)] * power;
                     emitted *= weight;
@@ -228,8 +229,9 @@ void main() {
             }
         }
     }
-    accumulate(e, add_direct, add_indirect);
+    accumulate(direct[e], direct_error[e], add_direct);
+    accumulate(indirect[e], indirect_error[e], add_indirect);
 #ifdef TO_RELIEF
-    accumulate_reflected(m, add_reflected);
+    accumulate(meso_reflected[m].sum, meso_reflected[m].error, add_reflected);
 #endif
 }

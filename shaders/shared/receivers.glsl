@@ -5,6 +5,7 @@
 #extension GL_KHR_shader_subgroup_ballot : require
 #include "shared/types.glsl"
 #include "shared/hemicube.glsl"
+#include "shared/load4.glsl"
 
 layout(local_size_x = GROUP) in;
 
@@ -81,18 +82,6 @@ bool visible(vec3 p, vec3 n, uint element, uint slot, Source s) {
     float sine = length(cross(n, plane.xyz));
     return apart <= REACH * footprint && depth <= apart * sine + HEIGHT_EPSILON;
 }
-
-// Four words that all lanes of the subgroup want, from `first` on. Each lane loads one of them: a load costs a software device
-// as much as some ten operations for each lane, wherever it points. All lanes must be active.
-#define LOAD4(words, first) share4(words[(first) + (gl_SubgroupInvocationID & 3)])
-
-vec4 share4(uint word) {
-    float value = uintBitsToFloat(word);
-    return vec4(subgroupBroadcast(value, 0), subgroupBroadcast(value, 1), subgroupBroadcast(value, 2),
-                subgroupBroadcast(value, 3));
-}
-
-const uint SOURCE_WORDS = 32;
 
 Source load_source(uint index) {
     vec4 word[SOURCE_WORDS / 4];

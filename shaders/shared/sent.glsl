@@ -1,17 +1,12 @@
-// What a source with a relief sends towards `local`, a unit vector in its hemicube's frame: the slot's own light, by direction.
-// Including files have the binding exits, [slot][emitted, reflected][direction], and `cells` of the directions' square.
+// What a source with a relief sends towards `local`, a unit vector in its hemicube's frame: emitted light for `kind` 0, reflected
+// light for 1. Including files have the binding exits, [slot][emitted, reflected][direction], and `cells` of the directions' square.
 
-void send_by_direction(uint slot, vec3 local, inout vec3 emitted, inout vec3 reflected) {
+vec3 sent_towards(uint slot, uint kind, vec3 local) {
     Look at = look(local, cells);
-    uint count = cells.x * cells.y;
-    uint first = 2 * slot * count;
-    bool emits = emitted != vec3(0.0);
-    emitted = vec3(0.0);
-    reflected = vec3(0.0);
+    uint first = (2 * slot + kind) * cells.x * cells.y;
+    vec3 sent = vec3(0.0);
     for (uint i = 0; i < 4; i++) {
-        if (emits) {
-            emitted += at.weight[i] * exits[first + at.k[i]];
-        }
-        reflected += at.weight[i] * exits[first + count + at.k[i]];
+        sent += at.weight[i] * exits[first + at.k[i]];
     }
+    return sent;
 }

@@ -232,8 +232,10 @@ pub struct Batch {
     /// Pixels a side of a face.
     pub face_size: u32,
     pub slots: Buffer,
-    /// [`ReceiverList`]s: dispatches over the elements without and with relief and the slots that are drawn in this batch.
-    pub commands: Buffer,
+    /// [`ReceiverList`]s: dispatches over the elements without and with relief, where slots are drawn in this batch, …
+    pub drawn_commands: Buffer,
+    /// … and where some emit.
+    pub emitting_commands: Buffer,
     pub views: Buffer,
     pub draws: Buffer,
     pub counts: Buffer,
@@ -288,6 +290,10 @@ impl Batch {
         let regions = u64::from(slot_count * FACES);
         let drawn = regions * u64::from(scene.occluder_count);
         let buffer = |name, bytes, usage| Buffer::new(device, name, bytes, usage);
+        let commands = |name| {
+            let bytes = 2 * size_of::<ReceiverList>() as u64;
+            buffer(name, bytes, BufferUse::Geometry)
+        };
         let size = (slot_count * face_size, 3 * face_size);
         let items = Image::new(
             device,
@@ -317,11 +323,8 @@ impl Batch {
             replay_slots,
             face_size,
             slots: upload(device, "slots", &empty, BufferUse::Storage)?,
-            commands: buffer(
-                "fresh commands",
-                2 * size_of::<ReceiverList>() as u64,
-                BufferUse::Geometry,
-            )?,
+            drawn_commands: commands("drawn commands")?,
+            emitting_commands: commands("emitting commands")?,
             views: buffer(
                 "views",
                 regions * size_of::<View>() as u64,

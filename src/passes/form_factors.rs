@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::buffers::{Batch, SceneBuffers, write};
+use super::buffers::{Batch, SceneBuffers, State, write};
 use super::factor_buffers::{FactorBuffers, ReceiverLists};
 use super::relief_buffers::ReliefBuffers;
 use super::types::ReceiverList;
@@ -52,7 +52,7 @@ struct Parameters {
 
 /// Place of the item buffer among the bindings, and how many there are for sorting and in all.
 const ITEMS: usize = 6;
-const SORT: usize = 7;
+const SORT: usize = 8;
 const PLAIN: usize = 12;
 
 fn pipeline(
@@ -98,7 +98,7 @@ impl FormFactors {
     pub fn bind(
         &self,
         device: &Arc<Device>,
-        scene: &SceneBuffers,
+        (scene, state): (&SceneBuffers, &State),
         batch: &Batch,
         factors: &FactorBuffers,
         relief: Option<&ReliefBuffers>,
@@ -116,7 +116,9 @@ impl FormFactors {
                 .map(Bind::Buffer)
                 .to_vec();
                 binds.push(Bind::Image(&batch.items, &batch.sampler));
-                let sort = self.sort.bind("sort receivers", &binds)?;
+                let behind = Bind::Buffer(&state.behind);
+                let sort = [&binds[..], &[behind]].concat();
+                let sort = self.sort.bind("sort receivers", &sort)?;
                 let rest = [
                     &scene.contours,
                     &scene.triangles,
@@ -129,14 +131,9 @@ impl FormFactors {
                 let kinds = pipelines.iter().map(|p| p.bind("form factors", &binds));
                 Ok::<_, crate::error::Error>((sort, kinds.collect::<Result<Vec<_>>>()?))
             };
-        let command = |elements: u32| ReceiverList {
-            groups_x: groups(elements.div_ceil(SORT_ELEMENTS)),
-            groups_y: 0,
-            groups_z: 1,
-            count: 0,
-        };
-        let commands = [factors.plain_count, factors.meso_count].map(command);
-        write(device, &batch.commands, &commands)?;
+        let commands = [factors.plain_count, factors.meso_count]
+            .map(|count| ReceiverList::idle(groups(count.div_ceil(SORT_ELEMENTS))));
+        write(device, &batch.drawn_commands, &commands)?;
         let (sort, kinds) = bind(&self.plain, &factors.plain_lists, &factors.fresh, None)?;
         let plain = Range {
             first_element: 0,
@@ -190,7 +187,7 @@ impl FormFactors {
             // A batch of replays alone sorts nothing.
             let at = (size_of::<ReceiverList>() * i) as u64;
             let push = parameters(range, 0);
-            cmd.dispatch_indirect(&self.sort, &range.sort, &push, (&batch.commands, at));
+            cmd.dispatch_indirect(&self.sort, &range.sort, &push, (&batch.drawn_commands, at));
         }
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         // Every element is in one list of a slot at most.

@@ -5,12 +5,13 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::buffers::{Batch, SceneBuffers, State};
+use super::buffers::{Batch, SceneBuffers, State, write};
 use super::factor_buffers::FactorBuffers;
 use super::relief_buffers::ReliefBuffers;
+use super::types::ReceiverList;
 use super::{groups, shaders};
 use crate::error::Result;
-use crate::vk::{Bind, Binding, Commands, ComputePipeline, DescriptorSet, Device};
+use crate::vk::{Bind, Binding, Buffer, Commands, ComputePipeline, DescriptorSet, Device, Stage};
 
 /// Gathering in a scene without relief.
 pub struct Gather {
@@ -23,10 +24,13 @@ pub struct GatherRelief {
     to: ComputePipeline,
 }
 
+/// For emitted light, which few batches have, and for reflected light.
+pub type Sets = [DescriptorSet; 2];
+
 /// Sets of [`GatherRelief`].
 pub struct ReliefSets {
-    from: DescriptorSet,
-    to: DescriptorSet,
+    from: Sets,
+    to: Sets,
 }
 
 #[repr(C)]
@@ -37,6 +41,8 @@ struct Parameters {
     fresh_slots: u32,
     slot_count: u32,
     first_block: u32,
+    /// 0: emitted light, 1: reflected.
+    reflected: u32,
 }
 
 #[repr(C)]
@@ -48,8 +54,10 @@ struct ReliefParameters {
     cells: [u32; 2],
 }
 
-/// Bindings that all have.
-const COMMON: usize = 12;
+/// How many bindings each shader has.
+const PLAIN: usize = 6;
+const FROM_RELIEF: usize = PLAIN + 3;
+const TO_RELIEF: usize = FROM_RELIEF + 4;
 
 fn pipeline<P>(
     device: &Arc<Device>,
@@ -62,68 +70,71 @@ fn pipeline<P>(
     ComputePipeline::new(device, name, spirv, &kinds, size_of::<P>(), &lanes, true)
 }
 
+/// What all bind, for emitted and for reflected light.
 fn binds<'a>(
-    scene: &'a SceneBuffers,
     state: &'a State,
     batch: &'a Batch,
     factors: &'a FactorBuffers,
-    fresh: &'a crate::vk::Buffer,
-) -> Vec<Bind<'a>> {
-    [
-        &batch.slots,
-        &scene.sources,
-        &scene.planes,
-        &scene.balls,
-        &state.direct,
-        &state.direct_error,
-        &state.indirect,
-        &state.indirect_error,
-        &state.behind,
-        fresh,
-        &state.kept_rows,
-        &factors.table,
-    ]
-    .map(Bind::Buffer)
-    .to_vec()
+    fresh: &'a Buffer,
+) -> [Vec<&'a Buffer>; 2] {
+    let lights = [
+        (&state.direct, &state.direct_error),
+        (&state.indirect, &state.indirect_error),
+    ];
+    lights.map(|(irradiance, error)| {
+        let rows = (&state.kept_rows, &factors.table);
+        vec![&batch.slots, irradiance, error, fresh, rows.0, rows.1]
+    })
 }
 
-fn parameters(
-    batch: &Batch,
-    first_element: u32,
-    element_count: u32,
-    first_block: u32,
-) -> Parameters {
-    Parameters {
-        first_element,
-        element_count,
-        fresh_slots: batch.slot_count,
-        slot_count: batch.all_slots(),
-        first_block,
-    }
+fn sets(pipeline: &ComputePipeline, name: &str, binds: &[Vec<&Buffer>; 2]) -> Result<Sets> {
+    let set = |buffers: &Vec<&Buffer>| {
+        let binds: Vec<_> = buffers.iter().map(|b| Bind::Buffer(b)).collect();
+        pipeline.bind(name, &binds)
+    };
+    Ok([set(&binds[0])?, set(&binds[1])?])
+}
+
+/// Has the elements without and with relief gather emitted light in the batches that have some.
+fn command_emitting(device: &Arc<Device>, batch: &Batch, elements: [u32; 2]) -> Result<()> {
+    let commands = elements.map(|count| ReceiverList::idle(groups(count)));
+    write(device, &batch.emitting_commands, &commands)
 }
 
 impl Gather {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
         Ok(Self {
-            pipeline: pipeline::<Parameters>(device, "gather", shaders::GATHER_COMP, COMMON)?,
+            pipeline: pipeline::<Parameters>(device, "gather", shaders::GATHER_COMP, PLAIN)?,
         })
     }
 
     pub fn bind(
         &self,
+        device: &Arc<Device>,
         scene: &SceneBuffers,
         state: &State,
         batch: &Batch,
         factors: &FactorBuffers,
-    ) -> Result<DescriptorSet> {
-        let binds = binds(scene, state, batch, factors, &factors.fresh);
-        self.pipeline.bind("gather", &binds)
+    ) -> Result<Sets> {
+        command_emitting(device, batch, [scene.element_count, 0])?;
+        let binds = binds(state, batch, factors, &factors.fresh);
+        sets(&self.pipeline, "gather", &binds)
     }
 
-    pub fn record(&self, cmd: &Commands, set: &DescriptorSet, scene: &SceneBuffers, batch: &Batch) {
+    pub fn record(&self, cmd: &Commands, sets: &Sets, scene: &SceneBuffers, batch: &Batch) {
         let count = scene.element_count;
-        let parameters = parameters(batch, 0, count, 0);
-        cmd.dispatch(&self.pipeline, set, &parameters, [groups(count), 1, 1]);
+        let parameters = |reflected| Parameters {
+            first_element: 0,
+            element_count: count,
+            fresh_slots: batch.slot_count,
+            slot_count: batch.all_slots(),
+            first_block: 0,
+            reflected,
+        };
+        let emitting = (&batch.emitting_commands, 0);
+        cmd.dispatch_indirect(&self.pipeline, &sets[0], &parameters(0), emitting);
+        let size = [groups(count), 1, 1];
+        cmd.dispatch(&self.pipeline, &sets[1], &parameters(1), size);
     }
 }
 
@@ -134,43 +145,37 @@ impl GatherRelief {
         let from = shaders::GATHER_FROM_RELIEF_COMP;
         let to = shaders::GATHER_TO_RELIEF_COMP;
         Ok(Self {
-            from: make("gather from relief", from, COMMON + 1)?,
-            to: make("gather to relief", to, COMMON + 6)?,
+            from: make("gather from relief", from, FROM_RELIEF)?,
+            to: make("gather to relief", to, TO_RELIEF)?,
         })
     }
 
     pub fn bind(
         &self,
-        scene: &SceneBuffers,
-        state: &State,
+        device: &Arc<Device>,
+        (scene, state): (&SceneBuffers, &State),
         batch: &Batch,
         factors: &FactorBuffers,
         relief: &ReliefBuffers,
     ) -> Result<ReliefSets> {
-        let binds = |fresh| {
-            let mut binds = binds(scene, state, batch, factors, fresh);
-            binds.push(Bind::Buffer(&relief.exits));
-            binds
-        };
-        let from = binds(&factors.fresh);
-        let mut to = binds(&factors.fresh_meso);
-        to.extend(
-            [
-                &relief.elements,
-                &relief.albedos,
-                &relief.moments_direct,
-                &relief.moments_indirect,
-                &relief.reflected,
-            ]
-            .map(Bind::Buffer),
-        );
+        command_emitting(device, batch, [factors.plain_count, factors.meso_count])?;
+        let sending = [&relief.exits, &scene.sources, &scene.balls];
+        let mut from = binds(state, batch, factors, &factors.fresh);
+        let mut to = binds(state, batch, factors, &factors.fresh_meso);
+        let moments = [&relief.moments_direct, &relief.moments_indirect];
+        for i in 0..2 {
+            from[i].extend(sending);
+            to[i].extend(sending);
+            let receiving = [&relief.elements, &relief.albedos];
+            to[i].extend(receiving.into_iter().chain([moments[i], &relief.reflected]));
+        }
         Ok(ReliefSets {
-            from: self.from.bind("gather from relief", &from)?,
-            to: self.to.bind("gather to relief", &to)?,
+            from: sets(&self.from, "gather from relief", &from)?,
+            to: sets(&self.to, "gather to relief", &to)?,
         })
     }
 
-    /// The two dispatches write to different elements.
+    /// Elements without and with relief are written to at once.
     pub fn record(
         &self,
         cmd: &Commands,
@@ -179,18 +184,43 @@ impl GatherRelief {
         batch: &Batch,
         factors: &FactorBuffers,
     ) {
-        let parameters = |first_element, element_count, first_block| ReliefParameters {
-            common: parameters(batch, first_element, element_count, first_block),
+        let (plain, meso) = (factors.plain_count, factors.meso_count);
+        let parameters = |meso_elements: bool, reflected| ReliefParameters {
+            common: Parameters {
+                first_element: if meso_elements { plain } else { 0 },
+                element_count: if meso_elements { meso } else { plain },
+                fresh_slots: batch.slot_count,
+                slot_count: batch.all_slots(),
+                first_block: if meso_elements {
+                    factors.plain_blocks()
+                } else {
+                    0
+                },
+                reflected,
+            },
             first_source: relief.first_source,
             source_count: relief.source_count,
             cells: relief.cells(),
         };
-        let (plain, meso) = (factors.plain_count, factors.meso_count);
+        let (from, to) = (parameters(false, 0), parameters(true, 0));
+        let second = size_of::<ReceiverList>() as u64;
+        cmd.dispatch_indirect(
+            &self.from,
+            &sets.from[0],
+            &from,
+            (&batch.emitting_commands, 0),
+        );
+        cmd.dispatch_indirect(
+            &self.to,
+            &sets.to[0],
+            &to,
+            (&batch.emitting_commands, second),
+        );
+        cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+        let (from, to) = (parameters(false, 1), parameters(true, 1));
         if plain > 0 {
-            let from = parameters(0, plain, 0);
-            cmd.dispatch(&self.from, &sets.from, &from, [groups(plain), 1, 1]);
+            cmd.dispatch(&self.from, &sets.from[1], &from, [groups(plain), 1, 1]);
         }
-        let to = parameters(plain, meso, factors.plain_blocks());
-        cmd.dispatch(&self.to, &sets.to, &to, [groups(meso), 1, 1]);
+        cmd.dispatch(&self.to, &sets.to[1], &to, [groups(meso), 1, 1]);
     }
 }

@@ -33,7 +33,7 @@ impl Select {
                 device,
                 "select",
                 shaders::SELECT_COMP,
-                7,
+                8,
                 size_of::<Parameters>(),
             )?,
         })
@@ -54,7 +54,8 @@ impl Select {
                 &batch.slots,
                 &state.progress,
                 &state.kept_rows,
-                &batch.commands,
+                &batch.drawn_commands,
+                &batch.emitting_commands,
             ]
             .map(Bind::Buffer),
         )

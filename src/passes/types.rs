@@ -155,6 +155,18 @@ pub struct ReceiverList {
     pub count: u32,
 }
 
+impl ReceiverList {
+    /// Of as many workgroups once there is something to do.
+    pub fn idle(groups_x: u32) -> Self {
+        Self {
+            groups_x,
+            groups_y: 0,
+            groups_z: 1,
+            count: 0,
+        }
+    }
+}
+
 /// Where the kept form factors of a source start; `chunk` is `NONE` where they are not kept.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]

@@ -35,7 +35,7 @@ pub(super) enum Estimate {
 
 #[allow(clippy::large_enum_variant)] // as above
 pub(super) enum GatherBy {
-    Plain(Gather, DescriptorSet),
+    Plain(Gather, gather::Sets),
     Relief(GatherRelief, gather::ReliefSets),
 }
 
@@ -62,7 +62,7 @@ impl Estimate {
             });
         };
         let form_factors = FormFactors::new(device, on.relief.is_some())?;
-        let sets = form_factors.bind(device, scene, batch, factors, on.relief)?;
+        let sets = form_factors.bind(device, (scene, state), batch, factors, on.relief)?;
         let normalise = match scene.enclosed {
             true => {
                 let normalise = Normalise::new(device)?;
@@ -82,12 +82,12 @@ impl Estimate {
         let gather = match on.relief {
             None => {
                 let gather = Gather::new(device)?;
-                let set = gather.bind(scene, state, batch, factors)?;
-                GatherBy::Plain(gather, set)
+                let sets = gather.bind(device, scene, state, batch, factors)?;
+                GatherBy::Plain(gather, sets)
             }
             Some(relief) => {
                 let gather = GatherRelief::new(device)?;
-                let sets = gather.bind(scene, state, batch, factors, relief)?;
+                let sets = gather.bind(device, (scene, state), batch, factors, relief)?;
                 GatherBy::Relief(gather, sets)
             }
         };
@@ -120,11 +120,11 @@ impl Estimate {
                     cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
                 }
                 found();
-                gather.record(cmd, batch, on, (factors, relief));
                 if let Some((keep, sets)) = keep {
-                    cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
                     keep.record(cmd, sets, batch, factors);
+                    cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
                 }
+                gather.record(cmd, batch, on, (factors, relief));
             }
             (Self::Pixels(pass, buffers), ..) => {
                 pass.record(cmd, buffers, on.scene, batch);
@@ -148,7 +148,7 @@ impl GatherBy {
         (factors, relief): (&FactorBuffers, Option<&ReliefBuffers>),
     ) {
         match (self, relief) {
-            (Self::Plain(gather, set), _) => gather.record(cmd, set, on.scene, batch),
+            (Self::Plain(gather, sets), _) => gather.record(cmd, sets, on.scene, batch),
             (Self::Relief(gather, sets), Some(relief)) => {
                 gather.record(cmd, sets, relief, batch, factors);
             }
