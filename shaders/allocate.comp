@@ -15,6 +15,8 @@ layout(scalar, binding = 1) buffer Occupied { uint occupied[]; };
 layout(scalar, binding = 2) buffer KeptRows { KeptRow kept_rows[]; };
 layout(scalar, binding = 3) readonly buffer Chunks { uvec2 chunks[]; };
 layout(scalar, binding = 4) buffer State { KeptState state; };
+// Of the pass over elements with a relief for light whose form factors found no room.
+layout(scalar, binding = 5) buffer LooseCommand { ReceiverList loose_command; };
 
 layout(push_constant, scalar) uniform Parameters {
     uint fresh_slots;
@@ -45,6 +47,9 @@ void main() {
     uint share = (block_count + SELECT_GROUP - 1) / SELECT_GROUP;
     uint begin = min(lane * share, block_count);
     uint end = min(begin + share, block_count);
+    if (lane == 0) {
+        loose_command.groups_y = 0;
+    }
     for (uint slot = 0; slot < fresh_slots; slot++) {
         uint source = slots[slot].source;
         if (source == NONE) {
@@ -74,6 +79,8 @@ void main() {
                 kept_rows[source] = KeptRow(row_chunk, row_first, slots[slot].scale);
                 state.used += words;
                 state.rows++;
+            } else {
+                loose_command.groups_y = 1;
             }
         }
         barrier();

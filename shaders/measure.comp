@@ -25,7 +25,7 @@ void main() {
         return;
     }
     Source source = sources[s];
-    bool emission_left = shot[s].w == 0.0;
+    bool emission_left = shot[s].w == SHOT_NOTHING;
     vec3 emitted = emission_left ? source.emitted : vec3(0.0);
     if (source.kind == KIND_POINT) {
         // Half of the sphere of directions, 2π sr.
@@ -39,8 +39,8 @@ void main() {
         reflected += element_area[e] * reflectance[e] * (direct[e] + indirect[e]);
         area += element_area[e];
     }
-    // Rounding may leave a source a little below what it has shot.
-    reflected = max(reflected / area - shot[s].rgb, vec3(0.0));
-    vec3 total = emitted + reflected;
+    // Less than 0 where the source has shot too much: by rounding, or since it took in a correction.
+    reflected = reflected / area - shot[s].rgb;
+    vec3 total = emitted + abs(reflected);
     unshot[s] = vec4(reflected, source.area * (total.r + total.g + total.b));
 }

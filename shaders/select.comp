@@ -53,13 +53,13 @@ void scan(uint lane) {
 
 // Gives a slot all that a source has left.
 void shoot(uint slot, uint source) {
-    bool emission_left = shot[source].w == 0.0;
+    bool emission_left = shot[source].w == SHOT_NOTHING;
     vec3 of_reflected = unshot[source].rgb;
     if (emission_left && sources[source].emitted != vec3(0.0)) {
         atomicOr(emitting, 1);
     }
     slots[slot] = Slot(emission_left ? sources[source].emitted : vec3(0.0), source, of_reflected, is_kept(source) ? kept_rows[source].scale : 1.0);
-    shot[source] = vec4(shot[source].rgb + of_reflected, 1.0);
+    shot[source] = vec4(shot[source].rgb + of_reflected, SHOT_EMISSION);
     unshot[source].w = 0.0;
 }
 
@@ -69,10 +69,11 @@ void main() {
     float reflected = 0.0;
     float kept = 0.0;
     for (uint s = lane; s < source_count; s += SELECT_GROUP) {
-        vec3 rgb = unshot[s].rgb;
+        vec3 rgb = abs(unshot[s].rgb);
+        bool emission_left = shot[s].w == SHOT_NOTHING;
         float of_reflected = sources[s].kind == KIND_POINT ? 0.0 : sources[s].area * (rgb.r + rgb.g + rgb.b);
-        reflected += of_reflected;
-        emitted += shot[s].w == 0.0 ? max(unshot[s].w - of_reflected, 0.0) : 0.0;
+        reflected += emission_left ? of_reflected : unshot[s].w;
+        emitted += emission_left ? max(unshot[s].w - of_reflected, 0.0) : 0.0;
         kept = is_kept(s) ? max(kept, unshot[s].w) : kept;
     }
     best_kept[lane] = kept;

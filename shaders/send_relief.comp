@@ -3,6 +3,9 @@
 // One workgroup a slot, one invocation a direction. Response::send in src/meso/response.rs is the first of the three steps.
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
+#extension GL_KHR_shader_subgroup_basic : require
+#extension GL_KHR_shader_subgroup_ballot : require
 #include "shared/types.glsl"
 #include "shared/directions.glsl"
 
@@ -13,8 +16,8 @@ layout(scalar, binding = 1) readonly buffer Sources { Source sources[]; };
 layout(scalar, binding = 2) readonly buffer Planes { vec4 planes[]; };
 layout(scalar, binding = 3) readonly buffer Areas { float element_area[]; };
 layout(scalar, binding = 4) readonly buffer MesoElements { MesoElement meso_elements[]; };
-// [response][direction in][colour and axis][direction out]
-layout(scalar, binding = 5) readonly buffer Matrices { float matrices[]; };
+// [response][direction in][direction out][colour]
+layout(scalar, binding = 5) readonly buffer Matrices { vec3 matrices[]; };
 // Sent light for a mean emitted radiosity of 1, [response][direction].
 layout(scalar, binding = 6) readonly buffer Emissions { vec3 emissions[]; };
 // Share of a uniform sender's power in each direction.
@@ -43,6 +46,9 @@ layout(push_constant, scalar) uniform Parameters {
 };
 
 shared vec3 part[MOST_DIRECTIONS];
+
+// A subgroup has as many lanes at least, and directions are a multiple of them.
+const uint SHARED_MOMENTS = 4;
 
 // Sum over the workgroup, in the same order every time.
 vec3 sum_over_directions(uint j, vec3 value) {
@@ -77,34 +83,40 @@ void main() {
     uint first_member = slot * most_members;
     bool mine = j < count;
 
-    // Respond: every member's light in its own frame.
+    // Respond: every member's light in its own frame. Moments are the same for all directions out: each lane loads those of one
+    // direction in, for all to share.
     uint dark = 0;
-    for (uint i = 0; mine && i < s.element_count; i++) {
+    for (uint i = 0; i < s.element_count; i++) {
         uint m = s.first_element + i - first_element;
         if (by_pixel == 1) {
-            member_exits[(first_member + i) * count + j] = outgoing[m * count + j];
+            if (mine) {
+                member_exits[(first_member + i) * count + j] = outgoing[m * count + j];
+            }
             continue;
         }
         MesoElement meso = meso_elements[m];
         vec3 sent = vec3(0.0);
-        for (uint k = 0; k < count; k++) {
-            uint at = 3 * (m * count + k);
+        for (uint first = 0; first < count; first += SHARED_MOMENTS) {
+            uint at = 3 * (m * count + first + gl_SubgroupInvocationID % SHARED_MOMENTS);
             vec3 r = moments_direct[at] + moments_indirect[at];
             vec3 g = moments_direct[at + 1] + moments_indirect[at + 1];
             vec3 b = moments_direct[at + 2] + moments_indirect[at + 2];
-            // A moment of light from above has a z above 0.
-            if (r.z == 0.0 && g.z == 0.0 && b.z == 0.0) {
-                dark++;
-                continue;
+            [[unroll]] for (uint lane = 0; lane < SHARED_MOMENTS; lane++) {
+                vec3 red = subgroupBroadcast(r, lane);
+                vec3 green = subgroupBroadcast(g, lane);
+                vec3 blue = subgroupBroadcast(b, lane);
+                // A moment of light from above has a z above 0.
+                if (red.z == 0.0 && green.z == 0.0 && blue.z == 0.0) {
+                    dark++;
+                    continue;
+                }
+                uint row = 3 * ((meso.response * count + first + lane) * count + min(j, count - 1));
+                sent += vec3(dot(matrices[row], red), dot(matrices[row + 1], green), dot(matrices[row + 2], blue));
             }
-            uint row = (meso.response * count + k) * 9 * count + j;
-            sent.r += matrices[row] * r.x + matrices[row + count] * r.y + matrices[row + 2 * count] * r.z;
-            row += 3 * count;
-            sent.g += matrices[row] * g.x + matrices[row + count] * g.y + matrices[row + 2 * count] * g.z;
-            row += 3 * count;
-            sent.b += matrices[row] * b.x + matrices[row + count] * b.y + matrices[row + 2 * count] * b.z;
         }
-        member_exits[(first_member + i) * count + j] = sent * meso.scale;
+        if (mine) {
+            member_exits[(first_member + i) * count + j] = sent * meso.scale;
+        }
     }
     if (j == 0) {
         dark_slots[shot.source - first_source] += dark;

@@ -181,6 +181,23 @@ impl Elements {
         plain.max(relief)
     }
 
+    /// Reflectance; of an element with a relief, the share of a uniform sky's light that leaves it.
+    pub fn even_reflectance(&self) -> Vec<Vec3> {
+        let Some(relief) = &self.relief else {
+            return self.reflectance.clone();
+        };
+        let responses = relief.responses.iter();
+        let even: Vec<Vec3> = responses
+            .map(|response| response.mean_albedo(&relief.directions))
+            .collect();
+        (0..self.len())
+            .map(|e| match relief.is_meso(e) {
+                true => even[relief.class[e] as usize] * relief.scale[e],
+                false => self.reflectance[e],
+            })
+            .collect()
+    }
+
     /// Whether an element has a relief.
     pub fn is_meso(&self, element: usize) -> bool {
         self.relief

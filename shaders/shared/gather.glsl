@@ -1,6 +1,7 @@
 // Every element adds up what the chosen sources send it: form factor times radiosity, the paper's equation (2) by reciprocity. One
 // subgroup a block of GROUP elements, sources in slot order: no atomics, the same bits every run and for every size of subgroup.
-// FROM_RELIEF: some sources send by direction. TO_RELIEF: the elements of this dispatch receive by direction.
+// FROM_RELIEF: some sources send by direction. TO_RELIEF: the elements of this dispatch receive by direction. RELIEF_EVENLY: they
+// have a relief, and take their irradiance alone.
 //
 // A dispatch takes emitted or reflected light. Few sources emit, so that its other half mostly need not run; and a software device
 // pays for both sides of every branch, but a loop over the slots of one kind costs what there are of them.
@@ -22,6 +23,11 @@
 #else
 #define FLUX float
 #endif
+#if defined(TO_RELIEF) || defined(RELIEF_EVENLY)
+#define FACTOR vec3
+#else
+#define FACTOR float
+#endif
 
 // The workgroup is one subgroup. An invocation takes PAIRS pairs of elements, a pair because two kept factors share a word; the
 // pairs of one step lie side by side.
@@ -35,7 +41,7 @@ layout(scalar, binding = 0) readonly buffer Slots { Slot slots[]; };
 layout(scalar, binding = 1) buffer Irradiance { vec3 irradiance[]; };
 layout(scalar, binding = 2) buffer IrradianceError { vec3 irradiance_error[]; };
 // Form factors of those that were drawn, [slot][element of this dispatch].
-layout(scalar, binding = 3) readonly buffer Fresh { FLUX fresh[]; };
+layout(scalar, binding = 3) readonly buffer Fresh { FACTOR fresh[]; };
 layout(scalar, binding = 4) readonly buffer KeptRows { KeptRow kept_rows[]; };
 layout(scalar, binding = 5) readonly buffer Chunks { uvec2 chunks[]; };
 #ifdef FROM_RELIEF
@@ -66,7 +72,15 @@ layout(push_constant, scalar) uniform Parameters {
     uint relief_source_count;
     uvec2 cells;              // of the directions' square
 #endif
+#ifdef TO_RELIEF
+    uint first_slot;
+    uint part;                // EVERYTHING, or of moments alone those by LOOSE_FACTORS or by KEPT_FACTORS
+#endif
 };
+
+const uint EVERYTHING = 0;
+const uint LOOSE_FACTORS = 1;
+const uint KEPT_FACTORS = 2;
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Words { uint word[]; };
 
@@ -178,13 +192,22 @@ Sent share(Sent sent, uint lane) {
                 subgroupBroadcast(sent.address, lane), subgroupBroadcast(sent.block, lane), false);
 }
 
+// What this dispatch takes of a fresh or kept form factor.
+FLUX as_flux(FACTOR f) {
+#ifdef RELIEF_EVENLY
+    return f.z;
+#else
+    return f;
+#endif
+}
+
 // The two kept form factors of the n-th and the next element.
 void kept_pair(Words words, uint block, uint n, out FLUX f[2]) {
     uint pair = in_block(n) < GROUP ? words.word[block + in_block(n) / 2] : 0;
     for (uint side = 0; side < 2; side++) {
         float factor = kept_factor(side == 0 ? pair & 0xffff : pair >> 16);
-#ifdef TO_RELIEF
-        f[side] = factor == 0.0 ? vec3(0.0) : factor * kept_direction(words.word[block + GROUP / 2 + in_block(n + side)]);
+#if defined(TO_RELIEF) || defined(RELIEF_EVENLY)
+        f[side] = as_flux(factor == 0.0 ? vec3(0.0) : factor * kept_direction(words.word[block + GROUP / 2 + in_block(n + side)]));
 #else
         f[side] = factor;
 #endif
@@ -215,7 +238,11 @@ void main() {
     }
 
     // Each lane looks up one slot and shares it with the others; slots of which the block sees nothing are passed over.
+#ifdef TO_RELIEF
+    for (uint first = first_slot; first < slot_count && part != LOOSE_FACTORS; first += LANES) {
+#else
     for (uint first = 0; first < slot_count; first += LANES) {
+#endif
         Sent mine = look_up(first + gl_SubgroupInvocationID);
         if (first >= fresh_slots && !subgroupAny(mine.source != NONE)) {
             break;
@@ -263,7 +290,7 @@ void main() {
                 uint i = receivers[n].i;
                 FLUX f = FLUX(0.0);
                 if (i != NONE) {
-                    f = fresh[(first + lane) * element_count + i];
+                    f = as_flux(fresh[(first + lane) * element_count + i]);
                 }
                 vec3 light = sent.light;
 #ifdef FROM_RELIEF
@@ -282,7 +309,12 @@ void main() {
             continue;
         }
         uint e = first_element + i;
-        accumulate(irradiance[e], irradiance_error[e], receivers[n].irradiance);
+#ifdef TO_RELIEF
+        if (part == EVERYTHING)
+#endif
+        {
+            accumulate(irradiance[e], irradiance_error[e], receivers[n].irradiance);
+        }
 #ifdef TO_RELIEF
         accumulate(meso_reflected[i].sum, meso_reflected[i].error, receivers[n].reflected * meso_elements[i].scale);
 #endif

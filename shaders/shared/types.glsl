@@ -3,6 +3,12 @@
 
 #extension GL_EXT_scalar_block_layout : require
 
+// What is behind the reflected radiosity that a source has shot: nothing yet; its emission too; so, and evenly in all directions
+// though it has a relief.
+const float SHOT_NOTHING = 0.0;
+const float SHOT_EMISSION = 1.0;
+const float SHOT_EVENLY = 2.0;
+
 // A group of neighbouring, nearly coplanar elements that shoots together, or half of a point light.
 struct Source {
     vec3 eye;          // the hemicube's place: on the group's surface, or the point light

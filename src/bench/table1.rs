@@ -216,7 +216,7 @@ fn in_turns(mut under: Vec<Under>, scene: &Scene, go_on: &impl Fn() -> bool) -> 
     while under.iter().any(|u| !u.done) && go_on() {
         for bake in under.iter_mut().filter(|u| !u.done) {
             let turn = Instant::now();
-            bake.solver.run(|_| turn.elapsed() < TURN)?;
+            bake.solver.turn(|_| turn.elapsed() < TURN)?;
             let report = bake.solver.report();
             bake.done = report.stop != StopReason::Interrupted;
             bake.row.seconds += turn.elapsed().as_secs_f64();

@@ -45,6 +45,7 @@ pub struct SceneBuffers {
     /// Centroid and radius.
     pub balls: Buffer,
     pub areas: Buffer,
+    /// Of an element with a relief: that of even light.
     pub reflectance: Buffer,
     pub sources: Buffer,
     pub contours: Buffer,
@@ -140,7 +141,7 @@ impl SceneBuffers {
             reflectance: upload(
                 device,
                 "reflectance",
-                &elements.reflectance,
+                &elements.even_reflectance(),
                 BufferUse::Storage,
             )?,
             sources: upload(device, "sources", &gpu_sources, BufferUse::Storage)?,
@@ -236,6 +237,8 @@ pub struct Batch {
     pub drawn_commands: Buffer,
     /// … and where some emit.
     pub emitting_commands: Buffer,
+    /// One over the elements with relief, where form factors of a drawn slot found no room to be kept.
+    pub loose_command: Buffer,
     pub views: Buffer,
     pub draws: Buffer,
     pub counts: Buffer,
@@ -325,6 +328,7 @@ impl Batch {
             slots: upload(device, "slots", &empty, BufferUse::Storage)?,
             drawn_commands: commands("drawn commands")?,
             emitting_commands: commands("emitting commands")?,
+            loose_command: commands("loose command")?,
             views: buffer(
                 "views",
                 regions * size_of::<View>() as u64,

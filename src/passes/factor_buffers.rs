@@ -168,6 +168,15 @@ impl FactorBuffers {
         self.plain_blocks() + self.meso_blocks()
     }
 
+    /// Whether there is room for the form factors of as many sources, if each is seen by half of the elements.
+    pub fn has_room_for(&self, sources: u32) -> bool {
+        let group = u64::from(GROUP);
+        let plain = u64::from(self.plain_blocks()) * group / 2;
+        let meso = u64::from(self.meso_blocks()) * (group / 2 + group);
+        let row = u64::from(self.blocks()) + (plain + meso) / 2;
+        u64::from(sources) * row <= u64::from(self.chunk_count()) * u64::from(self.chunk_words)
+    }
+
     /// Whether anything can be kept.
     pub fn keeps(&self) -> bool {
         !self.chunks.is_empty()

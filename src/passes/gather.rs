@@ -1,5 +1,5 @@
-//! Irradiance of every element from form factors, fresh and kept. Shaders: `gather.comp`, and where a scene has relief
-//! `gather_from_relief.comp` and `gather_to_relief.comp`.
+//! Irradiance of every element from form factors, fresh and kept, and of elements with a relief the moments of their light. Shaders:
+//! `gather.comp`, and where a scene has relief `gather_from_relief.comp`, `gather_to_relief.comp` and `gather_evenly.comp`.
 
 use std::sync::Arc;
 
@@ -22,6 +22,9 @@ pub struct Gather {
 pub struct GatherRelief {
     from: ComputePipeline,
     to: ComputePipeline,
+    /// The same as long as all sources send evenly.
+    plain: ComputePipeline,
+    evenly: ComputePipeline,
 }
 
 /// For emitted light, which few batches have, and for reflected light.
@@ -31,6 +34,9 @@ pub type Sets = [DescriptorSet; 2];
 pub struct ReliefSets {
     from: Sets,
     to: Sets,
+    plain: Sets,
+    evenly: Sets,
+    recalled: Sets,
 }
 
 #[repr(C)]
@@ -53,6 +59,23 @@ struct ReliefParameters {
     source_count: u32,
     cells: [u32; 2],
 }
+
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+struct ToReliefParameters {
+    common: ReliefParameters,
+    first_slot: u32,
+    part: u32,
+}
+
+/// What a dispatch to elements with a relief takes: irradiance and moments, or of moments alone those by form factors that found no
+/// room or those by kept ones.
+const EVERYTHING: u32 = 0;
+const LOOSE_FACTORS: u32 = 1;
+const KEPT_FACTORS: u32 = 2;
+
+/// Recalled sources of one dispatch: a software device ends a shader's loops after 65,535 turns of all together.
+const RECALLED_SLOTS: usize = 256;
 
 /// How many bindings each shader has.
 const PLAIN: usize = 6;
@@ -101,6 +124,85 @@ fn command_emitting(device: &Arc<Device>, batch: &Batch, elements: [u32; 2]) -> 
     write(device, &batch.emitting_commands, &commands)
 }
 
+/// Of [`Parameters::reflected`].
+const EMITTED: u32 = 0;
+const REFLECTED: u32 = 1;
+
+/// Over the elements without relief.
+fn plain(batch: &Batch, factors: &FactorBuffers, reflected: u32) -> Parameters {
+    Parameters {
+        first_element: 0,
+        element_count: factors.plain_count,
+        fresh_slots: batch.slot_count,
+        slot_count: batch.all_slots(),
+        first_block: 0,
+        reflected,
+    }
+}
+
+/// Over the elements with a relief.
+fn meso(batch: &Batch, factors: &FactorBuffers, reflected: u32) -> Parameters {
+    Parameters {
+        first_element: factors.plain_count,
+        element_count: factors.meso_count,
+        first_block: factors.plain_blocks(),
+        ..plain(batch, factors, reflected)
+    }
+}
+
+fn by_direction(relief: &ReliefBuffers, common: Parameters) -> ReliefParameters {
+    ReliefParameters {
+        common,
+        first_source: relief.first_source,
+        source_count: relief.source_count,
+        cells: relief.cells(),
+    }
+}
+
+/// No source sends by direction.
+fn evenly(relief: &ReliefBuffers, common: Parameters) -> ReliefParameters {
+    ReliefParameters {
+        source_count: 0,
+        ..by_direction(relief, common)
+    }
+}
+
+/// One light to `elements` of one kind; emitted light only where the batch has some.
+fn gather_light<P: Pod>(
+    cmd: &Commands,
+    (pipeline, sets): (&ComputePipeline, &Sets),
+    parameters: &P,
+    batch: &Batch,
+    (light, kind): (u32, Kind),
+) {
+    let set = &sets[light as usize];
+    match (light, kind) {
+        (EMITTED, kind) => {
+            let at = kind.command * size_of::<ReceiverList>() as u64;
+            cmd.dispatch_indirect(pipeline, set, parameters, (&batch.emitting_commands, at));
+        }
+        (_, Kind { elements: 0, .. }) => {}
+        (_, Kind { elements, .. }) => {
+            cmd.dispatch(pipeline, set, parameters, [groups(elements), 1, 1]);
+        }
+    }
+}
+
+fn kinds(factors: &FactorBuffers) -> [Kind; 2] {
+    let counts = [factors.plain_count, factors.meso_count];
+    [0, 1].map(|i| Kind {
+        elements: counts[i],
+        command: i as u64,
+    })
+}
+
+/// Elements without or with relief, and the place of their command among those of a batch.
+#[derive(Clone, Copy)]
+struct Kind {
+    elements: u32,
+    command: u64,
+}
+
 impl Gather {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
         Ok(Self {
@@ -122,31 +224,41 @@ impl Gather {
     }
 
     pub fn record(&self, cmd: &Commands, sets: &Sets, scene: &SceneBuffers, batch: &Batch) {
-        let count = scene.element_count;
-        let parameters = |reflected| Parameters {
-            first_element: 0,
-            element_count: count,
-            fresh_slots: batch.slot_count,
-            slot_count: batch.all_slots(),
-            first_block: 0,
-            reflected,
+        let all = Kind {
+            elements: scene.element_count,
+            command: 0,
         };
-        let emitting = (&batch.emitting_commands, 0);
-        cmd.dispatch_indirect(&self.pipeline, &sets[0], &parameters(0), emitting);
-        let size = [groups(count), 1, 1];
-        cmd.dispatch(&self.pipeline, &sets[1], &parameters(1), size);
+        for light in [EMITTED, REFLECTED] {
+            let parameters = Parameters {
+                first_element: 0,
+                element_count: scene.element_count,
+                fresh_slots: batch.slot_count,
+                slot_count: batch.all_slots(),
+                first_block: 0,
+                reflected: light,
+            };
+            gather_light(
+                cmd,
+                (&self.pipeline, sets),
+                &parameters,
+                batch,
+                (light, all),
+            );
+        }
     }
 }
 
 impl GatherRelief {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
-        let make =
-            |name, spirv, bindings| pipeline::<ReliefParameters>(device, name, spirv, bindings);
         let from = shaders::GATHER_FROM_RELIEF_COMP;
         let to = shaders::GATHER_TO_RELIEF_COMP;
+        let evenly = shaders::GATHER_EVENLY_COMP;
+        let plain = shaders::GATHER_COMP;
         Ok(Self {
-            from: make("gather from relief", from, FROM_RELIEF)?,
-            to: make("gather to relief", to, TO_RELIEF)?,
+            from: pipeline::<ReliefParameters>(device, "gather from relief", from, FROM_RELIEF)?,
+            to: pipeline::<ToReliefParameters>(device, "gather to relief", to, TO_RELIEF)?,
+            plain: pipeline::<Parameters>(device, "gather", plain, PLAIN)?,
+            evenly: pipeline::<Parameters>(device, "gather evenly", evenly, PLAIN)?,
         })
     }
 
@@ -158,10 +270,14 @@ impl GatherRelief {
         factors: &FactorBuffers,
         relief: &ReliefBuffers,
     ) -> Result<ReliefSets> {
-        command_emitting(device, batch, [factors.plain_count, factors.meso_count])?;
+        let (plain_count, meso_count) = (factors.plain_count, factors.meso_count);
+        command_emitting(device, batch, [plain_count, meso_count])?;
+        let loose = ReceiverList::idle(groups(meso_count));
+        write(device, &batch.loose_command, &[loose])?;
         let sending = [&relief.exits, &scene.sources, &scene.balls];
-        let mut from = binds(state, batch, factors, &factors.fresh);
-        let mut to = binds(state, batch, factors, &factors.fresh_meso);
+        let plain = binds(state, batch, factors, &factors.fresh);
+        let evenly = binds(state, batch, factors, &factors.fresh_meso);
+        let (mut from, mut to) = (plain.clone(), evenly.clone());
         let moments = [&relief.moments_direct, &relief.moments_indirect];
         for i in 0..2 {
             from[i].extend(sending);
@@ -169,13 +285,20 @@ impl GatherRelief {
             let receiving = [&relief.elements, &relief.albedos];
             to[i].extend(receiving.into_iter().chain([moments[i], &relief.reflected]));
         }
+        let mut recalled = to.clone();
+        recalled
+            .iter_mut()
+            .for_each(|binds| binds[0] = &relief.recalled);
         Ok(ReliefSets {
             from: sets(&self.from, "gather from relief", &from)?,
             to: sets(&self.to, "gather to relief", &to)?,
+            plain: sets(&self.plain, "gather", &plain)?,
+            evenly: sets(&self.evenly, "gather evenly", &evenly)?,
+            recalled: sets(&self.to, "gather recalled", &recalled)?,
         })
     }
 
-    /// Elements without and with relief are written to at once.
+    /// Sources with a relief send by direction. Elements without and with relief are written to at once.
     pub fn record(
         &self,
         cmd: &Commands,
@@ -184,43 +307,85 @@ impl GatherRelief {
         batch: &Batch,
         factors: &FactorBuffers,
     ) {
-        let (plain, meso) = (factors.plain_count, factors.meso_count);
-        let parameters = |meso_elements: bool, reflected| ReliefParameters {
-            common: Parameters {
-                first_element: if meso_elements { plain } else { 0 },
-                element_count: if meso_elements { meso } else { plain },
-                fresh_slots: batch.slot_count,
-                slot_count: batch.all_slots(),
-                first_block: if meso_elements {
-                    factors.plain_blocks()
-                } else {
-                    0
-                },
-                reflected,
-            },
-            first_source: relief.first_source,
-            source_count: relief.source_count,
-            cells: relief.cells(),
-        };
-        let (from, to) = (parameters(false, 0), parameters(true, 0));
-        let second = size_of::<ReceiverList>() as u64;
-        cmd.dispatch_indirect(
-            &self.from,
-            &sets.from[0],
-            &from,
-            (&batch.emitting_commands, 0),
-        );
-        cmd.dispatch_indirect(
-            &self.to,
-            &sets.to[0],
-            &to,
-            (&batch.emitting_commands, second),
-        );
-        cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-        let (from, to) = (parameters(false, 1), parameters(true, 1));
-        if plain > 0 {
-            cmd.dispatch(&self.from, &sets.from[1], &from, [groups(plain), 1, 1]);
+        let [without, with] = kinds(factors);
+        for light in [EMITTED, REFLECTED] {
+            let from = by_direction(relief, plain(batch, factors, light));
+            let to = ToReliefParameters {
+                common: by_direction(relief, meso(batch, factors, light)),
+                first_slot: 0,
+                part: EVERYTHING,
+            };
+            gather_light(
+                cmd,
+                (&self.from, &sets.from),
+                &from,
+                batch,
+                (light, without),
+            );
+            gather_light(cmd, (&self.to, &sets.to), &to, batch, (light, with));
+            cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         }
-        cmd.dispatch(&self.to, &sets.to[1], &to, [groups(meso), 1, 1]);
+    }
+
+    /// All sources send evenly. Elements with a relief take their irradiance alone, and moments by form factors that are not kept.
+    pub fn record_evenly(
+        &self,
+        cmd: &Commands,
+        sets: &ReliefSets,
+        relief: &ReliefBuffers,
+        batch: &Batch,
+        factors: &FactorBuffers,
+    ) {
+        let [without, with] = kinds(factors);
+        for light in [EMITTED, REFLECTED] {
+            let from = plain(batch, factors, light);
+            let to = meso(batch, factors, light);
+            let moments = ToReliefParameters {
+                common: evenly(relief, to),
+                first_slot: 0,
+                part: LOOSE_FACTORS,
+            };
+            gather_light(
+                cmd,
+                (&self.plain, &sets.plain),
+                &from,
+                batch,
+                (light, without),
+            );
+            gather_light(cmd, (&self.evenly, &sets.evenly), &to, batch, (light, with));
+            let set = &sets.to[light as usize];
+            cmd.dispatch_indirect(&self.to, set, &moments, (&batch.loose_command, 0));
+            cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+        }
+    }
+
+    /// Elements with a relief take in by direction what was shot evenly.
+    pub fn record_recalled(
+        &self,
+        cmd: &Commands,
+        sets: &ReliefSets,
+        (relief, source_count): (&ReliefBuffers, u32),
+        factors: &FactorBuffers,
+    ) {
+        let size = [groups(factors.meso_count), 1, 1];
+        for light in [EMITTED, REFLECTED] {
+            for first_slot in (0..source_count).step_by(RECALLED_SLOTS) {
+                let common = Parameters {
+                    first_element: factors.plain_count,
+                    element_count: factors.meso_count,
+                    fresh_slots: 0,
+                    slot_count: source_count.min(first_slot + RECALLED_SLOTS as u32),
+                    first_block: factors.plain_blocks(),
+                    reflected: light,
+                };
+                let parameters = ToReliefParameters {
+                    common: evenly(relief, common),
+                    first_slot,
+                    part: KEPT_FACTORS,
+                };
+                cmd.dispatch(&self.to, &sets.recalled[light as usize], &parameters, size);
+                cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+            }
+        }
     }
 }

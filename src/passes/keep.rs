@@ -22,11 +22,12 @@ pub struct Sets {
 
 impl Keep {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
-        let make =
-            |name, spirv, words: usize| ComputePipeline::storage(device, name, spirv, 5, 4 * words);
+        let make = |name, spirv, buffers, words: usize| {
+            ComputePipeline::storage(device, name, spirv, buffers, 4 * words)
+        };
         Ok(Self {
-            allocate: make("allocate", shaders::ALLOCATE_COMP, 5)?,
-            keep: make("keep", shaders::KEEP_COMP, 3)?,
+            allocate: make("allocate", shaders::ALLOCATE_COMP, 6, 5)?,
+            keep: make("keep", shaders::KEEP_COMP, 5, 3)?,
         })
     }
 
@@ -37,6 +38,7 @@ impl Keep {
             &state.kept_rows,
             &factors.table,
             &factors.state,
+            &batch.loose_command,
         ];
         let keep = [
             &batch.slots,

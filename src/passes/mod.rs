@@ -13,6 +13,7 @@ pub mod measure;
 pub mod measure_relief;
 pub mod normalise;
 pub mod pixels_relief;
+pub mod recall;
 pub mod relief;
 pub mod relief_buffers;
 pub mod relief_rays;

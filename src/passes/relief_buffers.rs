@@ -6,7 +6,7 @@ use bytemuck::Zeroable;
 use glam::Vec3;
 
 use super::buffers::upload;
-use super::types::{MesoElement, Reflected};
+use super::types::{MesoElement, Reflected, Slot};
 use crate::directions::Directions;
 use crate::elements::Elements;
 use crate::error::{Error, Result};
@@ -23,8 +23,10 @@ pub struct ReliefBuffers {
     pub source_count: u32,
     /// Most elements of a source.
     pub most_members: u32,
+    /// Some of its sources emit.
+    pub glows: bool,
     pub elements: Buffer,
-    /// R, `[response][in][colour][axis][out]`.
+    /// R, `[response][in][out][colour]`, vectors.
     pub matrices: Buffer,
     /// `[response][in][colour]`, vectors.
     pub albedos: Buffer,
@@ -41,6 +43,8 @@ pub struct ReliefBuffers {
     pub member_exits: Buffer,
     /// `[slot][emitted, reflected][direction]`.
     pub exits: Buffer,
+    /// All light that was shot evenly, as slots, `[source]`.
+    pub recalled: Buffer,
     /// Slots without light that were left out, `[relief source]`.
     pub dark_slots: Buffer,
     /// Whether elements reflect by the normal and albedo of each pixel; the rest is for that alone.
@@ -84,6 +88,9 @@ impl ReliefBuffers {
             .map(|s| s.element_count)
             .max()
             .unwrap_or(1);
+        let glows = sources.list[of_relief.clone()]
+            .iter()
+            .any(|s| s.emitted != Vec3::ZERO);
         let gpu_elements: Vec<MesoElement> = meso
             .clone()
             .map(|e| MesoElement {
@@ -98,11 +105,9 @@ impl ReliefBuffers {
             _ => (vec![Zeroable::zeroed()], vec![Zeroable::zeroed()]),
         };
         let responses = || relief.responses.iter();
-        let matrices: Vec<f32> = responses()
-            .flat_map(|r| r.matrix.chunks_exact(k as usize))
-            .flat_map(|row| {
-                (0..9).flat_map(move |i| row.iter().map(move |block| block[i / 3][i % 3]))
-            })
+        let matrices: Vec<Vec3> = responses()
+            .flat_map(|r| r.matrix.iter().flatten())
+            .copied()
             .collect();
         let albedos: Vec<Vec3> = responses()
             .flat_map(|r| r.albedo.iter().flatten())
@@ -132,6 +137,7 @@ impl ReliefBuffers {
             first_source: of_relief.start as u32,
             source_count: of_relief.len() as u32,
             most_members,
+            glows,
             elements: upload(device, "meso elements", &gpu_elements, BufferUse::Storage)?,
             matrices: upload(device, "relief matrices", &matrices, BufferUse::Storage)?,
             albedos: upload(device, "relief albedos", &albedos, BufferUse::Storage)?,
@@ -146,6 +152,10 @@ impl ReliefBuffers {
             shot_exits: zeroed("shot exits", 12 * k * of_relief.len() as u64)?,
             member_exits: storage("member exits", 12 * k * slots * u64::from(most_members))?,
             exits: storage("exits", 24 * k * slots)?,
+            recalled: storage(
+                "recalled",
+                (size_of::<Slot>() * sources.list.len().max(1)) as u64,
+            )?,
             dark_slots: zeroed("dark slots", 4 * of_relief.len() as u64)?,
             by_pixel,
             // No buffer is empty: a shader that does not read one binds it all the same.

@@ -39,8 +39,8 @@ pub fn measure(
                 .map(|e| (elements.reflectance[e] * irradiance[e]).as_dvec3() * elements.area[e])
                 .sum::<DVec3>()
                 / area;
-            let unshot = (reflected - shot.reflected).max(DVec3::ZERO);
-            (unshot, emitted + source.area * unshot.element_sum())
+            let unshot = reflected - shot.reflected;
+            (unshot, emitted + source.area * unshot.abs().element_sum())
         })
         .collect()
 }

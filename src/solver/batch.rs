@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::Settings;
-use super::estimate::{Estimate, ReliefSources};
+use super::estimate::{Estimate, ReliefSources, Sending};
 use crate::constants::FACES;
 use crate::error::Result;
 use crate::hemicube::pixel_count;
@@ -45,11 +45,19 @@ pub struct BatchResult {
 pub struct BatchLoop {
     // Commands first: dropping them waits until the device is done with the rest.
     commands: [Commands; 2],
+    /// Where sources with a relief send evenly first: the batches of that time.
+    evenly: Option<Evenly>,
     measure_only: Commands,
     readback: [Buffer; 2],
     timestamps: [Timestamps; 2],
     batch: Batch,
     _passes: Passes,
+}
+
+struct Evenly {
+    commands: [Commands; 2],
+    measure_only: Commands,
+    recall: Commands,
 }
 
 /// What lies on the device for as long as the solver.
@@ -111,7 +119,7 @@ impl BatchLoop {
             Timestamps::new(device, "batch timestamps a", STAMPS)?,
             Timestamps::new(device, "batch timestamps b", STAMPS)?,
         ];
-        let record = |name, i: usize| {
+        let record = |name, i: usize, sending| {
             Commands::record(device, name, |cmd| {
                 let stamps = &timestamps[i];
                 cmd.reset_timestamps(stamps);
@@ -120,10 +128,10 @@ impl BatchLoop {
                     &[Stage::Compute],
                 );
                 cmd.timestamp(stamps, 0);
-                passes.measure(cmd, on);
+                passes.measure(cmd, on, sending);
                 passes.select.0.record(cmd, &passes.select.1, &parameters);
                 cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-                if let (Some(sources), Some(relief)) = (&passes.relief, on.relief) {
+                if let Some((sources, relief)) = passes.directed(on, sending) {
                     sources.send(cmd, relief, &batch);
                 }
                 cmd.timestamp(stamps, 1);
@@ -134,26 +142,49 @@ impl BatchLoop {
                 pass.record(cmd, set, scene, &batch);
                 cmd.timestamp(stamps, 3);
                 let found = || cmd.timestamp(stamps, 4);
-                passes.estimate.record(cmd, &batch, on, found);
+                passes.estimate.record(cmd, &batch, on, sending, found);
                 cmd.timestamp(stamps, 5);
                 layout.record(cmd, state, &batch, &readback[i]);
                 Ok(())
             })
         };
-        let commands = [record("batch a", 0)?, record("batch b", 1)?];
-        let measure_only = Commands::record(device, "remeasure", |cmd| {
-            cmd.barrier(&[Stage::Compute, Stage::Transfer], &[Stage::Compute]);
-            passes.measure(cmd, on);
-            let none = Parameters {
-                shot_limit: 0,
-                ..parameters
-            };
-            passes.select.0.record(cmd, &passes.select.1, &none);
-            layout.record(cmd, state, &batch, &readback[0]);
-            Ok(())
-        })?;
+        let measure_only = |name, sending| {
+            Commands::record(device, name, |cmd| {
+                cmd.barrier(&[Stage::Compute, Stage::Transfer], &[Stage::Compute]);
+                passes.measure(cmd, on, sending);
+                let none = Parameters {
+                    shot_limit: 0,
+                    ..parameters
+                };
+                passes.select.0.record(cmd, &passes.select.1, &none);
+                layout.record(cmd, state, &batch, &readback[0]);
+                Ok(())
+            })
+        };
+        let by_direction = Sending::ByDirection;
+        let commands = [
+            record("batch a", 0, by_direction)?,
+            record("batch b", 1, by_direction)?,
+        ];
+        let evenly = match &passes.relief {
+            Some(sources) if passes.estimate.sends_evenly_first(on) => Some(Evenly {
+                commands: [
+                    record("even batch a", 0, Sending::Evenly)?,
+                    record("even batch b", 1, Sending::Evenly)?,
+                ],
+                measure_only: measure_only("remeasure evenly", Sending::Evenly)?,
+                recall: Commands::record(device, "recall", |cmd| {
+                    cmd.barrier(&[Stage::Compute, Stage::Transfer], &[Stage::Compute]);
+                    passes.estimate.recall(cmd, sources, on);
+                    Ok(())
+                })?,
+            }),
+            _ => None,
+        };
+        let measure_only = measure_only("remeasure", by_direction)?;
         Ok(Self {
             commands,
+            evenly,
             measure_only,
             readback,
             timestamps,
@@ -166,9 +197,9 @@ impl BatchLoop {
     /// are looked at too.
     pub fn run(&mut self, mut look: impl FnMut(&BatchResult) -> bool) -> Result<()> {
         let mut now = 0;
-        self.commands[now].submit()?;
+        self.batch(now).submit()?;
         loop {
-            self.commands[1 - now].submit()?;
+            self.batch(1 - now).submit()?;
             let go_on = look(&self.finish(now)?);
             now = 1 - now;
             if !go_on {
@@ -178,8 +209,26 @@ impl BatchLoop {
         }
     }
 
+    fn batch(&mut self, i: usize) -> &mut Commands {
+        match &mut self.evenly {
+            Some(evenly) => &mut evenly.commands[i],
+            None => &mut self.commands[i],
+        }
+    }
+
+    /// Where all has been sent evenly so far: sources with a relief send by direction from now on, and elements with one have
+    /// what came. Whether that was so.
+    pub fn recall(&mut self) -> Result<bool> {
+        let Some(mut evenly) = self.evenly.take() else {
+            return Ok(false);
+        };
+        evenly.recall.submit()?;
+        evenly.recall.wait()?;
+        Ok(true)
+    }
+
     fn finish(&mut self, i: usize) -> Result<BatchResult> {
-        self.commands[i].wait()?;
+        self.batch(i).wait()?;
         let layout = ReadbackLayout::new(&self.batch);
         let stamps = self.timestamps[i].intervals()?;
         let [select, cull, item_buffer, bin, gather] = stamps[..] else {
@@ -202,8 +251,12 @@ impl BatchLoop {
 
     /// What is unshot now, without shooting.
     pub fn remeasure(&mut self) -> Result<Progress> {
-        self.measure_only.submit()?;
-        self.measure_only.wait()?;
+        let measure = match &mut self.evenly {
+            Some(evenly) => &mut evenly.measure_only,
+            None => &mut self.measure_only,
+        };
+        measure.submit()?;
+        measure.wait()?;
         Ok(self.readback[0].read::<Progress>(0, 1)[0])
     }
 
@@ -241,12 +294,23 @@ fn bound<P>(pass: P, bind: impl FnOnce(&P) -> Result<DescriptorSet>) -> Result<(
 }
 
 impl Passes {
+    /// The sources that send by direction.
+    fn directed<'a>(
+        &'a self,
+        on: &OnDevice<'a>,
+        sending: Sending,
+    ) -> Option<(&'a ReliefSources, &'a ReliefBuffers)> {
+        let sources = self.relief.as_ref();
+        let directed = sources.filter(|_| sending == Sending::ByDirection);
+        directed.zip(on.relief)
+    }
+
     /// The unshot light of every source.
-    fn measure(&self, cmd: &Commands, on: &OnDevice<'_>) {
+    fn measure(&self, cmd: &Commands, on: &OnDevice<'_>, sending: Sending) {
         let (pass, set) = &self.measure;
         pass.record(cmd, set, on.scene.source_count);
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-        if let (Some(sources), Some(relief)) = (&self.relief, on.relief) {
+        if let Some((sources, relief)) = self.directed(on, sending) {
             sources.measure(cmd, relief);
         }
     }

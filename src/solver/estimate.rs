@@ -15,9 +15,18 @@ use crate::passes::keep::{self, Keep};
 use crate::passes::measure_relief::MeasureRelief;
 use crate::passes::normalise::Normalise;
 use crate::passes::pixels_relief::{self, PixelsRelief};
+use crate::passes::recall::Recall;
 use crate::passes::relief_buffers::ReliefBuffers;
 use crate::passes::send_relief::SendRelief;
 use crate::vk::{Commands, DescriptorSet, Device, Stage};
+
+/// How sources with a relief send. Shots are many and most of their light is even, so that where form factors are kept all is first
+/// solved as if it were, and what leaves in other directions is sent after.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Sending {
+    Evenly,
+    ByDirection,
+}
 
 #[allow(clippy::large_enum_variant)] // one of them lives as long as the solver
 pub(super) enum Estimate {
@@ -100,7 +109,14 @@ impl Estimate {
     }
 
     /// `found` is recorded between form factors and irradiance.
-    pub fn record(&self, cmd: &Commands, batch: &Batch, on: &OnDevice<'_>, found: impl FnOnce()) {
+    pub fn record(
+        &self,
+        cmd: &Commands,
+        batch: &Batch,
+        on: &OnDevice<'_>,
+        sending: Sending,
+        found: impl FnOnce(),
+    ) {
         match (self, on.factors, on.relief) {
             (
                 Self::Receivers {
@@ -124,7 +140,7 @@ impl Estimate {
                     keep.record(cmd, sets, batch, factors);
                     cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
                 }
-                gather.record(cmd, batch, on, (factors, relief));
+                gather.record(cmd, batch, on, (factors, relief), sending);
             }
             (Self::Pixels(pass, buffers), ..) => {
                 pass.record(cmd, buffers, on.scene, batch);
@@ -146,14 +162,44 @@ impl GatherBy {
         batch: &Batch,
         on: &OnDevice<'_>,
         (factors, relief): (&FactorBuffers, Option<&ReliefBuffers>),
+        sending: Sending,
     ) {
         match (self, relief) {
             (Self::Plain(gather, sets), _) => gather.record(cmd, sets, on.scene, batch),
-            (Self::Relief(gather, sets), Some(relief)) => {
-                gather.record(cmd, sets, relief, batch, factors);
-            }
+            (Self::Relief(gather, sets), Some(relief)) => match sending {
+                Sending::Evenly => gather.record_evenly(cmd, sets, relief, batch, factors),
+                Sending::ByDirection => gather.record(cmd, sets, relief, batch, factors),
+            },
             (Self::Relief(..), None) => unreachable!("made for a scene with relief"),
         }
+    }
+}
+
+impl Estimate {
+    /// Whether all is sent evenly first: not where sources with a relief emit, nor where what follows would have to be drawn anew.
+    pub fn sends_evenly_first(&self, on: &OnDevice<'_>) -> bool {
+        matches!(self, Self::Receivers { keep: Some(_), .. })
+            && on
+                .factors
+                .is_some_and(|f| f.has_room_for(on.scene.source_count))
+            && on.relief.is_some_and(|relief| !relief.glows)
+    }
+
+    /// Elements with a relief take in by direction what was shot evenly, and sources with a relief send by direction from now on.
+    pub fn recall(&self, cmd: &Commands, sources: &ReliefSources, on: &OnDevice<'_>) {
+        let (Self::Receivers { gather, .. }, Some(factors), Some(relief)) =
+            (self, on.factors, on.relief)
+        else {
+            unreachable!("asked for where light is sent evenly first");
+        };
+        let GatherBy::Relief(gather, sets) = gather else {
+            unreachable!("made for a scene with relief");
+        };
+        let (recall, set) = &sources.recall;
+        recall.record(cmd, set, on.scene, relief);
+        cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+        let listed = (relief, on.scene.source_count);
+        gather.record_recalled(cmd, sets, listed, factors);
     }
 }
 
@@ -161,6 +207,7 @@ impl GatherBy {
 pub(super) struct ReliefSources {
     measure: (MeasureRelief, DescriptorSet),
     send: (SendRelief, DescriptorSet),
+    recall: (Recall, DescriptorSet),
 }
 
 impl ReliefSources {
@@ -174,9 +221,12 @@ impl ReliefSources {
         let measured = measure.bind(on.scene, on.state, relief)?;
         let send = SendRelief::new(device)?;
         let sent = send.bind(on.scene, batch, relief)?;
+        let recall = Recall::new(device)?;
+        let recalled = recall.bind(on.scene, on.state, relief)?;
         Ok(Self {
             measure: (measure, measured),
             send: (send, sent),
+            recall: (recall, recalled),
         })
     }
 

@@ -11,6 +11,7 @@ mod self_test;
 mod settings;
 mod visibility;
 
+use std::cell::Cell;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -212,16 +213,26 @@ impl Solver {
     }
 
     /// Shoots until a stop rule holds, or `go_on` says no. What has been solved so far is always valid.
-    pub fn run(&mut self, mut go_on: impl FnMut(&Update) -> bool) -> Result<()> {
+    pub fn run(&mut self, go_on: impl FnMut(&Update) -> bool) -> Result<()> {
+        self.turn(go_on)?;
+        if self.batches.recall()? {
+            self.look_at_the_rest()?;
+        }
+        Ok(())
+    }
+
+    /// As [`Self::run`], but where `go_on` has said no it is to go on later, as if it had not stopped; until then elements with a
+    /// relief may lack the directions of their light.
+    pub fn turn(&mut self, mut go_on: impl FnMut(&Update) -> bool) -> Result<()> {
         let start = Instant::now();
         let factor = bound_factor(&self.elements);
         let budget = self.settings.budget.unwrap_or(Duration::MAX);
         let sources = self.scene.source_count;
         let emitted = self.emitted_power;
         let mut history: Vec<(f64, f64)> = Vec::new();
-        let mut stop = None;
+        let stop = Cell::new(None);
         let report = &mut self.report;
-        self.batches.run(|batch| {
+        let mut look = |batch: &BatchResult| {
             report.add(batch);
             let Progress {
                 unshot_emitted,
@@ -236,14 +247,14 @@ impl Solver {
             history.push((elapsed.as_secs_f64(), unshot_share));
             report.unshot_share = unshot_share;
             report.error_bound = error_bound;
-            if stop.is_some() {
+            if stop.get().is_some() {
                 return false;
             }
             if selected + replayed == 0 {
-                stop = Some(match self.settings.shots {
+                stop.set(Some(match self.settings.shots {
                     Some(limit) if shots >= limit => StopReason::Shots,
                     _ => StopReason::Residual,
-                });
+                }));
                 return false;
             }
             let update = Update {
@@ -258,21 +269,20 @@ impl Solver {
                 ),
             };
             if !go_on(&update) {
-                stop = Some(StopReason::Interrupted);
+                stop.set(Some(StopReason::Interrupted));
             } else if elapsed >= budget {
-                stop = Some(StopReason::Budget);
+                stop.set(Some(StopReason::Budget));
             }
-            stop.is_none()
-        })?;
-        // The last batches have shot since the last look: what is left now is what a measurement finds.
-        let last = self.batches.remeasure()?;
-        report.shots = last.shots;
-        report.unshot_share = ratio(
-            f64::from(last.unshot_emitted + last.unshot_reflected),
-            emitted,
-        );
-        report.error_bound = factor.map(|f| bound(f, report.unshot_share));
-        report.stop = stop.unwrap_or(StopReason::Residual);
+            stop.get().is_none()
+        };
+        self.batches.run(&mut look)?;
+        if stop.get() == Some(StopReason::Residual) && self.batches.recall()? {
+            stop.set(None);
+            self.batches.run(&mut look)?;
+        }
+        self.look_at_the_rest()?;
+        let report = &mut self.report;
+        report.stop = stop.get().unwrap_or(StopReason::Residual);
         report.seconds.setup = self.setup.as_secs_f64();
         report.seconds.solve_wall += start.elapsed().as_secs_f64();
         if let Some(factors) = &self.factors {
@@ -288,6 +298,17 @@ impl Solver {
             let dark: Vec<u32> = download(&self.device, &relief.dark_slots, sources)?;
             report.skipped.dark_slots = dark.iter().map(|&d| u64::from(d)).sum();
         }
+        Ok(())
+    }
+
+    /// The last batches have shot since the last look: what is left now is what a measurement finds.
+    fn look_at_the_rest(&mut self) -> Result<()> {
+        let last = self.batches.remeasure()?;
+        let unshot = f64::from(last.unshot_emitted + last.unshot_reflected);
+        let report = &mut self.report;
+        report.shots = last.shots;
+        report.unshot_share = ratio(unshot, self.emitted_power);
+        report.error_bound = bound_factor(&self.elements).map(|f| bound(f, report.unshot_share));
         Ok(())
     }
 
