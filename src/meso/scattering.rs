@@ -100,6 +100,15 @@ impl<'a> Scattering<'a> {
                 bounced(&self.exchange, sent.collect(), self.reflectance)
             })
             .collect();
+        // `[facet][in][axis][colour]`: what sums over facets reads lies side by side.
+        let width = 9 * k;
+        let mut rows = vec![0.0_f32; width * self.field.facet_count()];
+        rows.par_chunks_mut(width).enumerate().for_each(|(q, row)| {
+            for (at, column) in row.chunks_exact_mut(3).zip(&lit) {
+                at.copy_from_slice(&column[q].to_array());
+            }
+        });
+        drop(lit);
         let glowing = bounced(
             &self.exchange,
             vec![Vec3::ONE; self.field.facet_count()],
@@ -109,24 +118,29 @@ impl<'a> Scattering<'a> {
         let columns: Vec<Vec<(Vec<Block>, Vec3)>> = (0..k)
             .into_par_iter()
             .map(|out| {
+                let mut sums = vec![0.0_f32; width];
                 let column = |seen: &Seen| {
-                    let sum = |of: &[Vec3]| -> Vec3 {
-                        let facets = seen.facets.iter();
-                        facets.map(|&(q, share)| of[q as usize] * share).sum()
-                    };
-                    let column = lit
-                        .chunks_exact(3)
+                    sums.fill(0.0);
+                    for &(q, share) in &seen.facets {
+                        let row = &rows[q as usize * width..][..width];
+                        for (sum, lit) in sums.iter_mut().zip(row) {
+                            *sum += lit * share;
+                        }
+                    }
+                    let column = sums
+                        .chunks_exact(9)
                         .enumerate()
-                        .map(|(slot, axes)| {
-                            let by_axis = [sum(&axes[0]), sum(&axes[1]), sum(&axes[2])];
+                        .map(|(slot, by_axis)| {
                             let of_tile = &tile.matrix[slot * k + out];
                             [0, 1, 2].map(|c| {
-                                Vec3::from_array(by_axis.map(|v| v[c])) + of_tile[c] * seen.of_tile
+                                Vec3::new(by_axis[c], by_axis[3 + c], by_axis[6 + c])
+                                    + of_tile[c] * seen.of_tile
                             })
                         })
                         .collect();
-                    let emission = sum(&glowing) + tile.emission[out] * seen.of_tile;
-                    (column, emission)
+                    let facets = seen.facets.iter();
+                    let glow: Vec3 = facets.map(|&(q, share)| glowing[q as usize] * share).sum();
+                    (column, glow + tile.emission[out] * seen.of_tile)
                 };
                 self.seen_through(footprints, out)
                     .iter()

@@ -1,6 +1,6 @@
 //! The progressive solver: it alone orders the passes.
 //!
-//! A batch is one submission: measure → select → cull → item buffer → form factors → gather → keep. Two batches are under way at a time; the
+//! A batch is one submission: measure → select → cull → item buffer → form factors → keep → gather. Two batches are under way at a time; the
 //! device chooses what to shoot and when to stop, and the CPU looks on one batch behind.
 
 mod batch;
