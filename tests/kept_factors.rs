@@ -238,3 +238,45 @@ fn kept_form_factors_of_something_else_are_refused() {
     }
     assert_silent();
 }
+
+/// What sources with a relief have sent evenly is sent by direction in the end, but for no more power than may be unshot.
+#[test]
+fn sources_with_relief_send_by_direction_in_the_end() {
+    // As coarse as bakes are: at a fine residual every source sends again in any case.
+    const RESIDUAL: f64 = 0.005;
+    // UNEVEN of measure_relief.comp: the share of an even source's light that counts as unshot.
+    const UNEVEN: f64 = 0.1;
+    let settings = Settings {
+        residual: RESIDUAL,
+        ..settings()
+    };
+    let scene = scene(true).0.scene;
+    let solver =
+        bake::solve(&device(), &scene, &settings, None, |_| true).expect("the scene is solved");
+    let exits = solver.relief_exits().expect("they come back");
+    let kept = exits.expect("it has relief").kept;
+    let of_relief = &solver.sources.list[solver.sources.relief.clone()];
+    let directions = kept.len() / of_relief.len();
+    let power = |source: &mesolux::sources::Source, light: Vec3| {
+        source.area * f64::from(light.element_sum())
+    };
+    let (mut all, mut even) = (0.0, 0.0);
+    for (source, sent) in of_relief.iter().zip(kept.chunks_exact(directions)) {
+        let mean = sent.iter().sum::<Vec3>() / directions as f32;
+        all += power(source, mean);
+        if sent.iter().all(|v| *v == sent[0]) {
+            even += power(source, mean);
+        }
+    }
+    let emitted: f64 = (solver.sources.list.iter())
+        .map(mesolux::sources::Source::emitted_power)
+        .sum();
+    println!(
+        "sent evenly alone {:.2e} of what relief sends, all {:.2e} of the emission",
+        even / all,
+        all / emitted
+    );
+    assert!(all > 0.1 * emitted, "relief sends a good part of the light");
+    assert!(UNEVEN * even <= RESIDUAL * emitted);
+    assert_silent();
+}
