@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::Settings;
-use super::estimate::{Estimate, ReliefSources};
+use super::estimate::{self, Estimate, ReliefSets, ReliefSources};
 use crate::constants::FACES;
 use crate::error::Result;
 use crate::hemicube::pixel_count;
@@ -49,7 +49,8 @@ pub struct BatchLoop {
     readback: [Buffer; 2],
     timestamps: [Timestamps; 2],
     batch: Batch,
-    _passes: Passes,
+    _sets: Sets,
+    _passes: Arc<Passes>,
 }
 
 /// What lies on the device for as long as the solver.
@@ -61,14 +62,33 @@ pub(super) struct OnDevice<'a> {
     pub factors: Option<&'a FactorBuffers>,
 }
 
-/// Passes with what they are bound to.
-struct Passes {
-    measure: (Measure, DescriptorSet),
-    select: (Select, DescriptorSet),
-    cull: (Cull, DescriptorSet),
-    item_buffer: (ItemBuffer, DescriptorSet),
+/// Pipelines, for any number of batches.
+pub(super) struct Passes {
+    measure: Measure,
+    select: Select,
+    cull: Cull,
+    pub item_buffer: ItemBuffer,
     estimate: Estimate,
     relief: Option<ReliefSources>,
+}
+
+/// What they are bound to for one batch.
+struct Sets {
+    measure: DescriptorSet,
+    select: DescriptorSet,
+    cull: DescriptorSet,
+    item_buffer: DescriptorSet,
+    estimate: estimate::Bound,
+    relief: Option<ReliefSets>,
+}
+
+/// Which sources a loop shoots, and how long.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rule {
+    pub shots: Option<u32>,
+    /// See [`Parameters`].
+    pub stop_power: f32,
+    pub least_emitted: f32,
 }
 
 const STAMPS: u32 = 6;
@@ -76,33 +96,21 @@ const STAMPS: u32 = 6;
 impl BatchLoop {
     pub(super) fn new(
         device: &Arc<Device>,
-        settings: &Settings,
-        item_buffer: ItemBuffer,
+        passes: &Arc<Passes>,
         batch: Batch,
         on: &OnDevice<'_>,
-        stop_power: f64,
+        rule: Rule,
     ) -> Result<Self> {
         let (scene, state) = (on.scene, on.state);
-        let measure = Measure::new(device)?;
-        let select = Select::new(device)?;
-        let cull = Cull::new(device, settings.culling)?;
-        let relief = on
-            .relief
-            .map(|relief| ReliefSources::new(device, &batch, on, relief));
-        let passes = Passes {
-            estimate: Estimate::new(device, settings.estimator, &batch, on)?,
-            relief: relief.transpose()?,
-            measure: bound(measure, |p| p.bind(scene, state))?,
-            select: bound(select, |p| p.bind(scene, state, &batch))?,
-            cull: bound(cull, |p| p.bind(scene, &batch))?,
-            item_buffer: bound(item_buffer, |p| p.bind(&batch))?,
-        };
+        let passes = Arc::clone(passes);
+        let sets = passes.bind(device, &batch, on)?;
         let parameters = Parameters {
             source_count: scene.source_count,
             fresh_slots: batch.slot_count,
             replay_slots: batch.replay_slots,
-            shot_limit: settings.shots.unwrap_or(u32::MAX),
-            stop_power: stop_power as f32,
+            shot_limit: rule.shots.unwrap_or(u32::MAX),
+            stop_power: rule.stop_power,
+            least_emitted: rule.least_emitted,
         };
         let layout = ReadbackLayout::new(&batch);
         let readback = |name| Buffer::new(device, name, layout.bytes, BufferUse::Readback);
@@ -120,21 +128,18 @@ impl BatchLoop {
                     &[Stage::Compute],
                 );
                 cmd.timestamp(stamps, 0);
-                passes.measure(cmd, on);
-                passes.select.0.record(cmd, &passes.select.1, &parameters);
+                passes.measure(cmd, &sets, on);
+                passes.select.record(cmd, &sets.select, &parameters);
                 cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-                if let (Some(sources), Some(relief)) = (&passes.relief, on.relief) {
-                    sources.send(cmd, relief, &batch);
-                }
+                passes.send(cmd, &sets, &batch, on);
                 cmd.timestamp(stamps, 1);
-                passes.cull.0.record(cmd, &passes.cull.1, scene, &batch);
+                passes.cull.record(cmd, &sets.cull, scene, &batch);
                 cmd.barrier(&[Stage::Compute], &[Stage::Draw]);
                 cmd.timestamp(stamps, 2);
-                let (pass, set) = &passes.item_buffer;
-                pass.record(cmd, set, scene, &batch);
+                (passes.item_buffer).record(cmd, &sets.item_buffer, scene, &batch);
                 cmd.timestamp(stamps, 3);
                 let found = || cmd.timestamp(stamps, 4);
-                passes.estimate.record(cmd, &batch, on, found);
+                (passes.estimate).record(cmd, &sets.estimate, &batch, on, found);
                 cmd.timestamp(stamps, 5);
                 layout.record(cmd, state, &batch, &readback[i]);
                 Ok(())
@@ -143,12 +148,12 @@ impl BatchLoop {
         let commands = [record("batch a", 0)?, record("batch b", 1)?];
         let measure_only = Commands::record(device, "remeasure", |cmd| {
             cmd.barrier(&[Stage::Compute, Stage::Transfer], &[Stage::Compute]);
-            passes.measure(cmd, on);
+            passes.measure(cmd, &sets, on);
             let none = Parameters {
                 shot_limit: 0,
                 ..parameters
             };
-            passes.select.0.record(cmd, &passes.select.1, &none);
+            passes.select.record(cmd, &sets.select, &none);
             layout.record(cmd, state, &batch, &readback[0]);
             Ok(())
         })?;
@@ -158,8 +163,13 @@ impl BatchLoop {
             readback,
             timestamps,
             batch,
+            _sets: sets,
             _passes: passes,
         })
+    }
+
+    pub(super) fn face_size(&self) -> u32 {
+        self.batch.face_size
     }
 
     /// Runs batches, one always ahead of what is read, until `look` says no; then waits for the one ahead, whose results
@@ -235,19 +245,53 @@ impl BatchLoop {
     }
 }
 
-fn bound<P>(pass: P, bind: impl FnOnce(&P) -> Result<DescriptorSet>) -> Result<(P, DescriptorSet)> {
-    let set = bind(&pass)?;
-    Ok((pass, set))
-}
-
 impl Passes {
+    pub fn new(
+        device: &Arc<Device>,
+        settings: &Settings,
+        item_buffer: ItemBuffer,
+        on: &OnDevice<'_>,
+    ) -> Result<Self> {
+        let relief = on.relief.map(|_| ReliefSources::new(device));
+        Ok(Self {
+            measure: Measure::new(device)?,
+            select: Select::new(device)?,
+            cull: Cull::new(device, settings.culling)?,
+            item_buffer,
+            estimate: Estimate::new(device, settings.estimator, on)?,
+            relief: relief.transpose()?,
+        })
+    }
+
+    fn bind(&self, device: &Arc<Device>, batch: &Batch, on: &OnDevice<'_>) -> Result<Sets> {
+        let relief = match (&self.relief, on.relief) {
+            (Some(sources), Some(relief)) => Some(sources.bind(batch, on, relief)?),
+            _ => None,
+        };
+        Ok(Sets {
+            measure: self.measure.bind(on.scene, on.state)?,
+            select: self.select.bind(on.scene, on.state, batch)?,
+            cull: self.cull.bind(on.scene, batch)?,
+            item_buffer: self.item_buffer.bind(batch)?,
+            estimate: self.estimate.bind(device, batch, on)?,
+            relief,
+        })
+    }
+
     /// The unshot light of every source.
-    fn measure(&self, cmd: &Commands, on: &OnDevice<'_>) {
-        let (pass, set) = &self.measure;
-        pass.record(cmd, set, on.scene.source_count);
+    fn measure(&self, cmd: &Commands, sets: &Sets, on: &OnDevice<'_>) {
+        self.measure
+            .record(cmd, &sets.measure, on.scene.source_count);
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-        if let (Some(sources), Some(relief)) = (&self.relief, on.relief) {
-            sources.measure(cmd, relief);
+        if let (Some(sources), Some(sets), Some(relief)) = (&self.relief, &sets.relief, on.relief) {
+            sources.measure(cmd, sets, relief);
+        }
+    }
+
+    /// What the chosen sources with a relief send by direction.
+    fn send(&self, cmd: &Commands, sets: &Sets, batch: &Batch, on: &OnDevice<'_>) {
+        if let (Some(sources), Some(sets), Some(relief)) = (&self.relief, &sets.relief, on.relief) {
+            sources.send(cmd, sets, relief, batch);
         }
     }
 }

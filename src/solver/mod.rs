@@ -4,6 +4,7 @@
 //! device chooses what to shoot and when to stop, and the CPU looks on one batch behind.
 
 mod batch;
+mod emitters;
 mod estimate;
 mod relief_light;
 mod report;
@@ -11,6 +12,7 @@ mod self_test;
 mod settings;
 mod visibility;
 
+use std::cell::Cell;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -30,11 +32,11 @@ use crate::scene::{PointLight, Scene};
 use crate::sources::{self, Sources};
 use crate::vk::Device;
 
-use batch::{BatchLoop, OnDevice};
+use batch::{BatchLoop, OnDevice, Passes, Rule};
 pub use relief_light::ReliefLight;
 pub use report::{Report, Seconds, Skipped, StopReason};
 pub use self_test::{ids_come_back_right, open_device};
-pub use settings::{Estimator, HEMICUBE_RANGE, Settings, VISIBILITY_MEMORY};
+pub use settings::{EMITTER_SCALE, Estimator, HEMICUBE_RANGE, Settings, VISIBILITY_MEMORY};
 pub use visibility::Visibility;
 
 /// How far a solution has come.
@@ -70,6 +72,8 @@ pub struct Solver {
     pub connections: Connections,
     pub occluders: Occluders,
     // Before the buffers that its commands use.
+    /// Shoots what strong emitters emit; gone once that is done.
+    emitters: Option<BatchLoop>,
     batches: BatchLoop,
     scene: SceneBuffers,
     state: State,
@@ -177,20 +181,23 @@ impl Solver {
         let bound_factor = bound_factor(&elements);
         // The bound is bound_factor · unshot / emitted; never stop on more unshot than the residual itself.
         let stop_power = settings.residual * emitted_power / bound_factor.unwrap_or(1e3).max(1.0);
-        let batches = BatchLoop::new(
-            device,
-            settings,
-            item_buffer,
-            batch,
-            &OnDevice {
-                scene: &scene,
-                state: &state,
-                relief: relief.as_ref(),
-                factors: factors.as_ref(),
-            },
-            stop_power,
-        )?;
+        let on = OnDevice {
+            scene: &scene,
+            state: &state,
+            relief: relief.as_ref(),
+            factors: factors.as_ref(),
+        };
+        let passes = Arc::new(Passes::new(device, settings, item_buffer, &on)?);
+        let to_draw = (&sources.list[..], kept);
+        let emitters = emitters::new(device, settings, &passes, &on, to_draw)?;
+        let rule = Rule {
+            shots: settings.shots,
+            stop_power: stop_power as f32,
+            least_emitted: 0.0,
+        };
+        let batches = BatchLoop::new(device, &passes, batch, &on, rule)?;
         let mut report = Report::new(device, settings, &elements, &sources, slots.0);
+        report.emitter_hemicube = emitters.as_ref().map_or(face, BatchLoop::face_size);
         report.set_meshlets(scene.meshlet_count);
         report.skipped.triangles_merged = (elements.len() - occluders.len()) as u64;
         Ok(Self {
@@ -200,6 +207,7 @@ impl Solver {
             sources,
             connections,
             occluders,
+            emitters,
             batches,
             scene,
             state,
@@ -219,10 +227,13 @@ impl Solver {
         let sources = self.scene.source_count;
         let emitted = self.emitted_power;
         let mut history: Vec<(f64, f64)> = Vec::new();
-        let mut stop = None;
+        let stop = Cell::new(None);
         let report = &mut self.report;
-        self.batches.run(|batch| {
+        let mut look = |batch: &BatchResult, of_emitters: bool| {
             report.add(batch);
+            if of_emitters {
+                report.emitter_hemicubes += u64::from(batch.progress.selected);
+            }
             let Progress {
                 unshot_emitted,
                 unshot_reflected,
@@ -236,14 +247,17 @@ impl Solver {
             history.push((elapsed.as_secs_f64(), unshot_share));
             report.unshot_share = unshot_share;
             report.error_bound = error_bound;
-            if stop.is_some() {
+            if stop.get().is_some() {
+                return false;
+            }
+            if selected + replayed == 0 && of_emitters {
                 return false;
             }
             if selected + replayed == 0 {
-                stop = Some(match self.settings.shots {
+                stop.set(Some(match self.settings.shots {
                     Some(limit) if shots >= limit => StopReason::Shots,
                     _ => StopReason::Residual,
-                });
+                }));
                 return false;
             }
             let update = Update {
@@ -258,12 +272,19 @@ impl Solver {
                 ),
             };
             if !go_on(&update) {
-                stop = Some(StopReason::Interrupted);
+                stop.set(Some(StopReason::Interrupted));
             } else if elapsed >= budget {
-                stop = Some(StopReason::Budget);
+                stop.set(Some(StopReason::Budget));
             }
-            stop.is_none()
-        })?;
+            stop.get().is_none()
+        };
+        if let Some(emitters) = &mut self.emitters {
+            emitters.run(|batch| look(batch, true))?;
+        }
+        if stop.get().is_none() {
+            self.emitters = None;
+            self.batches.run(|batch| look(batch, false))?;
+        }
         // The last batches have shot since the last look: what is left now is what a measurement finds.
         let last = self.batches.remeasure()?;
         report.shots = last.shots;
@@ -272,7 +293,7 @@ impl Solver {
             emitted,
         );
         report.error_bound = factor.map(|f| bound(f, report.unshot_share));
-        report.stop = stop.unwrap_or(StopReason::Residual);
+        report.stop = stop.get().unwrap_or(StopReason::Residual);
         report.seconds.setup = self.setup.as_secs_f64();
         report.seconds.solve_wall += start.elapsed().as_secs_f64();
         if let Some(factors) = &self.factors {
