@@ -65,7 +65,7 @@ pub struct SolveOptions {
     #[arg(long, value_name = "N")]
     hemicube: Option<u32>,
     /// The same for sources that emit strongly, whose shadows are the sharpest; they are few, so that finer ones cost little.
-    /// The same as --hemicube draws them as all others [default: four times --hemicube, at most 2048]
+    /// The same as --hemicube draws them as all others [default: four times --hemicube, at most 1024]
     #[arg(long, value_name = "N")]
     emitter_hemicube: Option<u32>,
     /// Stop when the error bound, as a share of the emitted power, is no more than this [default: that of --quality, 0.001 for
