@@ -23,6 +23,7 @@ layout(push_constant, scalar) uniform Parameters {
     uint replay_slots;
     uint shot_limit;
     float stop_power;    // stops when all emission is shot and no more reflected power than this is unshot
+    float least_emitted; // above 0: chooses only sources whose emission is unshot and has this power, and replays none
 };
 
 shared float best_power[SELECT_GROUP];
@@ -37,12 +38,19 @@ bool is_kept(uint s) {
     return kept_rows[s].chunk != NONE;
 }
 
+// Whether a source that has something to send is to be drawn.
+bool may_draw(uint s) {
+    Source source = sources[s];
+    float emitted = (source.emitted.r + source.emitted.g + source.emitted.b) * (source.kind == KIND_POINT ? 6.28318531 : source.area);
+    return !is_kept(s) && (least_emitted == 0.0 || shot[s].w == SHOT_NOTHING && emitted >= least_emitted);
+}
+
 // This invocation's own best of the sources that it looks after and that need drawing.
 void scan(uint lane) {
     float power = 0.0;
     uint source = NONE;
     for (uint s = lane; s < source_count; s += SELECT_GROUP) {
-        if (unshot[s].w > power && !is_kept(s)) {
+        if (unshot[s].w > power && may_draw(s)) {
             power = unshot[s].w;
             source = s;
         }
@@ -74,7 +82,7 @@ void main() {
         float of_reflected = sources[s].kind == KIND_POINT ? 0.0 : sources[s].area * (rgb.r + rgb.g + rgb.b);
         reflected += emission_left ? of_reflected : unshot[s].w;
         emitted += emission_left ? max(unshot[s].w - of_reflected, 0.0) : 0.0;
-        kept = is_kept(s) ? max(kept, unshot[s].w) : kept;
+        kept = is_kept(s) && least_emitted == 0.0 ? max(kept, unshot[s].w) : kept;
     }
     best_kept[lane] = kept;
     sum_emitted[lane] = emitted;

@@ -28,6 +28,7 @@ impl CachedBake {
         let Settings {
             estimator,
             hemicube,
+            emitter_hemicube: _,
             residual,
             // A bake that it stopped is not kept.
             budget: _,
@@ -40,8 +41,9 @@ impl CachedBake {
             visibility_memory,
             relief,
         } = settings;
+        let emitter_face = settings.emitter_face();
         let key = format!(
-            "bake cache 1, layout {VERSION}\n{maker}\n{scene_hash}\n{estimator:?} {hemicube} {residual:?} {shots:?} {seed} \
+            "bake cache 2, layout {VERSION}\n{maker}\n{scene_hash}\n{estimator:?} {hemicube} {emitter_face} {residual:?} {shots:?} {seed} \
              {grouping:?} {culling:?} {merging} {batch} {visibility_memory:?} {:?} {:?}",
             relief.transport, relief.directions
         );

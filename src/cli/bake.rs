@@ -64,6 +64,10 @@ pub struct SolveOptions {
     /// Pixels a side of a hemicube face [default: that of --quality, 128 for normal]
     #[arg(long, value_name = "N")]
     hemicube: Option<u32>,
+    /// The same for sources that emit strongly, whose shadows are the sharpest; they are few, so that finer ones cost little.
+    /// The same as --hemicube draws them as all others [default: four times --hemicube, at most 1024]
+    #[arg(long, value_name = "N")]
+    emitter_hemicube: Option<u32>,
     /// Stop when the error bound, as a share of the emitted power, is no more than this [default: that of --quality, 0.001 for
     /// normal]
     #[arg(long, value_name = "X")]
@@ -154,6 +158,7 @@ impl SolveOptions {
         let settings = self.settings()?;
         Ok(Self {
             hemicube: Some(settings.hemicube),
+            emitter_hemicube: Some(settings.emitter_face()),
             residual: Some(settings.residual),
             source_elements: Some(settings.grouping.max_elements),
             source_area: Some(settings.grouping.max_area),
@@ -198,6 +203,7 @@ impl SolveOptions {
                 EstimatorName::Pixel => Estimator::Pixel,
             },
             hemicube: self.hemicube.unwrap_or(preset.hemicube),
+            emitter_hemicube: self.emitter_hemicube.or(preset.emitter_hemicube),
             residual: self.residual.unwrap_or(preset.residual),
             grouping: self.grouping(preset.grouping)?,
             budget: self.budget()?,

@@ -32,6 +32,9 @@ pub struct Options {
     /// Hemicubes of the pixel estimator
     #[arg(long, value_name = "N,...", value_delimiter = ',', default_value = "64,128,256,512", num_args = 0..)]
     pixel_hemicube: Vec<u32>,
+    /// Sides of the hemicubes of strong emitters over that of all others; 1 draws them as all others
+    #[arg(long, value_name = "N,...", value_delimiter = ',', default_value = "4")]
+    emitter_scale: Vec<u32>,
     /// Sizes of the sources over the default one
     #[arg(
         long,
@@ -85,6 +88,9 @@ pub fn run(options: &Options) -> Result<()> {
             "--source-scale {bad}: must be in 0.01 to 100"
         )));
     }
+    if options.emitter_scale.contains(&0) {
+        return Err(Error::Usage("--emitter-scale 0: must be at least 1".into()));
+    }
     let wanted = pareto::Options {
         wanted: Wanted {
             samples: options.samples.max(2),
@@ -93,6 +99,7 @@ pub fn run(options: &Options) -> Result<()> {
         },
         grid: Grid {
             hemicubes: options.hemicube.clone(),
+            emitter_scales: options.emitter_scale.clone(),
             scales: options.source_scale.clone(),
             pixel_hemicubes: options.pixel_hemicube.clone(),
             directions: options.directions.clone(),

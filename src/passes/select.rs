@@ -24,6 +24,8 @@ pub struct Parameters {
     pub shot_limit: u32,
     /// No more shots once all emission is shot and this much reflected power is unshot, internal units.
     pub stop_power: f32,
+    /// Above 0: chooses only sources whose emission is unshot and has this power, internal units, and replays none.
+    pub least_emitted: f32,
 }
 
 impl Select {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::Settings;
-use super::estimate::{Estimate, ReliefSources, Sending};
+use super::estimate::{self, Estimate, ReliefSets, ReliefSources, Sending};
 use crate::constants::FACES;
 use crate::error::Result;
 use crate::hemicube::pixel_count;
@@ -51,7 +51,8 @@ pub struct BatchLoop {
     readback: [Buffer; 2],
     timestamps: [Timestamps; 2],
     batch: Batch,
-    _passes: Passes,
+    _sets: Sets,
+    _passes: Arc<Passes>,
 }
 
 struct Evenly {
@@ -69,14 +70,33 @@ pub(super) struct OnDevice<'a> {
     pub factors: Option<&'a FactorBuffers>,
 }
 
-/// Passes with what they are bound to.
-struct Passes {
-    measure: (Measure, DescriptorSet),
-    select: (Select, DescriptorSet),
-    cull: (Cull, DescriptorSet),
-    item_buffer: (ItemBuffer, DescriptorSet),
+/// Pipelines, for any number of batches.
+pub(super) struct Passes {
+    measure: Measure,
+    select: Select,
+    cull: Cull,
+    pub item_buffer: ItemBuffer,
     estimate: Estimate,
     relief: Option<ReliefSources>,
+}
+
+/// What they are bound to for one batch.
+struct Sets {
+    measure: DescriptorSet,
+    select: DescriptorSet,
+    cull: DescriptorSet,
+    item_buffer: DescriptorSet,
+    estimate: estimate::Bound,
+    relief: Option<ReliefSets>,
+}
+
+/// Which sources a loop shoots, and how long.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rule {
+    pub shots: Option<u32>,
+    /// See [`Parameters`].
+    pub stop_power: f32,
+    pub least_emitted: f32,
 }
 
 const STAMPS: u32 = 6;
@@ -84,33 +104,21 @@ const STAMPS: u32 = 6;
 impl BatchLoop {
     pub(super) fn new(
         device: &Arc<Device>,
-        settings: &Settings,
-        item_buffer: ItemBuffer,
+        passes: &Arc<Passes>,
         batch: Batch,
         on: &OnDevice<'_>,
-        stop_power: f64,
+        rule: Rule,
     ) -> Result<Self> {
         let (scene, state) = (on.scene, on.state);
-        let measure = Measure::new(device)?;
-        let select = Select::new(device)?;
-        let cull = Cull::new(device, settings.culling)?;
-        let relief = on
-            .relief
-            .map(|relief| ReliefSources::new(device, &batch, on, relief));
-        let passes = Passes {
-            estimate: Estimate::new(device, settings.estimator, &batch, on)?,
-            relief: relief.transpose()?,
-            measure: bound(measure, |p| p.bind(scene, state))?,
-            select: bound(select, |p| p.bind(scene, state, &batch))?,
-            cull: bound(cull, |p| p.bind(scene, &batch))?,
-            item_buffer: bound(item_buffer, |p| p.bind(&batch))?,
-        };
+        let passes = Arc::clone(passes);
+        let sets = passes.bind(device, &batch, on)?;
         let parameters = Parameters {
             source_count: scene.source_count,
             fresh_slots: batch.slot_count,
             replay_slots: batch.replay_slots,
-            shot_limit: settings.shots.unwrap_or(u32::MAX),
-            stop_power: stop_power as f32,
+            shot_limit: rule.shots.unwrap_or(u32::MAX),
+            stop_power: rule.stop_power,
+            least_emitted: rule.least_emitted,
         };
         let layout = ReadbackLayout::new(&batch);
         let readback = |name| Buffer::new(device, name, layout.bytes, BufferUse::Readback);
@@ -128,21 +136,20 @@ impl BatchLoop {
                     &[Stage::Compute],
                 );
                 cmd.timestamp(stamps, 0);
-                passes.measure(cmd, on, sending);
-                passes.select.0.record(cmd, &passes.select.1, &parameters);
+                passes.measure(cmd, &sets, on, sending);
+                passes.select.record(cmd, &sets.select, &parameters);
                 cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-                if let Some((sources, relief)) = passes.directed(on, sending) {
-                    sources.send(cmd, relief, &batch);
+                if let Some((sources, sets, relief)) = passes.directed(&sets, on, sending) {
+                    sources.send(cmd, sets, relief, &batch);
                 }
                 cmd.timestamp(stamps, 1);
-                passes.cull.0.record(cmd, &passes.cull.1, scene, &batch);
+                passes.cull.record(cmd, &sets.cull, scene, &batch);
                 cmd.barrier(&[Stage::Compute], &[Stage::Draw]);
                 cmd.timestamp(stamps, 2);
-                let (pass, set) = &passes.item_buffer;
-                pass.record(cmd, set, scene, &batch);
+                (passes.item_buffer).record(cmd, &sets.item_buffer, scene, &batch);
                 cmd.timestamp(stamps, 3);
                 let found = || cmd.timestamp(stamps, 4);
-                passes.estimate.record(cmd, &batch, on, sending, found);
+                (passes.estimate).record(cmd, &sets.estimate, &batch, on, sending, found);
                 cmd.timestamp(stamps, 5);
                 layout.record(cmd, state, &batch, &readback[i]);
                 Ok(())
@@ -151,12 +158,12 @@ impl BatchLoop {
         let measure_only = |name, sending| {
             Commands::record(device, name, |cmd| {
                 cmd.barrier(&[Stage::Compute, Stage::Transfer], &[Stage::Compute]);
-                passes.measure(cmd, on, sending);
+                passes.measure(cmd, &sets, on, sending);
                 let none = Parameters {
                     shot_limit: 0,
                     ..parameters
                 };
-                passes.select.0.record(cmd, &passes.select.1, &none);
+                passes.select.record(cmd, &sets.select, &none);
                 layout.record(cmd, state, &batch, &readback[0]);
                 Ok(())
             })
@@ -166,8 +173,10 @@ impl BatchLoop {
             record("batch a", 0, by_direction)?,
             record("batch b", 1, by_direction)?,
         ];
-        let evenly = match &passes.relief {
-            Some(sources) if passes.estimate.sends_evenly_first(on) => Some(Evenly {
+        let first_evenly = passes.estimate.sends_evenly_first(on);
+        let directed = passes.directed(&sets, on, by_direction);
+        let evenly = match directed.filter(|_| first_evenly) {
+            Some((sources, of_relief, relief)) => Some(Evenly {
                 commands: [
                     record("even batch a", 0, Sending::Evenly)?,
                     record("even batch b", 1, Sending::Evenly)?,
@@ -175,11 +184,12 @@ impl BatchLoop {
                 measure_only: measure_only("remeasure evenly", Sending::Evenly)?,
                 recall: Commands::record(device, "recall", |cmd| {
                     cmd.barrier(&[Stage::Compute, Stage::Transfer], &[Stage::Compute]);
-                    passes.estimate.recall(cmd, sources, on);
+                    let gathers = (&passes.estimate, &sets.estimate);
+                    sources.recall(cmd, of_relief, (relief, on), gathers);
                     Ok(())
                 })?,
             }),
-            _ => None,
+            None => None,
         };
         let measure_only = measure_only("remeasure", by_direction)?;
         Ok(Self {
@@ -189,8 +199,13 @@ impl BatchLoop {
             readback,
             timestamps,
             batch,
+            _sets: sets,
             _passes: passes,
         })
+    }
+
+    pub(super) fn face_size(&self) -> u32 {
+        self.batch.face_size
     }
 
     /// Runs batches, one always ahead of what is read, until `look` says no; then waits for the one ahead, whose results
@@ -288,30 +303,61 @@ impl BatchLoop {
     }
 }
 
-fn bound<P>(pass: P, bind: impl FnOnce(&P) -> Result<DescriptorSet>) -> Result<(P, DescriptorSet)> {
-    let set = bind(&pass)?;
-    Ok((pass, set))
-}
-
 impl Passes {
+    pub fn new(
+        device: &Arc<Device>,
+        settings: &Settings,
+        item_buffer: ItemBuffer,
+        on: &OnDevice<'_>,
+    ) -> Result<Self> {
+        let relief = on.relief.map(|_| ReliefSources::new(device));
+        Ok(Self {
+            measure: Measure::new(device)?,
+            select: Select::new(device)?,
+            cull: Cull::new(device, settings.culling)?,
+            item_buffer,
+            estimate: Estimate::new(device, settings.estimator, on)?,
+            relief: relief.transpose()?,
+        })
+    }
+
+    fn bind(&self, device: &Arc<Device>, batch: &Batch, on: &OnDevice<'_>) -> Result<Sets> {
+        let relief = match (&self.relief, on.relief) {
+            (Some(sources), Some(relief)) => Some(sources.bind(batch, on, relief)?),
+            _ => None,
+        };
+        Ok(Sets {
+            measure: self.measure.bind(on.scene, on.state)?,
+            select: self.select.bind(on.scene, on.state, batch)?,
+            cull: self.cull.bind(on.scene, batch)?,
+            item_buffer: self.item_buffer.bind(batch)?,
+            estimate: self.estimate.bind(device, batch, on)?,
+            relief,
+        })
+    }
+
     /// The sources that send by direction.
     fn directed<'a>(
         &'a self,
+        sets: &'a Sets,
         on: &OnDevice<'a>,
         sending: Sending,
-    ) -> Option<(&'a ReliefSources, &'a ReliefBuffers)> {
-        let sources = self.relief.as_ref();
-        let directed = sources.filter(|_| sending == Sending::ByDirection);
-        directed.zip(on.relief)
+    ) -> Option<(&'a ReliefSources, &'a ReliefSets, &'a ReliefBuffers)> {
+        match (&self.relief, &sets.relief, on.relief, sending) {
+            (Some(sources), Some(sets), Some(relief), Sending::ByDirection) => {
+                Some((sources, sets, relief))
+            }
+            _ => None,
+        }
     }
 
     /// The unshot light of every source.
-    fn measure(&self, cmd: &Commands, on: &OnDevice<'_>, sending: Sending) {
-        let (pass, set) = &self.measure;
-        pass.record(cmd, set, on.scene.source_count);
+    fn measure(&self, cmd: &Commands, sets: &Sets, on: &OnDevice<'_>, sending: Sending) {
+        self.measure
+            .record(cmd, &sets.measure, on.scene.source_count);
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-        if let Some((sources, relief)) = self.directed(on, sending) {
-            sources.measure(cmd, relief);
+        if let Some((sources, sets, relief)) = self.directed(sets, on, sending) {
+            sources.measure(cmd, sets, relief);
         }
     }
 }

@@ -8,7 +8,6 @@ use super::batch::OnDevice;
 use crate::error::Result;
 use crate::passes::bin_pixels::{self, BinPixels};
 use crate::passes::buffers::Batch;
-use crate::passes::factor_buffers::FactorBuffers;
 use crate::passes::form_factors::{self, FormFactors};
 use crate::passes::gather::{self, Gather, GatherRelief};
 use crate::passes::keep::{self, Keep};
@@ -28,83 +27,102 @@ pub(super) enum Sending {
     ByDirection,
 }
 
+/// Pipelines, for any number of batches.
 #[allow(clippy::large_enum_variant)] // one of them lives as long as the solver
 pub(super) enum Estimate {
     Receivers {
-        form_factors: (FormFactors, form_factors::Sets),
+        form_factors: FormFactors,
         /// In enclosed scenes.
-        normalise: Option<(Normalise, DescriptorSet)>,
+        normalise: Option<Normalise>,
         /// None where nothing is to be kept.
-        keep: Option<(Keep, keep::Sets)>,
+        keep: Option<Keep>,
         gather: GatherBy,
     },
-    Pixels(BinPixels, bin_pixels::Buffers),
-    PixelsRelief(PixelsRelief, pixels_relief::Buffers),
+    Pixels(BinPixels),
+    PixelsRelief(PixelsRelief),
 }
 
 #[allow(clippy::large_enum_variant)] // as above
 pub(super) enum GatherBy {
-    Plain(Gather, gather::Sets),
-    Relief(GatherRelief, gather::ReliefSets),
+    Plain(Gather),
+    Relief(GatherRelief),
+}
+
+/// What they are bound to for one batch.
+#[allow(clippy::large_enum_variant)] // one or two of them live as long as the solver
+pub(super) enum Bound {
+    Receivers {
+        form_factors: form_factors::Sets,
+        normalise: Option<DescriptorSet>,
+        keep: Option<keep::Sets>,
+        gather: GatherSets,
+    },
+    Pixels(bin_pixels::Buffers),
+    PixelsRelief(pixels_relief::Buffers),
+}
+
+pub(super) enum GatherSets {
+    Plain(gather::Sets),
+    Relief(gather::ReliefSets),
 }
 
 impl Estimate {
-    pub fn new(
-        device: &Arc<Device>,
-        estimator: Estimator,
-        batch: &Batch,
-        on: &OnDevice<'_>,
-    ) -> Result<Self> {
-        let (scene, state) = (on.scene, on.state);
+    pub fn new(device: &Arc<Device>, estimator: Estimator, on: &OnDevice<'_>) -> Result<Self> {
         let Some(factors) = on.factors.filter(|_| estimator == Estimator::Receiver) else {
             return Ok(match on.relief {
-                Some(relief) => {
-                    let pass = PixelsRelief::new(device)?;
-                    let buffers = pass.bind(device, scene, state, batch, relief)?;
-                    Self::PixelsRelief(pass, buffers)
-                }
-                None => {
-                    let pass = BinPixels::new(device)?;
-                    let buffers = pass.bind(device, scene, state, batch)?;
-                    Self::Pixels(pass, buffers)
-                }
+                Some(_) => Self::PixelsRelief(PixelsRelief::new(device)?),
+                None => Self::Pixels(BinPixels::new(device)?),
             });
         };
-        let form_factors = FormFactors::new(device, on.relief.is_some())?;
-        let sets = form_factors.bind(device, (scene, state), batch, factors, on.relief)?;
-        let normalise = match scene.enclosed {
-            true => {
-                let normalise = Normalise::new(device)?;
-                let set = normalise.bind(scene, batch, factors)?;
-                Some((normalise, set))
-            }
-            false => None,
-        };
-        let keep = match factors.keeps() {
-            true => {
-                let keep = Keep::new(device)?;
-                let sets = keep.bind(state, batch, factors)?;
-                Some((keep, sets))
-            }
-            false => None,
-        };
-        let gather = match on.relief {
-            None => {
-                let gather = Gather::new(device)?;
-                let sets = gather.bind(device, scene, state, batch, factors)?;
-                GatherBy::Plain(gather, sets)
-            }
-            Some(relief) => {
-                let gather = GatherRelief::new(device)?;
-                let sets = gather.bind(device, (scene, state), batch, factors, relief)?;
-                GatherBy::Relief(gather, sets)
-            }
-        };
+        let normalise = on.scene.enclosed.then(|| Normalise::new(device));
+        let keep = factors.keeps().then(|| Keep::new(device));
         Ok(Self::Receivers {
-            form_factors: (form_factors, sets),
-            normalise,
-            keep,
-            gather,
+            form_factors: FormFactors::new(device, on.relief.is_some())?,
+            normalise: normalise.transpose()?,
+            keep: keep.transpose()?,
+            gather: match on.relief {
+                None => GatherBy::Plain(Gather::new(device)?),
+                Some(_) => GatherBy::Relief(GatherRelief::new(device)?),
+            },
+        })
+    }
+
+    pub fn bind(&self, device: &Arc<Device>, batch: &Batch, on: &OnDevice<'_>) -> Result<Bound> {
+        let (scene, state) = (on.scene, on.state);
+        Ok(match (self, on.factors, on.relief) {
+            (
+                Self::Receivers {
+                    form_factors,
+                    normalise,
+                    keep,
+                    gather,
+                },
+                Some(factors),
+                relief,
+            ) => Bound::Receivers {
+                form_factors: form_factors.bind(device, (scene, state), batch, factors, relief)?,
+                normalise: (normalise.as_ref())
+                    .map(|n| n.bind(scene, batch, factors))
+                    .transpose()?,
+                keep: (keep.as_ref())
+                    .map(|k| k.bind(state, batch, factors))
+                    .transpose()?,
+                gather: match (gather, relief) {
+                    (GatherBy::Plain(gather), _) => {
+                        GatherSets::Plain(gather.bind(device, scene, state, batch, factors)?)
+                    }
+                    (GatherBy::Relief(gather), Some(relief)) => {
+                        let lit = (scene, state);
+                        GatherSets::Relief(gather.bind(device, lit, batch, factors, relief)?)
+                    }
+                    (GatherBy::Relief(_), None) => unreachable!("made for a scene with relief"),
+                },
+            },
+            (Self::Pixels(pass), ..) => Bound::Pixels(pass.bind(device, scene, state, batch)?),
+            (Self::PixelsRelief(pass), _, Some(relief)) => {
+                Bound::PixelsRelief(pass.bind(device, scene, state, batch, relief)?)
+            }
+            _ => unreachable!("made for what is on the device"),
         })
     }
 
@@ -112,18 +130,25 @@ impl Estimate {
     pub fn record(
         &self,
         cmd: &Commands,
+        bound: &Bound,
         batch: &Batch,
         on: &OnDevice<'_>,
         sending: Sending,
         found: impl FnOnce(),
     ) {
-        match (self, on.factors, on.relief) {
+        match (self, bound, on.factors, on.relief) {
             (
                 Self::Receivers {
-                    form_factors: (form_factors, sets),
+                    form_factors,
                     normalise,
                     keep,
                     gather,
+                },
+                Bound::Receivers {
+                    form_factors: sets,
+                    normalise: normalise_set,
+                    keep: keep_sets,
+                    gather: gather_sets,
                 },
                 Some(factors),
                 relief,
@@ -131,51 +156,44 @@ impl Estimate {
                 cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
                 form_factors.record(cmd, sets, batch, factors);
                 cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-                if let Some((normalise, set)) = normalise {
+                if let (Some(normalise), Some(set)) = (normalise, normalise_set) {
                     normalise.record(cmd, set, batch, factors);
                     cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
                 }
                 found();
-                if let Some((keep, sets)) = keep {
+                if let (Some(keep), Some(sets)) = (keep, keep_sets) {
                     keep.record(cmd, sets, batch, factors);
                     cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
                 }
-                gather.record(cmd, batch, on, (factors, relief), sending);
+                match (gather, gather_sets, relief) {
+                    (GatherBy::Plain(gather), GatherSets::Plain(sets), _) => {
+                        gather.record(cmd, sets, on.scene, batch);
+                    }
+                    (GatherBy::Relief(gather), GatherSets::Relief(sets), Some(relief)) => {
+                        match sending {
+                            Sending::Evenly => {
+                                gather.record_evenly(cmd, sets, relief, batch, factors);
+                            }
+                            Sending::ByDirection => {
+                                gather.record(cmd, sets, relief, batch, factors);
+                            }
+                        }
+                    }
+                    _ => unreachable!("bound as it was made"),
+                }
             }
-            (Self::Pixels(pass, buffers), ..) => {
+            (Self::Pixels(pass), Bound::Pixels(buffers), ..) => {
                 pass.record(cmd, buffers, on.scene, batch);
                 found();
             }
-            (Self::PixelsRelief(pass, buffers), _, Some(relief)) => {
+            (Self::PixelsRelief(pass), Bound::PixelsRelief(buffers), _, Some(relief)) => {
                 pass.record(cmd, buffers, relief, batch);
                 found();
             }
-            _ => unreachable!("made for what is on the device"),
+            _ => unreachable!("bound as it was made"),
         }
     }
-}
 
-impl GatherBy {
-    fn record(
-        &self,
-        cmd: &Commands,
-        batch: &Batch,
-        on: &OnDevice<'_>,
-        (factors, relief): (&FactorBuffers, Option<&ReliefBuffers>),
-        sending: Sending,
-    ) {
-        match (self, relief) {
-            (Self::Plain(gather, sets), _) => gather.record(cmd, sets, on.scene, batch),
-            (Self::Relief(gather, sets), Some(relief)) => match sending {
-                Sending::Evenly => gather.record_evenly(cmd, sets, relief, batch, factors),
-                Sending::ByDirection => gather.record(cmd, sets, relief, batch, factors),
-            },
-            (Self::Relief(..), None) => unreachable!("made for a scene with relief"),
-        }
-    }
-}
-
-impl Estimate {
     /// Whether all is sent evenly first: not where sources with a relief emit, nor where what follows would have to be drawn anew.
     pub fn sends_evenly_first(&self, on: &OnDevice<'_>) -> bool {
         matches!(self, Self::Receivers { keep: Some(_), .. })
@@ -185,61 +203,83 @@ impl Estimate {
             && on.relief.is_some_and(|relief| !relief.glows)
     }
 
-    /// Elements with a relief take in by direction what was shot evenly, and sources with a relief send by direction from now on.
-    pub fn recall(&self, cmd: &Commands, sources: &ReliefSources, on: &OnDevice<'_>) {
-        let (Self::Receivers { gather, .. }, Some(factors), Some(relief)) =
-            (self, on.factors, on.relief)
-        else {
-            unreachable!("asked for where light is sent evenly first");
-        };
-        let GatherBy::Relief(gather, sets) = gather else {
-            unreachable!("made for a scene with relief");
-        };
-        let (recall, set) = &sources.recall;
-        recall.record(cmd, set, on.scene, relief);
-        cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-        let listed = (relief, on.scene.source_count);
-        gather.record_recalled(cmd, sets, listed, factors);
+    /// Elements with a relief take in by direction what was shot evenly and is listed for them.
+    fn recall(&self, cmd: &Commands, bound: &Bound, on: &OnDevice<'_>) {
+        match (self, bound, on.factors, on.relief) {
+            (
+                Self::Receivers {
+                    gather: GatherBy::Relief(gather),
+                    ..
+                },
+                Bound::Receivers {
+                    gather: GatherSets::Relief(sets),
+                    ..
+                },
+                Some(factors),
+                Some(relief),
+            ) => gather.record_recalled(cmd, sets, (relief, on.scene.source_count), factors),
+            _ => unreachable!("asked for where light is sent evenly first"),
+        }
     }
 }
 
 /// What only scenes with relief compile: what their sources have to send, and by which direction they send it.
 pub(super) struct ReliefSources {
-    measure: (MeasureRelief, DescriptorSet),
-    send: (SendRelief, DescriptorSet),
-    recall: (Recall, DescriptorSet),
+    measure: MeasureRelief,
+    send: SendRelief,
+    recall: Recall,
+}
+
+/// What they are bound to for one batch.
+pub(super) struct ReliefSets {
+    measure: DescriptorSet,
+    send: DescriptorSet,
+    recall: DescriptorSet,
 }
 
 impl ReliefSources {
-    pub fn new(
-        device: &Arc<Device>,
+    pub fn new(device: &Arc<Device>) -> Result<Self> {
+        Ok(Self {
+            measure: MeasureRelief::new(device)?,
+            send: SendRelief::new(device)?,
+            recall: Recall::new(device)?,
+        })
+    }
+
+    pub fn bind(
+        &self,
         batch: &Batch,
         on: &OnDevice<'_>,
         relief: &ReliefBuffers,
-    ) -> Result<Self> {
-        let measure = MeasureRelief::new(device)?;
-        let measured = measure.bind(on.scene, on.state, relief)?;
-        let send = SendRelief::new(device)?;
-        let sent = send.bind(on.scene, batch, relief)?;
-        let recall = Recall::new(device)?;
-        let recalled = recall.bind(on.scene, on.state, relief)?;
-        Ok(Self {
-            measure: (measure, measured),
-            send: (send, sent),
-            recall: (recall, recalled),
+    ) -> Result<ReliefSets> {
+        Ok(ReliefSets {
+            measure: self.measure.bind(on.scene, on.state, relief)?,
+            send: self.send.bind(on.scene, batch, relief)?,
+            recall: self.recall.bind(on.scene, on.state, relief)?,
         })
     }
 
     /// Unshot light, over what [`crate::passes::measure`] took it for.
-    pub fn measure(&self, cmd: &Commands, relief: &ReliefBuffers) {
-        let (pass, set) = &self.measure;
-        pass.record(cmd, set, relief);
+    pub fn measure(&self, cmd: &Commands, sets: &ReliefSets, relief: &ReliefBuffers) {
+        self.measure.record(cmd, &sets.measure, relief);
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
     }
 
-    pub fn send(&self, cmd: &Commands, relief: &ReliefBuffers, batch: &Batch) {
-        let (pass, set) = &self.send;
-        pass.record(cmd, set, relief, batch);
+    pub fn send(&self, cmd: &Commands, sets: &ReliefSets, relief: &ReliefBuffers, batch: &Batch) {
+        self.send.record(cmd, &sets.send, relief, batch);
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+    }
+
+    /// Elements with a relief take in by direction what was shot evenly, and sources with a relief send by direction from now on.
+    pub fn recall(
+        &self,
+        cmd: &Commands,
+        sets: &ReliefSets,
+        (relief, on): (&ReliefBuffers, &OnDevice<'_>),
+        (estimate, bound): (&Estimate, &Bound),
+    ) {
+        self.recall.record(cmd, &sets.recall, on.scene, relief);
+        cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+        estimate.recall(cmd, bound, on);
     }
 }

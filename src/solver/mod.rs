@@ -4,6 +4,7 @@
 //! device chooses what to shoot and when to stop, and the CPU looks on one batch behind.
 
 mod batch;
+mod emitters;
 mod estimate;
 mod relief_light;
 mod report;
@@ -31,11 +32,11 @@ use crate::scene::{PointLight, Scene};
 use crate::sources::{self, Sources};
 use crate::vk::Device;
 
-use batch::{BatchLoop, OnDevice};
+use batch::{BatchLoop, OnDevice, Passes, Rule};
 pub use relief_light::ReliefLight;
 pub use report::{Report, Seconds, Skipped, StopReason};
 pub use self_test::{ids_come_back_right, open_device};
-pub use settings::{Estimator, HEMICUBE_RANGE, Settings, VISIBILITY_MEMORY};
+pub use settings::{EMITTER_SCALE, Estimator, HEMICUBE_RANGE, Settings, VISIBILITY_MEMORY};
 pub use visibility::Visibility;
 
 /// How far a solution has come.
@@ -71,6 +72,8 @@ pub struct Solver {
     pub connections: Connections,
     pub occluders: Occluders,
     // Before the buffers that its commands use.
+    /// Shoots what strong emitters emit; gone once that is done.
+    emitters: Option<BatchLoop>,
     batches: BatchLoop,
     scene: SceneBuffers,
     state: State,
@@ -178,20 +181,23 @@ impl Solver {
         let bound_factor = bound_factor(&elements);
         // The bound is bound_factor · unshot / emitted; never stop on more unshot than the residual itself.
         let stop_power = settings.residual * emitted_power / bound_factor.unwrap_or(1e3).max(1.0);
-        let batches = BatchLoop::new(
-            device,
-            settings,
-            item_buffer,
-            batch,
-            &OnDevice {
-                scene: &scene,
-                state: &state,
-                relief: relief.as_ref(),
-                factors: factors.as_ref(),
-            },
-            stop_power,
-        )?;
+        let on = OnDevice {
+            scene: &scene,
+            state: &state,
+            relief: relief.as_ref(),
+            factors: factors.as_ref(),
+        };
+        let passes = Arc::new(Passes::new(device, settings, item_buffer, &on)?);
+        let to_draw = (&sources.list[..], kept);
+        let emitters = emitters::new(device, settings, &passes, &on, to_draw)?;
+        let rule = Rule {
+            shots: settings.shots,
+            stop_power: stop_power as f32,
+            least_emitted: 0.0,
+        };
+        let batches = BatchLoop::new(device, &passes, batch, &on, rule)?;
         let mut report = Report::new(device, settings, &elements, &sources, slots.0);
+        report.emitter_hemicube = emitters.as_ref().map_or(face, BatchLoop::face_size);
         report.set_meshlets(scene.meshlet_count);
         report.skipped.triangles_merged = (elements.len() - occluders.len()) as u64;
         Ok(Self {
@@ -201,6 +207,7 @@ impl Solver {
             sources,
             connections,
             occluders,
+            emitters,
             batches,
             scene,
             state,
@@ -232,8 +239,11 @@ impl Solver {
         let mut history: Vec<(f64, f64)> = Vec::new();
         let stop = Cell::new(None);
         let report = &mut self.report;
-        let mut look = |batch: &BatchResult| {
+        let mut look = |batch: &BatchResult, of_emitters: bool| {
             report.add(batch);
+            if of_emitters {
+                report.emitter_hemicubes += u64::from(batch.progress.selected);
+            }
             let Progress {
                 unshot_emitted,
                 unshot_reflected,
@@ -248,6 +258,9 @@ impl Solver {
             report.unshot_share = unshot_share;
             report.error_bound = error_bound;
             if stop.get().is_some() {
+                return false;
+            }
+            if selected + replayed == 0 && of_emitters {
                 return false;
             }
             if selected + replayed == 0 {
@@ -275,10 +288,16 @@ impl Solver {
             }
             stop.get().is_none()
         };
-        self.batches.run(&mut look)?;
+        if let Some(emitters) = &mut self.emitters {
+            emitters.run(|batch| look(batch, true))?;
+        }
+        if stop.get().is_none() {
+            self.emitters = None;
+            self.batches.run(|batch| look(batch, false))?;
+        }
         if stop.get() == Some(StopReason::Residual) && self.batches.recall()? {
             stop.set(None);
-            self.batches.run(&mut look)?;
+            self.batches.run(|batch| look(batch, false))?;
         }
         self.look_at_the_rest()?;
         let report = &mut self.report;

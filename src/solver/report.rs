@@ -63,10 +63,14 @@ pub struct Report {
     pub device: String,
     pub estimator: &'static str,
     pub hemicube: u32,
+    /// Of strong emitters; `hemicube` where none is drawn more finely.
+    pub emitter_hemicube: u32,
     pub elements: u64,
     pub sources: u64,
     pub batch: u32,
     pub hemicubes: u64,
+    /// Of them, those of strong emitters.
+    pub emitter_hemicubes: u64,
     pub triangles_drawn: u64,
     /// Sources whose form factors are kept: they were drawn once.
     pub kept_sources: u64,
@@ -123,10 +127,12 @@ impl Report {
                 Estimator::Pixel => "pixel",
             },
             hemicube: settings.hemicube,
+            emitter_hemicube: settings.hemicube,
             elements: elements.len() as u64,
             sources: sources.list.len() as u64,
             batch,
             hemicubes: 0,
+            emitter_hemicubes: 0,
             triangles_drawn: 0,
             kept_sources: 0,
             replayed: 0,

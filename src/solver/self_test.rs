@@ -91,6 +91,7 @@ pub fn ids_come_back_right(device: &Arc<Device>) -> Result<bool> {
             replay_slots: 0,
             shot_limit: 1,
             stop_power: 0.0,
+            least_emitted: 0.0,
         };
         select.record(cmd, &sets.1, &parameters);
         then();

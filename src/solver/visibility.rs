@@ -51,8 +51,9 @@ fn key(scene: &Scene, settings: &Settings) -> String {
     let mut hash = Sha256::new();
     hash.update(unlit.hash());
     let flat = settings.relief.transport == Transport::Lambert;
-    let (size, seed, grouping) = (settings.hemicube, settings.seed, settings.grouping);
-    hash.update(format!("2 {size} {seed} {grouping:?} {flat}"));
+    let sizes = (settings.hemicube, settings.emitter_face());
+    let (seed, grouping) = (settings.seed, settings.grouping);
+    hash.update(format!("3 {sizes:?} {seed} {grouping:?} {flat}"));
     hexadecimal(hash)
 }
 

@@ -14,13 +14,15 @@ use crate::error::Result;
 use crate::meso::Transport;
 use crate::quality::scaled;
 use crate::scene::Scene;
-use crate::solver::{Estimator, Settings, Solver, StopReason};
+use crate::solver::{EMITTER_SCALE, Estimator, HEMICUBE_RANGE, Settings, Solver, StopReason};
 use crate::vk::Device;
 
 /// The settings that are tried: each hemicube with each size of sources, for both estimators.
 #[derive(Debug, Clone)]
 pub struct Grid {
     pub hemicubes: Vec<u32>,
+    /// Sides of the hemicubes of strong emitters over those.
+    pub emitter_scales: Vec<u32>,
     /// Sizes of sources over the default ones, see [`scaled`].
     pub scales: Vec<f64>,
     /// Hemicubes of the `pixel` estimator, at the default size of sources and at the smallest.
@@ -38,6 +40,7 @@ pub struct Grid {
 pub(super) struct Try {
     pub estimator: Estimator,
     pub hemicube: u32,
+    pub emitter_scale: u32,
     pub scale: f64,
     pub directions: u32,
 }
@@ -58,19 +61,27 @@ impl Grid {
         let directions = plain.relief.directions.count() as u32;
         let mut tries = Vec::new();
         let smallest = self.scales.iter().copied().fold(1.0, f64::min);
+        let finer = || self.emitter_scales.iter().copied();
+        let both = |list: &[u32]| -> Vec<(u32, u32)> {
+            let each = list.iter().flat_map(|&n| finer().map(move |e| (n, e)));
+            each.collect()
+        };
         for &scale in &self.scales {
-            for &hemicube in &self.hemicubes {
+            for (hemicube, emitter_scale) in both(&self.hemicubes) {
                 tries.push(Try {
                     estimator: Estimator::Receiver,
                     hemicube,
+                    emitter_scale,
                     scale,
                     directions,
                 });
             }
             if scale == 1.0 || scale == smallest {
-                tries.extend(self.pixel_hemicubes.iter().map(|&hemicube| Try {
+                let pixel = both(&self.pixel_hemicubes).into_iter();
+                tries.extend(pixel.map(|(hemicube, emitter_scale)| Try {
                     estimator: Estimator::Pixel,
                     hemicube,
+                    emitter_scale,
                     scale,
                     directions,
                 }));
@@ -81,6 +92,7 @@ impl Grid {
             tries.extend(others.map(|&directions| Try {
                 estimator: Estimator::Receiver,
                 hemicube: plain.hemicube,
+                emitter_scale: EMITTER_SCALE,
                 scale: 1.0,
                 directions,
             }));
@@ -90,10 +102,16 @@ impl Grid {
 }
 
 impl Try {
+    fn emitter_hemicube(&self) -> u32 {
+        let finer = self.hemicube.saturating_mul(self.emitter_scale);
+        finer.min(*HEMICUBE_RANGE.end()).max(self.hemicube)
+    }
+
     fn settings(&self, grid: &Grid) -> Result<Settings> {
         let mut settings = Settings {
             estimator: self.estimator,
             hemicube: self.hemicube,
+            emitter_hemicube: Some(self.emitter_hemicube()),
             residual: grid.residual,
             grouping: scaled(self.scale),
             ..Settings::default()
@@ -142,6 +160,7 @@ impl Try {
                     Estimator::Pixel => Method::Pixel,
                 },
                 hemicube: Some(self.hemicube),
+                emitter_hemicube: Some(self.emitter_hemicube()),
                 source_scale: Some(self.scale),
                 directions: solver
                     .elements

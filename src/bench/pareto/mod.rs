@@ -73,6 +73,8 @@ impl Method {
 pub struct Row {
     pub method: Method,
     pub hemicube: Option<u32>,
+    /// Of strong emitters.
+    pub emitter_hemicube: Option<u32>,
     /// Size of the sources over the default one, see [`crate::quality::scaled`].
     pub source_scale: Option<f64>,
     pub directions: Option<u32>,
@@ -97,6 +99,7 @@ impl Row {
         Self {
             method,
             hemicube: None,
+            emitter_hemicube: None,
             source_scale: None,
             directions: None,
             sources: None,
@@ -112,7 +115,10 @@ impl Row {
 
     /// Whether two rows are the same bake at two times, or the same method.
     fn same_curve(&self, other: &Self) -> bool {
-        let settings = |r: &Self| (r.method, r.hemicube, r.source_scale, r.directions);
+        let settings = |r: &Self| {
+            let hemicubes = (r.hemicube, r.emitter_hemicube);
+            (r.method, hemicubes, r.source_scale, r.directions)
+        };
         settings(self) == settings(other)
     }
 
@@ -120,6 +126,7 @@ impl Row {
     pub fn settings(&self) -> String {
         let mut words = Vec::new();
         words.extend(self.hemicube.map(|n| format!("hemicube {n}")));
+        words.extend(self.emitter_hemicube.map(|n| format!("emitters {n}")));
         words.extend(self.source_scale.map(|s| format!("sources x {s}")));
         words.extend(self.directions.map(|k| format!("K = {k}")));
         words.extend(self.error_bound.map(|b| format!("residual {b:.1e}")));
@@ -296,7 +303,7 @@ fn write(
     write_atomically(&folder.join("pareto.csv"), |out| {
         writeln!(
             out,
-            "method,hemicube,source_scale,directions,sources,hemicubes,paths,error_bound,finished,seconds,rms,rms_low,rms_high,bias,bias_interval,best"
+            "method,hemicube,emitter_hemicube,source_scale,directions,sources,hemicubes,paths,error_bound,finished,seconds,rms,rms_low,rms_high,bias,bias_interval,best"
         )?;
         for r in rows {
             fn cell<T: ToString>(value: Option<T>) -> String {
@@ -305,9 +312,10 @@ fn write(
             let m = &r.measure;
             writeln!(
                 out,
-                "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+                "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
                 r.method.title(),
                 cell(r.hemicube),
+                cell(r.emitter_hemicube),
                 cell(r.source_scale),
                 cell(r.directions),
                 cell(r.sources),
