@@ -121,6 +121,17 @@ impl Elements {
         before
     }
 
+    /// Takes the emission of a scene that differs in nothing else from that of these elements.
+    pub fn set_emission(&mut self, scene: &Scene) {
+        for (e, emitted) in self.emitted.iter_mut().enumerate() {
+            let material = &scene.materials[self.material[e] as usize];
+            *emitted = Vec3::from_array(material.ke) * PI as f32;
+            if let Some(relief) = self.relief.as_ref().filter(|relief| relief.is_meso(e)) {
+                *emitted *= relief.response(e).mean_emission;
+            }
+        }
+    }
+
     pub fn is_empty(&self) -> bool {
         self.corners.is_empty()
     }

@@ -43,6 +43,9 @@ pub enum Error {
     /// No Vulkan device fits, or the one asked for is not there.
     #[error("{0}")]
     Device(String),
+    /// There is no window to be had.
+    #[error("{0}; `mesolux render` draws a picture without a window")]
+    Display(String),
     /// A Vulkan call failed.
     #[error("Vulkan device {device}: {what}: {source}")]
     Vulkan {

@@ -50,4 +50,6 @@ pub mod scene;
 pub mod solution;
 pub mod solver;
 pub mod sources;
+#[cfg(feature = "window")]
+pub mod view;
 pub mod vk;

@@ -342,7 +342,7 @@ fn solve_visibly(
 }
 
 /// Where the form factors of a bake are kept.
-fn beside(bake: &Path) -> PathBuf {
+pub fn beside(bake: &Path) -> PathBuf {
     bake.with_extension("visibility")
 }
 

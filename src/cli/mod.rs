@@ -13,6 +13,8 @@ mod render;
 mod scene;
 mod series;
 mod show;
+#[cfg(feature = "window")]
+mod view;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -37,6 +39,8 @@ struct Cli {
 enum Command {
     Bake(bake::Options),
     Render(render::Options),
+    #[cfg(feature = "window")]
+    View(view::Options),
     Compare(compare::Options),
     Scene(scene::Options),
     Info(info::Options),
@@ -125,9 +129,12 @@ impl DeviceOptions {
 }
 
 pub fn main() -> ExitCode {
+    #[cfg(feature = "window")]
+    let start = std::time::Instant::now();
     let cli = Cli::parse();
     let filter = tracing_subscriber::EnvFilter::try_from_env("MESOLUX_LOG")
-        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("info"));
+        // The window's library warns of what desktops lack and it does without.
+        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("info,winit=error"));
     tracing_subscriber::fmt()
         .with_writer(std::io::stderr)
         .with_env_filter(filter)
@@ -137,6 +144,8 @@ pub fn main() -> ExitCode {
     let done = match &cli.command {
         Command::Bake(options) => bake::run(options),
         Command::Render(options) => render::run(options),
+        #[cfg(feature = "window")]
+        Command::View(options) => view::run(options, start),
         Command::Compare(options) => compare::run(options),
         Command::Scene(options) => scene::run(options),
         Command::Info(options) => info::run(options),

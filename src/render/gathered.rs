@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::picture::{self, Picture, SAMPLES, Samples};
 use super::projection::Tile;
-use super::{View, tone};
+use super::tone;
 
 /// A pixel keeps its samples where a channel's lowest is below this share of its highest: nearer together, the tone curve is
 /// straight enough that the mean alone gives the same code.
@@ -13,6 +13,7 @@ const CONTRAST: f32 = 0.8;
 /// What has been drawn so far.
 pub struct Gathered {
     width: u32,
+    height: u32,
     radiance: Vec<[f32; 3]>,
     contrasts: Vec<(u32, Samples)>,
     /// Luminance of the pixels that an exposure meter looks at.
@@ -20,10 +21,11 @@ pub struct Gathered {
 }
 
 impl Gathered {
-    pub fn new(view: &View<'_>) -> Self {
+    pub fn new((width, height): (u32, u32)) -> Self {
         Self {
-            width: view.width,
-            radiance: vec![[0.0; 3]; view.width as usize * view.height as usize],
+            width,
+            height,
+            radiance: vec![[0.0; 3]; width as usize * height as usize],
             contrasts: Vec::new(),
             metered: Vec::new(),
         }
@@ -64,11 +66,11 @@ impl Gathered {
         }
     }
 
-    pub fn into_picture(mut self, view: &View<'_>) -> Picture {
+    pub fn into_picture(mut self) -> Picture {
         self.contrasts.par_sort_unstable_by_key(|c| c.0);
         Picture {
-            width: view.width,
-            height: view.height,
+            width: self.width,
+            height: self.height,
             radiance: self.radiance,
             automatic_exposure: picture::automatic_exposure(&mut self.metered),
             contrasts: self.contrasts,

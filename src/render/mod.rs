@@ -33,11 +33,15 @@ pub use compare::{Comparison, side_by_side};
 pub use flip::{Flip, PIXELS_PER_DEGREE, ldr};
 pub use lighting::{Direct, Light, Lighting, ReliefShading, Show};
 pub use overdraw::Overdraw;
+#[cfg(feature = "window")]
+pub(crate) use picture::write_png;
 pub use picture::{FileKind, Picture, SAMPLES};
 pub(crate) use projection::Projection;
 pub use renderer::Renderer;
 pub use slots::slot_colour;
 pub use smooth::corner_irradiance;
+#[cfg(feature = "window")]
+pub(crate) use textures::upload as upload_texture;
 
 use crate::error::{Error, Result};
 use crate::scene::{Camera, Scene};

@@ -182,7 +182,7 @@ impl Picture {
     }
 
     /// 8-bit sRGB codes, `[row][column][channel]`.
-    fn srgb_codes(&self, exposure: Option<f32>) -> Vec<u8> {
+    pub(crate) fn srgb_codes(&self, exposure: Option<f32>) -> Vec<u8> {
         let scale = exposure.unwrap_or(self.automatic_exposure).exp2();
         let shown = |radiance: [f32; 3]| tone::neutral(radiance.map(|c| c * scale));
         let mut linear: Vec<[f32; 3]> = self.radiance.par_iter().map(|&r| shown(r)).collect();
@@ -208,7 +208,7 @@ impl Picture {
 }
 
 /// Writes 8-bit codes, `[row][column][channel]`.
-pub(super) fn write_png(path: &Path, (width, height): (u32, u32), codes: &[u8]) -> Result<()> {
+pub(crate) fn write_png(path: &Path, (width, height): (u32, u32), codes: &[u8]) -> Result<()> {
     write_atomically(path, |out| {
         PngEncoder::new(out)
             .write_image(codes, width, height, image::ExtendedColorType::Rgb8)

@@ -28,7 +28,8 @@ pub struct Renderer<'a> {
     device: Arc<Device>,
     scene: &'a Scene,
     lighting: Lighting<'a>,
-    view: View<'a>,
+    /// Pixels across and down.
+    size: (u32, u32),
     projection: Projection,
     shade: Shade,
     textures: Textures,
@@ -77,7 +78,7 @@ impl<'a> Renderer<'a> {
             device: Arc::clone(device),
             scene,
             lighting,
-            view: *view,
+            size: (view.width, view.height),
             projection,
             shade,
             textures,
@@ -90,7 +91,7 @@ impl<'a> Renderer<'a> {
     ///
     /// # Errors
     /// As [`super::render`]; what was seen before stays then.
-    pub fn look(&mut self, view: &View<'a>) -> Result<()> {
+    pub fn look(&mut self, view: &View<'_>) -> Result<()> {
         view.check()?;
         let (device, scene) = (&self.device, self.scene);
         let (lighting, kept) = (&self.lighting, self.kept.as_ref());
@@ -107,7 +108,7 @@ impl<'a> Renderer<'a> {
         self.mesh = mesh;
         self.relief = relief;
         self.projection = projection;
-        self.view = *view;
+        self.size = (view.width, view.height);
         Ok(())
     }
 
@@ -124,6 +125,14 @@ impl<'a> Renderer<'a> {
         }
     }
 
+    /// As [`Self::picture`], in tiles of so many pixels a side, at each of which `go_on` may give the picture up.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn picture_while(&self, tile: u32, go_on: impl FnMut() -> bool) -> Result<Option<Picture>> {
+        self.tiles(tile.clamp(1, TILE), go_on)
+    }
+
     /// What [`Show::Overdraw`] counts.
     ///
     /// # Errors
@@ -138,21 +147,28 @@ impl<'a> Renderer<'a> {
     }
 
     fn gathered(&self) -> Result<Picture> {
-        let view = &self.view;
-        let (width, height) = (view.width.min(TILE), view.height.min(TILE));
+        let whole = self.tiles(TILE, || true)?;
+        Ok(whole.expect("a picture that nothing gives up is whole"))
+    }
+
+    fn tiles(&self, side: u32, mut go_on: impl FnMut() -> bool) -> Result<Option<Picture>> {
+        let (width, height) = self.size;
         let target = Target::new(
             &self.device,
             &self.shade,
-            (width * SAMPLES, height * SAMPLES),
+            (width.min(side) * SAMPLES, height.min(side) * SAMPLES),
         )?;
-        let mut gathered = Gathered::new(view);
-        for row in (0..view.height).step_by(TILE as usize) {
-            for column in (0..view.width).step_by(TILE as usize) {
+        let mut gathered = Gathered::new(self.size);
+        for row in (0..height).step_by(side as usize) {
+            for column in (0..width).step_by(side as usize) {
+                if !go_on() {
+                    return Ok(None);
+                }
                 let tile = Tile {
                     column,
                     row,
-                    width: TILE.min(view.width - column),
-                    height: TILE.min(view.height - row),
+                    width: side.min(width - column),
+                    height: side.min(height - row),
                 };
                 Commands::run(&self.device, "shade", |cmd| {
                     self.record(cmd, &target, (tile, SAMPLES), None, || ());
@@ -165,7 +181,7 @@ impl<'a> Renderer<'a> {
                 );
             }
         }
-        Ok(gathered.into_picture(view))
+        Ok(Some(gathered.into_picture()))
     }
 
     /// Draws the whole view `count` times with one sample a pixel, as a window would; seconds of each by GPU timestamps.
@@ -206,7 +222,7 @@ impl<'a> Renderer<'a> {
 
     /// A target for one sample of each pixel, and the tile that is the whole view.
     fn whole(&self) -> Result<(Target, Tile)> {
-        let (width, height) = (self.view.width, self.view.height);
+        let (width, height) = self.size;
         let tile = Tile {
             column: 0,
             row: 0,

@@ -89,7 +89,11 @@ impl Bound {
     }
 }
 
-fn upload(
+/// A texture of linear RGB, with its levels of detail.
+///
+/// # Errors
+/// A device without the memory, or whose largest image is smaller.
+pub fn upload(
     device: &Arc<Device>,
     name: &str,
     (width, height): (u32, u32),

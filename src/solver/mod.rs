@@ -3,9 +3,11 @@
 //! A batch is one submission: measure → select → cull → item buffer → form factors → keep → gather. Two batches are under way at a time; the
 //! device chooses what to shoot and when to stop, and the CPU looks on one batch behind.
 
+mod ambient;
 mod batch;
 mod emitters;
 mod estimate;
+mod look;
 mod relief_light;
 mod report;
 mod self_test;
@@ -32,10 +34,12 @@ use crate::scene::{PointLight, Scene};
 use crate::sources::{self, Sources};
 use crate::vk::Device;
 
+pub use ambient::Ambient;
 use batch::{BatchLoop, OnDevice, Passes, Rule};
+pub use look::ItemPicture;
 pub use relief_light::ReliefLight;
 pub use report::{Report, Seconds, Skipped, StopReason};
-pub use self_test::{ids_come_back_right, open_device};
+pub use self_test::{choose_device, ids_come_back_right, open_device};
 pub use settings::{EMITTER_SCALE, Estimator, HEMICUBE_RANGE, Settings, VISIBILITY_MEMORY};
 pub use visibility::Visibility;
 

@@ -12,11 +12,25 @@ use crate::passes::buffers::{Batch, SceneBuffers, State};
 use crate::passes::item_buffer::ItemBuffer;
 use crate::scene::{Material, Scene, Triangle};
 use crate::sources;
-use crate::vk::{Buffer, BufferUse, Commands, Device, Instance, Stage};
+use crate::vk::{Buffer, BufferUse, Candidate, Commands, Device, Instance, Stage};
 
 /// Opens the device asked for, by index or part of its name, or else the best one that can run this program.
 pub fn open_device(wanted: Option<&str>, validation: bool) -> Result<Arc<Device>> {
     let instance = Instance::new(validation)?;
+    let candidate = choose_device(&instance, wanted)?;
+    let device = Device::new(&instance, &candidate)?;
+    if !ids_come_back_right(&device)? {
+        return Err(Error::Device(format!(
+            "device {} ({}) gives wrong primitive numbers to fragment shaders (some Mesa 25.3 to 26.1 drivers do); \
+             update the driver or choose another --device",
+            candidate.name, candidate.driver
+        )));
+    }
+    Ok(device)
+}
+
+/// The device that [`open_device`] opens.
+pub fn choose_device(instance: &Instance, wanted: Option<&str>) -> Result<Candidate> {
     let candidates = instance.candidates()?;
     let chosen = match wanted {
         None => candidates.first(),
@@ -33,29 +47,19 @@ pub fn open_device(wanted: Option<&str>, validation: bool) -> Result<Arc<Device>
             })
         }
     };
-    let Some(candidate) = chosen else {
-        let names: Vec<_> = candidates
-            .iter()
-            .map(|c| format!("{}: {}", c.index, c.name))
-            .collect();
-        return Err(Error::Device(match wanted {
-            Some(wanted) if !names.is_empty() => {
-                format!("no device \"{wanted}\"; there are {}", names.join(", "))
-            }
-            _ => {
-                "no Vulkan device; on Debian install mesa-vulkan-drivers for a software one".into()
-            }
-        }));
-    };
-    let device = Device::new(&instance, candidate)?;
-    if !ids_come_back_right(&device)? {
-        return Err(Error::Device(format!(
-            "device {} ({}) gives wrong primitive numbers to fragment shaders (some Mesa 25.3 to 26.1 drivers do); \
-             update the driver or choose another --device",
-            candidate.name, candidate.driver
-        )));
+    if let Some(candidate) = chosen {
+        return Ok(candidate.clone());
     }
-    Ok(device)
+    let names: Vec<_> = candidates
+        .iter()
+        .map(|c| format!("{}: {}", c.index, c.name))
+        .collect();
+    Err(Error::Device(match wanted {
+        Some(wanted) if !names.is_empty() => {
+            format!("no device \"{wanted}\"; there are {}", names.join(", "))
+        }
+        _ => "no Vulkan device; on Debian install mesa-vulkan-drivers for a software one".into(),
+    }))
 }
 
 /// Draws one hemicube inside a small box of distinct triangles and compares every pixel's ID with the triangle that the

@@ -21,6 +21,8 @@ pub enum BufferUse {
     Addressed,
     /// Memory that the CPU writes once and the device copies from.
     Upload,
+    /// Memory that the CPU writes again and again, and that shaders read or that feeds vertices and indices.
+    Stream,
     /// Memory that the device writes and the CPU reads.
     Readback,
 }
@@ -44,11 +46,17 @@ impl Buffer {
                 | vk::BufferUsageFlags::INDEX_BUFFER
                 | vk::BufferUsageFlags::INDIRECT_BUFFER;
         }
+        if usage == BufferUse::Stream {
+            flags |= vk::BufferUsageFlags::VERTEX_BUFFER | vk::BufferUsageFlags::INDEX_BUFFER;
+        }
         if usage == BufferUse::Addressed {
             flags |= vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS;
         }
         if bytes > device.limits().max_storage_buffer_range
-            && matches!(usage, BufferUse::Storage | BufferUse::Geometry)
+            && matches!(
+                usage,
+                BufferUse::Storage | BufferUse::Geometry | BufferUse::Stream
+            )
         {
             return Err(Error::DeviceMemory {
                 device: device.name().to_owned(),
@@ -78,7 +86,7 @@ impl Buffer {
                     BufferUse::Storage | BufferUse::Geometry | BufferUse::Addressed => {
                         MemoryLocation::GpuOnly
                     }
-                    BufferUse::Upload => MemoryLocation::CpuToGpu,
+                    BufferUse::Upload | BufferUse::Stream => MemoryLocation::CpuToGpu,
                     BufferUse::Readback => MemoryLocation::GpuToCpu,
                 },
                 linear: true,
@@ -111,7 +119,8 @@ impl Buffer {
         unsafe { self.device.raw.get_buffer_device_address(&info) }
     }
 
-    /// Writes `data` at byte `offset`. The buffer must be an [`BufferUse::Upload`] buffer that no submission reads.
+    /// Writes `data` at byte `offset`. The buffer must be an [`BufferUse::Upload`] or [`BufferUse::Stream`] buffer that no
+    /// submission reads.
     pub fn write<T: Pod>(&mut self, offset: u64, data: &[T]) {
         let source = bytemuck::cast_slice::<T, u8>(data);
         let offset = offset as usize;
@@ -119,7 +128,7 @@ impl Buffer {
             .allocation
             .as_mut()
             .and_then(|a| a.mapped_slice_mut())
-            .expect("only upload buffers are written by the CPU");
+            .expect("only upload and stream buffers are written by the CPU");
         target[offset..offset + source.len()].copy_from_slice(source);
     }
 

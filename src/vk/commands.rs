@@ -16,7 +16,7 @@ use crate::error::Result;
 ///
 /// Whatever was recorded must live until the last submission is done: [`Commands::wait`] says when, and dropping waits.
 pub struct Commands {
-    raw: vk::CommandBuffer,
+    pub(super) raw: vk::CommandBuffer,
     pool: vk::CommandPool,
     fence: vk::Fence,
     under_way: bool,
@@ -84,9 +84,32 @@ impl Commands {
 
     /// Submits; the last submission must have been waited for.
     pub fn submit(&mut self) -> Result<()> {
+        self.submit_between(&[], &[])
+    }
+
+    /// Submits between semaphores: copies wait for the first ones, and the others are signalled when all is done.
+    pub(super) fn submit_between(
+        &mut self,
+        after: &[vk::Semaphore],
+        before: &[vk::Semaphore],
+    ) -> Result<()> {
         assert!(!self.under_way, "commands are submitted once at a time");
         let infos = [vk::CommandBufferSubmitInfo::default().command_buffer(self.raw)];
-        let submits = [vk::SubmitInfo2::default().command_buffer_infos(&infos)];
+        let at = |stage| {
+            move |&semaphore: &vk::Semaphore| {
+                vk::SemaphoreSubmitInfo::default()
+                    .semaphore(semaphore)
+                    .stage_mask(stage)
+            }
+        };
+        let copies = at(vk::PipelineStageFlags2::ALL_TRANSFER);
+        let waits: Vec<_> = after.iter().map(copies).collect();
+        let all = at(vk::PipelineStageFlags2::ALL_COMMANDS);
+        let signals: Vec<_> = before.iter().map(all).collect();
+        let submits = [vk::SubmitInfo2::default()
+            .command_buffer_infos(&infos)
+            .wait_semaphore_infos(&waits)
+            .signal_semaphore_infos(&signals)];
         let queue = self.device.queue.lock().unwrap_or_else(|e| e.into_inner());
         // SAFETY: the fence is unsignalled and free, the queue is locked, and the buffer is recorded to its end.
         unsafe { self.device.raw.queue_submit2(*queue, &submits, self.fence) }
@@ -315,6 +338,19 @@ impl Commands {
             self.device.raw.cmd_set_viewport(self.raw, 0, &viewports);
             self.device.raw.cmd_set_scissor(self.raw, 0, &scissors);
         }
+    }
+
+    /// What is drawn next is cut to this rectangle of the framebuffer.
+    pub fn scissor(&self, x: u32, y: u32, width: u32, height: u32) {
+        let scissors = [vk::Rect2D {
+            offset: vk::Offset2D {
+                x: x as i32,
+                y: y as i32,
+            },
+            extent: vk::Extent2D { width, height },
+        }];
+        // SAFETY: the scissor is dynamic in every pipeline of this crate.
+        unsafe { self.device.raw.cmd_set_scissor(self.raw, 0, &scissors) };
     }
 
     pub fn push_graphics<T: Pod>(&self, pipeline: &GraphicsPipeline, push: &T) {

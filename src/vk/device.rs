@@ -2,9 +2,10 @@
 
 use std::ffi::CString;
 use std::mem::ManuallyDrop;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use ash::{ext, vk};
+use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
 use super::instance::{Candidate, Instance, graphics_family};
@@ -19,7 +20,7 @@ pub struct Device {
     names: Option<ext::debug_utils::Device>,
     candidate: Candidate,
     limits: Limits,
-    _instance: Arc<Instance>,
+    pub(super) instance: Arc<Instance>,
 }
 
 /// What the passes size themselves by.
@@ -77,8 +78,13 @@ impl Device {
             .geometry_shader(true)
             .full_draw_index_uint32(true)
             .shader_int64(candidate.int64_atomics);
+        let extensions = match instance.presents {
+            true => vec![khr::swapchain::NAME.as_ptr()],
+            false => Vec::new(),
+        };
         let info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queue_infos)
+            .enabled_extension_names(&extensions)
             .enabled_features(&features)
             .push_next(&mut f12)
             .push_next(&mut f13);
@@ -128,7 +134,7 @@ impl Device {
                 heap_bytes: candidate.heap_bytes,
             },
             candidate: candidate.clone(),
-            _instance: Arc::clone(instance),
+            instance: Arc::clone(instance),
         }))
     }
 
@@ -184,8 +190,17 @@ impl Device {
     }
 }
 
+/// Bytes in buffers and images that devices of this process took with them when they went; anything but 0 is a leak.
+static LEFT_BYTES: AtomicU64 = AtomicU64::new(0);
+
+/// Bytes in buffers and images that were not freed before their device; 0 is the only good answer.
+pub fn left_bytes() -> u64 {
+    LEFT_BYTES.load(Ordering::Relaxed)
+}
+
 impl Drop for Device {
     fn drop(&mut self) {
+        LEFT_BYTES.fetch_add(self.allocated_bytes(), Ordering::Relaxed);
         // SAFETY: every object of the device holds it by `Arc`, so none is left; the allocator goes before the device.
         unsafe {
             let _ = self.raw.device_wait_idle();

@@ -214,8 +214,42 @@ pub(super) const GRAPHICS_STAGES: vk::ShaderStageFlags = vk::ShaderStageFlags::f
     vk::ShaderStageFlags::VERTEX.as_raw() | vk::ShaderStageFlags::FRAGMENT.as_raw(),
 );
 
+/// How a fragment's colour meets what is there.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Blending {
+    /// The nearest wins.
+    Nearest,
+    /// All are summed; depth is not looked at.
+    Sum,
+    /// The later lies over the earlier by its alpha, which its colour has been multiplied by; depth is not looked at.
+    Over,
+}
+
 impl GraphicsPipeline {
     pub fn new(device: &Arc<Device>, pass: &RenderPass, state: &GraphicsState<'_>) -> Result<Self> {
+        let blending = match state.sums {
+            true => Blending::Sum,
+            false => Blending::Nearest,
+        };
+        Self::blended(device, pass, state, blending)
+    }
+
+    /// A pipeline that lays what it draws over what is there, by alpha that the colours have been multiplied by; depth is not
+    /// looked at.
+    pub fn over(
+        device: &Arc<Device>,
+        pass: &RenderPass,
+        state: &GraphicsState<'_>,
+    ) -> Result<Self> {
+        Self::blended(device, pass, state, Blending::Over)
+    }
+
+    fn blended(
+        device: &Arc<Device>,
+        pass: &RenderPass,
+        state: &GraphicsState<'_>,
+        blending: Blending,
+    ) -> Result<Self> {
         let descriptors = DescriptorLayout::new(device, state.name, state.bindings)?;
         let layout = pipeline_layout(
             device,
@@ -275,16 +309,20 @@ impl GraphicsPipeline {
         let samples = vk::PipelineMultisampleStateCreateInfo::default()
             .rasterization_samples(vk::SampleCountFlags::TYPE_1);
         let depth = vk::PipelineDepthStencilStateCreateInfo::default()
-            .depth_test_enable(!state.sums)
-            .depth_write_enable(!state.sums)
+            .depth_test_enable(blending == Blending::Nearest)
+            .depth_write_enable(blending == Blending::Nearest)
             .depth_compare_op(vk::CompareOp::GREATER);
+        let kept = match blending {
+            Blending::Over => vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
+            Blending::Nearest | Blending::Sum => vk::BlendFactor::ONE,
+        };
         let blends = [vk::PipelineColorBlendAttachmentState::default()
-            .blend_enable(state.sums)
+            .blend_enable(blending != Blending::Nearest)
             .src_color_blend_factor(vk::BlendFactor::ONE)
-            .dst_color_blend_factor(vk::BlendFactor::ONE)
+            .dst_color_blend_factor(kept)
             .color_blend_op(vk::BlendOp::ADD)
             .src_alpha_blend_factor(vk::BlendFactor::ONE)
-            .dst_alpha_blend_factor(vk::BlendFactor::ONE)
+            .dst_alpha_blend_factor(kept)
             .alpha_blend_op(vk::BlendOp::ADD)
             .color_write_mask(vk::ColorComponentFlags::RGBA)];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);

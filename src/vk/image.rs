@@ -185,6 +185,22 @@ pub struct Sampler {
 
 impl Sampler {
     pub fn new(device: &Arc<Device>, name: &str, linear: bool) -> Result<Self> {
+        let repeat = vk::SamplerAddressMode::REPEAT;
+        Self::with_edges(device, name, linear, repeat)
+    }
+
+    /// A linear one that goes on beyond the edges as it is there.
+    pub fn held(device: &Arc<Device>, name: &str) -> Result<Self> {
+        let edge = vk::SamplerAddressMode::CLAMP_TO_EDGE;
+        Self::with_edges(device, name, true, edge)
+    }
+
+    fn with_edges(
+        device: &Arc<Device>,
+        name: &str,
+        linear: bool,
+        edges: vk::SamplerAddressMode,
+    ) -> Result<Self> {
         let filter = if linear {
             vk::Filter::LINEAR
         } else {
@@ -200,8 +216,8 @@ impl Sampler {
             .min_filter(filter)
             .mipmap_mode(between_levels)
             .max_lod(vk::LOD_CLAMP_NONE)
-            .address_mode_u(vk::SamplerAddressMode::REPEAT)
-            .address_mode_v(vk::SamplerAddressMode::REPEAT);
+            .address_mode_u(edges)
+            .address_mode_v(edges);
         // SAFETY: a plain creation on a live device.
         let raw = unsafe { device.raw.create_sampler(&info, None) }
             .map_err(device.error("creating a sampler"))?;

@@ -28,9 +28,11 @@ pub fn validation_log() -> Vec<String> {
 pub struct Instance {
     pub(super) raw: ash::Instance,
     pub(super) debug_utils: bool,
+    /// Whether devices of this instance are to show pictures on windows.
+    pub(super) presents: bool,
     messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     // Last: the library is unloaded after everything made from it.
-    _entry: ash::Entry,
+    pub(super) entry: ash::Entry,
 }
 
 /// A physical device and what this program could do on it.
@@ -56,6 +58,11 @@ pub struct Candidate {
 impl Instance {
     /// Loads Vulkan. With `validation`, a missing layer is an error: a silent run must mean that it was watched.
     pub fn new(validation: bool) -> Result<Arc<Self>> {
+        Self::with_extensions(validation, &[])
+    }
+
+    /// With the extensions that a window's surface needs, if any.
+    pub(super) fn with_extensions(validation: bool, wanted: &[&CStr]) -> Result<Arc<Self>> {
         // SAFETY: the loader is a well-behaved system library; nothing of it is used after `_entry` is dropped.
         let entry = unsafe { ash::Entry::load() }.map_err(|e| {
             Error::Device(format!(
@@ -87,7 +94,17 @@ impl Instance {
             || extensions
                 .iter()
                 .any(|e| e.extension_name_as_c_str() == Ok(ext::debug_utils::NAME));
-        let mut extension_names = Vec::new();
+        if let Some(missing) = wanted.iter().find(|name| {
+            !extensions
+                .iter()
+                .any(|e| e.extension_name_as_c_str() == Ok(**name))
+        }) {
+            return Err(Error::Display(format!(
+                "Vulkan has no surface for this display: {} is missing",
+                missing.to_string_lossy()
+            )));
+        }
+        let mut extension_names: Vec<_> = wanted.iter().map(|name| name.as_ptr()).collect();
         if debug_utils {
             extension_names.push(ext::debug_utils::NAME.as_ptr());
         }
@@ -116,11 +133,12 @@ impl Instance {
         let mut instance = Self {
             raw,
             debug_utils,
+            presents: !wanted.is_empty(),
             messenger: None,
-            _entry: entry,
+            entry,
         };
         if validation {
-            let loader = ext::debug_utils::Instance::new(&instance._entry, &instance.raw);
+            let loader = ext::debug_utils::Instance::new(&instance.entry, &instance.raw);
             // SAFETY: the extension is enabled, and the callback is a plain function.
             let messenger =
                 unsafe { loader.create_debug_utils_messenger(&self::messenger_info(), None) }

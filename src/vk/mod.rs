@@ -12,6 +12,10 @@ mod device;
 mod graphics;
 mod image;
 mod instance;
+#[cfg(feature = "window")]
+mod surface;
+#[cfg(feature = "window")]
+mod swapchain;
 mod timestamps;
 
 pub use barrier::Stage;
@@ -19,13 +23,17 @@ pub use buffer::{Buffer, BufferUse};
 pub use commands::Commands;
 pub use compute::ComputePipeline;
 pub use descriptors::{Bind, Binding, DescriptorLayout, DescriptorSet};
-pub use device::{Device, Limits};
+pub use device::{Device, Limits, left_bytes};
 pub use graphics::{
     AfterPass, Attachment, Framebuffer, GraphicsPipeline, GraphicsState, RenderPass,
     VertexAttribute,
 };
 pub use image::{Image, ImageUse, Sampler};
 pub use instance::{Candidate, Instance, validation_log, validation_messages};
+#[cfg(feature = "window")]
+pub use surface::Surface;
+#[cfg(feature = "window")]
+pub use swapchain::{Shown, Swapchain};
 pub use timestamps::Timestamps;
 
 pub use ash::vk::Format;

@@ -1,0 +1,130 @@
+//! `mesolux view`.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::Args;
+
+use super::bake::{SolveOptions, beside, writable};
+use super::camera::CameraOptions;
+use super::render::size;
+use super::{Builtin, DeviceOptions};
+use mesolux::error::{Error, Result};
+use mesolux::solution::Bake;
+use mesolux::solver::Visibility;
+use mesolux::view::{self, DeviceChoice, Step};
+
+/// Show a scene in a window while it bakes, or a bake
+///
+/// The middle button of the mouse orbits, with Shift it pans, the wheel nears; Alt and the left button stand in for it. The right button looks
+/// about, W A S D Q E fly, Shift faster. 1 2 3: all, direct, indirect light. Tab: the panel, which names the other keys. What is changed of
+/// the lights is shown by form factors that are kept.
+#[derive(Args)]
+pub struct Options {
+    /// A scene (see `bake`) or a bake (.safetensors)
+    #[arg(value_name = "SCENE|BAKE")]
+    input: String,
+    /// Pixels across and down
+    #[arg(long, value_name = "WxH", default_value = "1024x640", value_parser = size)]
+    size: (u32, u32),
+    #[command(flatten)]
+    camera: CameraOptions,
+    /// Draw so many frames, then close
+    #[arg(long, value_name = "N", conflicts_with = "script")]
+    frames: Option<u64>,
+    /// Write the window's last frame, with --frames
+    #[arg(long, value_name = "OUT.png", requires = "frames")]
+    screenshot: Option<PathBuf>,
+    /// Do what a script says, one step a line, then close: move X Y, press|release left|middle|right, wheel N, key NAME [down|up],
+    /// see front|right|top, resize W H, minimise, restore W H, set SWITCH VALUE, set lamp NAME colour|strength|position N...,
+    /// frames N, wait SECONDS, bake, relit, detail, screenshot FILE, save FILE, lose-surface, close
+    #[arg(long, value_name = "FILE")]
+    script: Option<PathBuf>,
+    #[command(flatten)]
+    solve: SolveOptions,
+    #[command(flatten)]
+    builtin: Builtin,
+    #[command(flatten)]
+    device: DeviceOptions,
+}
+
+/// Largest window.
+const MOST_PIXELS: u32 = 16_384;
+
+impl Options {
+    fn steps(&self) -> Result<Option<Vec<Step>>> {
+        if let Some(path) = &self.script {
+            return view::read_script(path).map(Some);
+        }
+        let Some(frames) = self.frames else {
+            return Ok(None);
+        };
+        let mut steps = vec![Step::Frames(frames)];
+        if let Some(path) = &self.screenshot {
+            if !path
+                .extension()
+                .is_some_and(|e| e.eq_ignore_ascii_case("png"))
+            {
+                return Err(Error::Usage(format!(
+                    "--screenshot {}: the name must end in .png",
+                    path.display()
+                )));
+            }
+            writable(path)?;
+            steps.push(Step::Screenshot(path.clone()));
+        }
+        Ok(Some(steps))
+    }
+}
+
+pub fn run(options: &Options, start: Instant) -> Result<()> {
+    let script = options.steps()?;
+    let (width, height) = options.size;
+    if !(1..=MOST_PIXELS).contains(&width) || !(1..=MOST_PIXELS).contains(&height) {
+        return Err(Error::Usage(format!(
+            "--size {width}x{height}: sides must be in 1 to {MOST_PIXELS}"
+        )));
+    }
+    let settings = options.solve.settings()?;
+    settings.check()?;
+    let path = Path::new(&options.input);
+    let is_bake = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("safetensors"));
+    let (scene, bake, kept) = if is_bake {
+        let bake = Bake::load(path)?;
+        let scene = Builtin::scene_of(path, &bake)?;
+        let beside = beside(path);
+        let kept = match beside.is_file() {
+            true => Some(Visibility::load(&beside)?),
+            false => None,
+        };
+        (scene, Some(bake), kept)
+    } else {
+        (options.builtin.load(&options.input)?, None, None)
+    };
+    let camera = options.camera.of(&scene)?;
+    let lines = view::run(view::Options {
+        scene,
+        bake,
+        kept,
+        settings,
+        camera,
+        size: options.size,
+        device: DeviceChoice::new(options.device.device.clone(), options.device.validate),
+        script,
+        start,
+    })?;
+    for line in lines {
+        tracing::info!("{line}");
+    }
+    match mesolux::vk::left_bytes() {
+        0 => tracing::info!("closed: nothing is left in buffers and images"),
+        bytes => {
+            return Err(Error::Device(format!(
+                "{bytes} bytes in buffers and images were not freed"
+            )));
+        }
+    }
+    options.device.check()
+}

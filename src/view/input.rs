@@ -1,0 +1,340 @@
+//! Mouse and keys: what they do to the view and to the switches.
+//!
+//! As in Blender, the middle button orbits, with Shift it pans, with Ctrl it nears; Alt and the left button stand in for it. As in
+//! games, the right button looks about, and W A S D, Q and E fly.
+
+use egui::RawInput;
+use glam::DVec3;
+
+use super::camera::Eye;
+use super::event::{Event, Key, Modifiers, PointerButton};
+use super::pick::first_hit;
+use super::switches::{DIRECTIONS, EXPOSURES, PARTS, SHADINGS, next};
+use super::viewer::Viewer;
+
+/// What the mouse and the keys are at.
+#[derive(Default)]
+pub struct Input {
+    /// For the panel.
+    raw: RawInput,
+    modifiers: Modifiers,
+    /// Pixels; none while it is elsewhere.
+    pub pointer: Option<(f32, f32)>,
+    drag: Option<Drag>,
+    /// A point light that follows the pointer, and where it was.
+    grabbed: Option<(usize, DVec3)>,
+    /// Keys held that fly.
+    held: Vec<Key>,
+    /// The element under the cursor where something asks for it, and the one that was clicked.
+    pub hovered: Option<u32>,
+    pub chosen: Option<u32>,
+    /// Whether a script drives the window.
+    pub scripted: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Drag {
+    Orbit,
+    Pan,
+    Near,
+    Look,
+    /// A left button that has not moved yet: a click.
+    Click,
+}
+
+/// Keys that fly, with their ways: right, up, forward.
+const WAYS: [(Key, DVec3); 6] = [
+    (Key::W, DVec3::Z),
+    (Key::S, DVec3::NEG_Z),
+    (Key::D, DVec3::X),
+    (Key::A, DVec3::NEG_X),
+    (Key::E, DVec3::Y),
+    (Key::Q, DVec3::NEG_Y),
+];
+/// Times as fast with Shift.
+const FASTER: f64 = 4.0;
+/// Pixels of a drag that near as far as one step of the wheel.
+const NEARING: f64 = 20.0;
+/// Stops of a key press.
+const STOP: f32 = 0.25;
+/// What a key press makes of a light's strength.
+const BRIGHTER: f32 = 1.25;
+
+impl Input {
+    pub fn flies(&self) -> bool {
+        !self.held.is_empty()
+    }
+
+    pub fn take_raw(&mut self) -> RawInput {
+        self.raw.modifiers = self.modifiers;
+        self.raw.take()
+    }
+
+    fn tell(&mut self, event: egui::Event) {
+        self.raw.events.push(event);
+    }
+}
+
+impl Viewer {
+    pub(super) fn take_input(&mut self, event: Event) {
+        let modifiers = self.input.modifiers;
+        let scale = self.scale;
+        let at = |(x, y): (f32, f32)| egui::pos2(x / scale, y / scale);
+        match event {
+            Event::Pointer { x, y } => {
+                self.input.tell(egui::Event::PointerMoved(at((x, y))));
+                self.move_pointer((x, y));
+            }
+            Event::PointerGone => {
+                self.input.tell(egui::Event::PointerGone);
+                self.input.pointer = None;
+                self.input.hovered = None;
+            }
+            Event::Button { button, pressed } => {
+                self.input.tell(egui::Event::PointerButton {
+                    pos: at(self.input.pointer.unwrap_or_default()),
+                    button,
+                    pressed,
+                    modifiers,
+                });
+                self.press(button, pressed);
+            }
+            Event::Wheel(steps) => {
+                self.input.tell(egui::Event::MouseWheel {
+                    unit: egui::MouseWheelUnit::Line,
+                    delta: egui::vec2(0.0, steps),
+                    modifiers,
+                });
+                if !self.is_over_panel() {
+                    self.eye.near(f64::from(steps));
+                }
+            }
+            Event::Key { key, pressed } => {
+                self.input.tell(egui::Event::Key {
+                    key,
+                    physical_key: None,
+                    pressed,
+                    repeat: false,
+                    modifiers,
+                });
+                self.key(key, pressed);
+            }
+            Event::Text(text) => self.input.tell(egui::Event::Text(text)),
+            Event::Modifiers(modifiers) => self.input.modifiers = modifiers,
+            Event::Focus(focused) => {
+                self.input.raw.focused = focused;
+                self.input.tell(egui::Event::WindowFocused(focused));
+                if !focused {
+                    // Their releases go to another window.
+                    self.input.held.clear();
+                    self.input.drag = None;
+                }
+            }
+            Event::See(side) => self.see(side),
+            Event::Resized { .. } | Event::Scale(_) | Event::Close => {}
+        }
+    }
+
+    fn is_over_panel(&self) -> bool {
+        self.switches.panel && self.egui.wants_pointer_input()
+    }
+
+    fn move_pointer(&mut self, (x, y): (f32, f32)) {
+        let before = self.input.pointer.replace((x, y)).unwrap_or((x, y));
+        let across = f64::from(x - before.0);
+        let down = f64::from(y - before.1);
+        let height = f64::from(self.size.1);
+        if self.input.grabbed.is_some() {
+            self.drag_lamp();
+            return;
+        }
+        match self.input.drag {
+            Some(Drag::Orbit) => self.eye.orbit(across, down),
+            Some(Drag::Pan) => self.eye.pan(across, down, height),
+            Some(Drag::Near) => self.eye.near(-down / NEARING),
+            Some(Drag::Look) => self.eye.look(across, down),
+            Some(Drag::Click) | None => {}
+        }
+        // Looking for the element takes a while in large scenes.
+        let wanted = self.switches.slots && self.input.drag.is_none() && !self.is_over_panel();
+        self.input.hovered = match wanted {
+            true => self.element_at((x, y)),
+            false => None,
+        };
+    }
+
+    fn element_at(&self, (x, y): (f32, f32)) -> Option<u32> {
+        let ray = self.eye.ray((f64::from(x), f64::from(y)), self.size);
+        first_hit(&self.scene, self.eye.camera.position, ray)
+    }
+
+    fn press(&mut self, button: PointerButton, pressed: bool) {
+        let Modifiers {
+            alt, ctrl, shift, ..
+        } = self.input.modifiers;
+        if self.input.grabbed.is_some() {
+            if pressed {
+                self.let_go(button == PointerButton::Primary);
+            }
+            return;
+        }
+        if !pressed {
+            let clicked = self.input.drag.take() == Some(Drag::Click);
+            if clicked && button == PointerButton::Primary {
+                self.click();
+            }
+            return;
+        }
+        if self.is_over_panel() {
+            return;
+        }
+        let middle = button == PointerButton::Middle || (button == PointerButton::Primary && alt);
+        self.input.drag = match button {
+            _ if middle && shift => Some(Drag::Pan),
+            _ if middle && ctrl => Some(Drag::Near),
+            _ if middle => Some(Drag::Orbit),
+            PointerButton::Secondary => Some(Drag::Look),
+            PointerButton::Primary => Some(Drag::Click),
+            _ => None,
+        };
+    }
+
+    /// Marks the element under the cursor, or none where it was marked.
+    fn click(&mut self) {
+        let found = self.input.pointer.and_then(|at| self.element_at(at));
+        self.input.chosen = found.filter(|_| found != self.input.chosen);
+        if let (Some(e), true) = (self.input.chosen, self.switches.items) {
+            self.ask_items(e);
+        }
+    }
+
+    fn key(&mut self, key: Key, pressed: bool) {
+        self.input.held.retain(|held| *held != key);
+        if !pressed || self.egui.wants_keyboard_input() {
+            return;
+        }
+        if self.input.grabbed.is_some() {
+            match key {
+                Key::Enter => self.let_go(true),
+                Key::Escape => self.let_go(false),
+                _ => {}
+            }
+            return;
+        }
+        if self.input.modifiers.command {
+            self.closing |= key == Key::Q;
+            return;
+        }
+        if WAYS.iter().any(|(way, _)| *way == key) {
+            self.input.held.push(key);
+            return;
+        }
+        let switches = &mut self.switches;
+        let stops = |ev: f32, by: f32| (ev + by).clamp(*EXPOSURES.start(), *EXPOSURES.end());
+        match key {
+            Key::Num1 => switches.part = PARTS[0].1,
+            Key::Num2 => switches.part = PARTS[1].1,
+            Key::Num3 => switches.part = PARTS[2].1,
+            Key::Z => switches.shading = next(&SHADINGS, switches.shading),
+            Key::T => switches.ambient ^= true,
+            Key::X => switches.detail ^= true,
+            Key::O => switches.elements ^= true,
+            Key::P => switches.sources ^= true,
+            Key::H => switches.slots ^= true,
+            Key::B => switches.bound ^= true,
+            Key::Tab => switches.panel ^= true,
+            Key::Comma => switches.exposure = stops(switches.exposure, -STOP),
+            Key::Period => switches.exposure = stops(switches.exposure, STOP),
+            Key::I => {
+                switches.items ^= true;
+                if let (true, Some(e)) = (switches.items, self.input.chosen) {
+                    self.ask_items(e);
+                }
+            }
+            Key::K => {
+                let counts = DIRECTIONS.map(|count| ("", count));
+                self.directions = next(&counts, self.directions);
+                self.bake();
+            }
+            Key::L if !self.lamps.is_empty() => self.lamp = (self.lamp + 1) % self.lamps.len(),
+            Key::Plus | Key::Equals => self.brighten(BRIGHTER),
+            Key::Minus => self.brighten(1.0 / BRIGHTER),
+            Key::G => self.grab(),
+            Key::C => self.see_camera(self.next_camera),
+            Key::Home => self.eye.see_all(),
+            Key::F12 => self.save(None),
+            Key::Escape => self.input.chosen = None,
+            _ => {}
+        }
+    }
+
+    fn see(&mut self, side: DVec3) {
+        self.eye.along(side);
+    }
+
+    pub(super) fn see_camera(&mut self, i: usize) {
+        let count = self.scene.cameras.len();
+        if let Some(camera) = self.scene.cameras.get(i) {
+            self.eye = Eye::new(&self.scene, camera);
+            self.next_camera = (i + 1) % count;
+        }
+    }
+
+    /// Flies as the keys held say, for the time of a frame.
+    pub(super) fn fly(&mut self, seconds: f64) {
+        let ways = WAYS.iter().filter(|(key, _)| self.input.held.contains(key));
+        let way: DVec3 = ways.map(|(_, way)| *way).sum();
+        if way != DVec3::ZERO {
+            let speed = match self.input.modifiers.shift {
+                true => FASTER,
+                false => 1.0,
+            };
+            self.eye.fly(way.normalize() * speed, seconds);
+        }
+    }
+
+    fn brighten(&mut self, by: f32) {
+        if let Some(lamp) = self.lamps.get_mut(self.lamp) {
+            lamp.strength *= by;
+            self.relight();
+        }
+    }
+
+    /// The chosen point light follows the pointer from now on.
+    fn grab(&mut self) {
+        let position = self.lamps.get(self.lamp).and_then(|lamp| lamp.position);
+        if let (Some(position), Some(_)) = (position, self.input.pointer) {
+            self.input.grabbed = Some((self.lamp, position));
+        }
+    }
+
+    /// Moves the light under the pointer, in the plane through its place that faces the eye.
+    fn drag_lamp(&mut self) {
+        let (Some((i, before)), Some((x, y))) = (self.input.grabbed, self.input.pointer) else {
+            return;
+        };
+        let eye = self.eye.camera.position;
+        let forward = self.eye.ray(
+            (f64::from(self.size.0) / 2.0, f64::from(self.size.1) / 2.0),
+            self.size,
+        );
+        let ray = self.eye.ray((f64::from(x), f64::from(y)), self.size);
+        let depth = (before - eye).dot(forward);
+        let along = depth / ray.dot(forward);
+        if along.is_finite() && depth > 0.0 {
+            self.lamps[i].position = Some(eye + ray * along);
+            self.relight();
+        }
+    }
+
+    /// Leaves the light where it is, or puts it back.
+    fn let_go(&mut self, stays: bool) {
+        let Some((i, before)) = self.input.grabbed.take() else {
+            return;
+        };
+        if !stays {
+            self.lamps[i].position = Some(before);
+            self.relight();
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! A window that shows a scene while it bakes.
+//!
+//! ```text
+//! system, script ─► Event ─► Viewer ─┬─► Panel (egui) ─────────┐
+//!                                    ├─► SurfacePass ──────────┼─► Screen ─► the window
+//!            Baker ─► Snapshot ─────►┤                         │
+//!                      Detailer ────►┴─► the detailed picture ─┘
+//! ```
+//!
+//! Three threads, each with a Vulkan device of its own, hand results over in host memory: the window's draws frames by the light of
+//! the corners; the baker's solves; the detailer's draws the view as `render` does while it stays. No frame waits for the other
+//! two. A software driver shares its own threads between the devices of an instance, so that each device has its own instance too;
+//! and the other two threads, with all that they start, run at a lower priority.
+
+mod baker;
+mod camera;
+mod detailer;
+mod event;
+mod input;
+mod lamps;
+mod overlay;
+mod panel;
+mod panel_pass;
+mod pick;
+mod runner;
+mod screen;
+mod script;
+mod snapshot;
+mod surface_pass;
+mod switches;
+mod timing;
+mod viewer;
+mod window;
+
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+use std::time::Instant;
+
+use crate::error::Result;
+use crate::scene::{Camera, Scene};
+use crate::solution::Bake;
+use crate::solver::{self, Settings, Visibility};
+use crate::vk::{Device, Instance};
+
+pub use script::{Step, read as read_script};
+pub use window::run;
+
+/// What is to be shown, and how.
+pub struct Options {
+    pub scene: Scene,
+    /// A solution; without one the scene is baked.
+    pub bake: Option<Bake>,
+    /// What was kept with the solution, to light it anew by.
+    pub kept: Option<Visibility>,
+    pub settings: Settings,
+    pub camera: Camera,
+    /// Pixels across and down.
+    pub size: (u32, u32),
+    pub device: DeviceChoice,
+    /// What is done in place of a person; the window closes at its end.
+    pub script: Option<Vec<Step>>,
+    /// When the program started.
+    pub start: Instant,
+}
+
+/// Tells the window that there is something new.
+type Wake = Arc<dyn Fn() + Send + Sync>;
+
+/// Which device, whether it is watched, and the one that bakes once it is open.
+#[derive(Clone, Default)]
+pub struct DeviceChoice {
+    /// By index or a part of its name; the best one if not given.
+    pub wanted: Option<String>,
+    pub validation: bool,
+    baking: Arc<Mutex<Option<Arc<Device>>>>,
+}
+
+impl DeviceChoice {
+    pub fn new(wanted: Option<String>, validation: bool) -> Self {
+        Self {
+            wanted,
+            validation,
+            baking: Arc::default(),
+        }
+    }
+
+    /// The device that bakes, tested when it is opened first.
+    fn open_baking(&self) -> Result<Arc<Device>> {
+        let mut baking = self.baking.lock().unwrap_or_else(|e| e.into_inner());
+        match &*baking {
+            Some(device) => Ok(Arc::clone(device)),
+            None => {
+                let device = solver::open_device(self.wanted.as_deref(), self.validation)?;
+                Ok(Arc::clone(baking.insert(device)))
+            }
+        }
+    }
+
+    /// A device that draws detailed pictures.
+    fn open_drawing(&self) -> Result<Arc<Device>> {
+        let instance = Instance::new(self.validation)?;
+        let candidate = solver::choose_device(&instance, self.wanted.as_deref())?;
+        Device::new(&instance, &candidate)
+    }
+}
+
+/// Niceness of the threads that no frame waits for.
+#[cfg(target_os = "linux")]
+const NICENESS: i32 = 10;
+
+/// Starts a thread at a lower priority; threads that it starts, and those of drivers that it loads, inherit it.
+fn background(name: &str, work: impl FnOnce() + Send + 'static) -> JoinHandle<()> {
+    let started = std::thread::Builder::new()
+        .name(name.to_owned())
+        .spawn(move || {
+            // Linux takes it for this thread alone; where it is refused, frames are slower.
+            #[cfg(target_os = "linux")]
+            let _ = rustix::process::setpriority_process(None, NICENESS);
+            work();
+        });
+    started.expect("the system has room for another thread")
+}
+
+/// Threads of the CPU's own work at a lower priority; to be called before any of them works.
+fn calm_workers() {
+    let built = background("workers", || {
+        // Where they have begun to work, they stay as they are.
+        let _ = rayon::ThreadPoolBuilder::new().build_global();
+    });
+    let _ = built.join();
+}

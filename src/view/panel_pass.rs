@@ -1,0 +1,294 @@
+//! Draws the triangles that egui makes of a panel. Shaders: `panel.vert`, `panel.frag`.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use egui::epaint::{ImageData, ImageDelta, Primitive, Vertex};
+use egui::{ClippedPrimitive, Color32, ColorImage, TextureId, TexturesDelta};
+
+use crate::error::Result;
+use crate::passes::shaders;
+use crate::vk::{
+    Bind, Binding, Buffer, BufferUse, Commands, DescriptorSet, Device, Format, GraphicsPipeline,
+    GraphicsState, Image, ImageUse, RenderPass, Sampler, VertexAttribute,
+};
+
+/// Draws panels; one frame is under way at a time.
+pub struct PanelPass {
+    pipeline: GraphicsPipeline,
+    sampler: Sampler,
+    textures: HashMap<TextureId, Texture>,
+    vertices: Buffer,
+    indices: Buffer,
+    device: Arc<Device>,
+}
+
+struct Texture {
+    set: DescriptorSet,
+    /// What the image holds: egui changes parts of it.
+    pixels: ColorImage,
+    /// None of a picture that another owns.
+    _image: Option<Image>,
+}
+
+/// The picture that lies under everything.
+const PICTURE: TextureId = TextureId::User(0);
+
+/// Triangles of one texture within one rectangle.
+struct Draw {
+    first_index: u32,
+    index_count: u32,
+    texture: TextureId,
+    /// Left, top, width, height in pixels.
+    clip: [u32; 4],
+}
+
+/// What [`PanelPass::prepare`] has brought to the device for one frame.
+pub struct Prepared {
+    /// The picture first.
+    draws: Vec<Draw>,
+    /// Of the window in points.
+    size: [f32; 2],
+}
+
+/// Bytes of a new buffer for so many: some spare, so that a panel that grows does not make one each frame.
+fn roomy(bytes: u64) -> u64 {
+    (bytes * 3 / 2).max(1 << 16)
+}
+
+impl PanelPass {
+    pub fn new(device: &Arc<Device>, pass: &RenderPass) -> Result<Self> {
+        let attribute = |format, offset: usize| VertexAttribute {
+            format,
+            offset: offset as u32,
+        };
+        let pipeline = GraphicsPipeline::over(
+            device,
+            pass,
+            &GraphicsState {
+                name: "panel",
+                vertex: shaders::PANEL_VERT,
+                fragment: shaders::PANEL_FRAG,
+                bindings: &[Binding::Sampled],
+                push_bytes: size_of::<[f32; 2]>(),
+                vertex_stride: size_of::<Vertex>() as u32,
+                attributes: &[
+                    attribute(Format::R32G32_SFLOAT, std::mem::offset_of!(Vertex, pos)),
+                    attribute(Format::R32G32_SFLOAT, std::mem::offset_of!(Vertex, uv)),
+                    attribute(Format::R8G8B8A8_UNORM, std::mem::offset_of!(Vertex, color)),
+                ],
+                sums: false,
+            },
+        )?;
+        let stream = |name| Buffer::new(device, name, roomy(0), BufferUse::Stream);
+        Ok(Self {
+            pipeline,
+            sampler: Sampler::held(device, "panel")?,
+            textures: HashMap::new(),
+            vertices: stream("panel vertices")?,
+            indices: stream("panel indices")?,
+            device: Arc::clone(device),
+        })
+    }
+
+    /// Takes new textures and lets go of old ones.
+    ///
+    /// # Errors
+    /// A device without the memory.
+    pub fn update(&mut self, delta: &TexturesDelta) -> Result<()> {
+        for (id, change) in &delta.set {
+            self.set(*id, change)?;
+        }
+        for id in &delta.free {
+            self.textures.remove(id);
+        }
+        Ok(())
+    }
+
+    fn set(&mut self, id: TextureId, change: &ImageDelta) -> Result<()> {
+        let ImageData::Color(new) = &change.image;
+        let pixels = match (change.pos, self.textures.remove(&id)) {
+            (Some(at), Some(texture)) => patched(texture.pixels, new, at),
+            _ => new.as_ref().clone(),
+        };
+        let size = (pixels.size[0] as u32, pixels.size[1] as u32);
+        let image = upload(&self.device, "panel texture", size, &pixels.pixels)?;
+        let bind = [Bind::Image(&image, &self.sampler)];
+        let set = self.pipeline.bind("panel texture", &bind)?;
+        let texture = Texture {
+            set,
+            pixels,
+            _image: Some(image),
+        };
+        self.textures.insert(id, texture);
+        Ok(())
+    }
+
+    /// Takes the picture that [`Self::record_picture`] draws; it must live until the next one is taken.
+    ///
+    /// # Errors
+    /// A device without the memory.
+    pub fn set_picture(&mut self, image: &Image) -> Result<()> {
+        let bind = [Bind::Image(image, &self.sampler)];
+        let texture = Texture {
+            set: self.pipeline.bind("detailed picture", &bind)?,
+            pixels: ColorImage::default(),
+            _image: None,
+        };
+        self.textures.insert(PICTURE, texture);
+        Ok(())
+    }
+
+    /// Brings the triangles of a frame of so many pixels to the device, `scale` pixels a point.
+    ///
+    /// # Errors
+    /// A device without the memory.
+    pub fn prepare(
+        &mut self,
+        primitives: &[ClippedPrimitive],
+        (width, height): (u32, u32),
+        scale: f32,
+    ) -> Result<Prepared> {
+        let size = [width as f32 / scale, height as f32 / scale];
+        let corner = |x: f32, y: f32| Vertex {
+            pos: egui::pos2(x * size[0], y * size[1]),
+            uv: egui::pos2(x, y),
+            color: Color32::WHITE,
+        };
+        let mut vertices = vec![
+            corner(0.0, 0.0),
+            corner(1.0, 0.0),
+            corner(1.0, 1.0),
+            corner(0.0, 1.0),
+        ];
+        let mut indices = vec![0, 1, 2, 0, 2, 3];
+        let mut draws = vec![Draw {
+            first_index: 0,
+            index_count: indices.len() as u32,
+            texture: PICTURE,
+            clip: [0, 0, width, height],
+        }];
+        for ClippedPrimitive {
+            clip_rect,
+            primitive,
+        } in primitives
+        {
+            let Primitive::Mesh(mesh) = primitive else {
+                continue;
+            };
+            let pixel = |points: f32, most: u32| ((points * scale).round() as u32).min(most);
+            let (left, top) = (
+                pixel(clip_rect.min.x, width),
+                pixel(clip_rect.min.y, height),
+            );
+            let (right, bottom) = (
+                pixel(clip_rect.max.x, width),
+                pixel(clip_rect.max.y, height),
+            );
+            if left >= right || top >= bottom || !self.textures.contains_key(&mesh.texture_id) {
+                continue;
+            }
+            draws.push(Draw {
+                first_index: indices.len() as u32,
+                index_count: mesh.indices.len() as u32,
+                texture: mesh.texture_id,
+                clip: [left, top, right - left, bottom - top],
+            });
+            let before = vertices.len() as u32;
+            indices.extend(mesh.indices.iter().map(|i| before + i));
+            vertices.extend_from_slice(&mesh.vertices);
+        }
+        for (name, buffer, bytes) in [
+            (
+                "panel vertices",
+                &mut self.vertices,
+                size_of_val(&vertices[..]),
+            ),
+            (
+                "panel indices",
+                &mut self.indices,
+                size_of_val(&indices[..]),
+            ),
+        ] {
+            if bytes as u64 > buffer.bytes() {
+                *buffer = Buffer::new(&self.device, name, roomy(bytes as u64), BufferUse::Stream)?;
+            }
+        }
+        self.vertices.write(0, &vertices);
+        self.indices.write(0, &indices);
+        Ok(Prepared { draws, size })
+    }
+
+    /// Draws the picture over all that was drawn, within the render pass that is under way.
+    pub fn record_picture(&self, cmd: &Commands, prepared: &Prepared) {
+        self.draw(cmd, prepared, &prepared.draws[..1]);
+    }
+
+    /// Draws the panel within the render pass that is under way.
+    pub fn record(&self, cmd: &Commands, prepared: &Prepared) {
+        self.draw(cmd, prepared, &prepared.draws[1..]);
+    }
+
+    fn draw(&self, cmd: &Commands, prepared: &Prepared, draws: &[Draw]) {
+        cmd.bind_indices(&self.indices);
+        for draw in draws {
+            let Some(texture) = self.textures.get(&draw.texture) else {
+                continue;
+            };
+            let [left, top, width, height] = draw.clip;
+            cmd.bind_graphics(&self.pipeline, &texture.set, &self.vertices);
+            cmd.push_graphics(&self.pipeline, &prepared.size);
+            cmd.scissor(left, top, width, height);
+            cmd.draw_indexed(draw.first_index, draw.index_count);
+        }
+    }
+}
+
+/// `whole` with `part` at column and row `at`.
+fn patched(mut whole: ColorImage, part: &ColorImage, [left, top]: [usize; 2]) -> ColorImage {
+    let (width, part_width) = (whole.size[0], part.size[0]);
+    for (row, pixels) in part.pixels.chunks_exact(part_width).enumerate() {
+        let start = (top + row) * width + left;
+        whole.pixels[start..start + part_width].copy_from_slice(pixels);
+    }
+    whole
+}
+
+/// An image of 8-bit codes that shaders read as they are.
+pub fn upload(
+    device: &Arc<Device>,
+    name: &str,
+    size: (u32, u32),
+    pixels: &[Color32],
+) -> Result<Image> {
+    let image = Image::new(
+        device,
+        name,
+        size,
+        Format::R8G8B8A8_UNORM,
+        ImageUse::Texture,
+    )?;
+    let bytes = size_of_val(pixels) as u64;
+    let mut staging = Buffer::new(device, "texture staging", bytes, BufferUse::Upload)?;
+    staging.write(0, pixels);
+    Commands::run(device, name, |cmd| {
+        cmd.upload_texture(&staging, &image, 4);
+        Ok(())
+    })?;
+    Ok(image)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_patch_changes_its_rectangle_alone() {
+        let whole = ColorImage::filled([3, 3], Color32::BLACK);
+        let part = ColorImage::filled([2, 1], Color32::WHITE);
+        let found = patched(whole, &part, [1, 2]);
+        let white = |p: &Color32| *p == Color32::WHITE;
+        let places: Vec<_> = (0..9).filter(|&i| white(&found.pixels[i])).collect();
+        assert_eq!(places, [7, 8]);
+    }
+}

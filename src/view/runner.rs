@@ -1,0 +1,151 @@
+//! Runs a script step by step between frames.
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use super::event::Event;
+use super::script::Step;
+use super::viewer::Viewer;
+use crate::error::{Error, Result};
+
+/// A script under way.
+pub struct Runner {
+    steps: VecDeque<Step>,
+    /// Frames shown since the step that waits began.
+    frames: u64,
+    since: Instant,
+    begun: bool,
+}
+
+/// Between two looks at whether what a step waits for has come.
+const POLLING: Duration = Duration::from_millis(20);
+/// How long a system may take to give the window another size.
+const RESIZING: Duration = Duration::from_secs(5);
+
+impl Runner {
+    pub fn new(steps: Vec<Step>) -> Self {
+        Self {
+            steps: steps.into(),
+            frames: 0,
+            since: Instant::now(),
+            begun: false,
+        }
+    }
+
+    /// Counts a frame that was shown.
+    pub fn shown(&mut self) {
+        self.frames += 1;
+    }
+
+    /// When this has to be asked again, at the latest; frames are drawn as fast as they can meanwhile if that is now.
+    pub fn next(&self, now: Instant) -> Option<Instant> {
+        match self.steps.front() {
+            Some(Step::Wait(seconds)) => Some(self.since + Duration::from_secs_f64(*seconds)),
+            Some(Step::Frames(_)) => Some(now),
+            Some(_) => Some(now + POLLING),
+            None => None,
+        }
+    }
+
+    /// Whether frames are wanted though nothing has changed.
+    pub fn wants_frames(&self) -> bool {
+        let first = self.steps.front();
+        matches!(first, Some(Step::Frames(_) | Step::Screenshot(_)))
+    }
+
+    /// Does what can be done now. `resize` asks the system for a size.
+    ///
+    /// # Errors
+    /// A step that cannot be done.
+    pub fn advance(&mut self, viewer: &mut Viewer, mut resize: impl FnMut(u32, u32)) -> Result<()> {
+        while let Some(step) = self.steps.front() {
+            let first = !self.begun;
+            if first {
+                self.begun = true;
+                self.frames = 0;
+                self.since = Instant::now();
+            }
+            let done = match step {
+                Step::Do(event) => {
+                    viewer.handle(event.clone());
+                    true
+                }
+                Step::Resize(width, height) => {
+                    if first {
+                        resize(*width, *height);
+                    }
+                    if self.since.elapsed() > RESIZING {
+                        return Err(Error::Display(format!(
+                            "the window did not become {width}x{height}"
+                        )));
+                    }
+                    viewer.size == (*width, *height)
+                }
+                Step::Frames(count) => self.frames >= *count,
+                Step::Bake => viewer.is_baked(),
+                Step::Relit => viewer.edited.is_none(),
+                Step::Detail => viewer.is_detailed(),
+                Step::Wait(seconds) => self.since.elapsed().as_secs_f64() >= *seconds,
+                Step::Set(words) => {
+                    set(viewer, words)?;
+                    true
+                }
+                Step::Screenshot(path) => {
+                    if first {
+                        viewer.capture = Some(path.clone());
+                        viewer.dirty = true;
+                    }
+                    viewer.capture.is_none()
+                }
+                Step::Save(path) => {
+                    if first {
+                        viewer.save(Some(path.clone()));
+                    }
+                    viewer.saving == 0
+                }
+                Step::LoseSurface => {
+                    viewer.screen.lose();
+                    viewer.dirty = true;
+                    true
+                }
+            };
+            if !done {
+                return Ok(());
+            }
+            self.steps.pop_front();
+            self.begun = false;
+        }
+        viewer.handle(Event::Close);
+        Ok(())
+    }
+}
+
+/// `directions 16`, `height 0.5`, `lamp NAME colour 1 0 0`, or a switch.
+fn set(viewer: &mut Viewer, words: &[String]) -> Result<()> {
+    let wrong = || Error::Usage(format!("\"set {}\" cannot be", words.join(" ")));
+    match words {
+        [name, value] if name == "directions" => {
+            let count = value.parse().map_err(|_| wrong())?;
+            crate::directions::Directions::new(count)?;
+            viewer.directions = count;
+            viewer.bake();
+        }
+        [name, value] if name == "height" => {
+            let scale: f64 = value.parse().map_err(|_| wrong())?;
+            if !(0.0..=1e3).contains(&scale) {
+                return Err(wrong());
+            }
+            viewer.relief_scale = scale;
+            viewer.bake();
+        }
+        [name, lamp, property, values @ ..] if name == "lamp" => {
+            let found = viewer.lamps.iter_mut().find(|l| l.name == *lamp);
+            found.ok_or_else(wrong)?.set(property, values)?;
+            viewer.relight();
+        }
+        [name, value] => viewer.switches.set(name, value)?,
+        _ => return Err(wrong()),
+    }
+    viewer.dirty = true;
+    Ok(())
+}

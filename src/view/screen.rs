@@ -1,0 +1,205 @@
+//! What the window's frames are drawn in and shown by.
+
+use std::sync::Arc;
+
+use winit::window::Window;
+
+use super::DeviceChoice;
+use crate::error::{Error, Result};
+use crate::solver::choose_device;
+use crate::vk::{
+    Attachment, Buffer, BufferUse, Commands, Device, Format, Framebuffer, Image, ImageUse,
+    Instance, RenderPass, Shown, Stage, Surface, Swapchain,
+};
+
+/// A window with its device and, while it has an area, its images.
+pub struct Screen {
+    swapchain: Option<Swapchain>,
+    target: Option<Target>,
+    surface: Option<Arc<Surface>>,
+    pass: RenderPass,
+    format: Format,
+    device: Arc<Device>,
+    instance: Arc<Instance>,
+    window: Arc<Window>,
+}
+
+/// A frame before it is copied to the window.
+struct Target {
+    framebuffer: Framebuffer,
+    colour: Image,
+    _depth: Image,
+}
+
+/// A frame that was read back: 8-bit sRGB codes, `[row][column][channel]`.
+pub struct Captured {
+    pub size: (u32, u32),
+    pub codes: Vec<u8>,
+}
+
+impl Screen {
+    /// # Errors
+    /// A display without a Vulkan surface; a device that is not there, or cannot show pictures on this display.
+    pub fn new(window: &Arc<Window>, size: (u32, u32), choice: &DeviceChoice) -> Result<Self> {
+        let instance = Instance::for_display(choice.validation, window.as_ref())?;
+        let surface = Arc::new(Surface::new(&instance, window)?);
+        let wanted = choice.wanted.as_deref();
+        let best = choose_device(&instance, wanted)?;
+        let candidate = match (surface.fits(&best), wanted) {
+            (true, _) => best,
+            (false, None) => {
+                let others = instance.candidates()?.into_iter();
+                let mut others = others.filter(|c| c.missing.is_empty() && surface.fits(c));
+                others.next().ok_or_else(|| {
+                    Error::Display("no Vulkan device can show pictures on this display".into())
+                })?
+            }
+            (false, Some(_)) => {
+                return Err(Error::Display(format!(
+                    "device {} cannot show pictures on this display",
+                    best.name
+                )));
+            }
+        };
+        let device = Device::new(&instance, &candidate)?;
+        let swapchain = Swapchain::new(&device, &surface, size, None)?;
+        let format = swapchain
+            .as_ref()
+            .map_or(Format::B8G8R8A8_UNORM, Swapchain::format);
+        let pass = RenderPass::new(&device, "window", Attachment::copied(format))?;
+        Ok(Self {
+            swapchain,
+            target: None,
+            surface: Some(surface),
+            pass,
+            format,
+            device,
+            instance,
+            window: Arc::clone(window),
+        })
+    }
+
+    pub fn device(&self) -> &Arc<Device> {
+        &self.device
+    }
+
+    pub fn pass(&self) -> &RenderPass {
+        &self.pass
+    }
+
+    /// Lets go of the surface as if the system had taken it; the next frame makes a new one.
+    pub fn lose(&mut self) {
+        self.swapchain = None;
+        self.surface = None;
+    }
+
+    /// Makes images of the window's size where there are none; returns their size, none while the window has no area.
+    ///
+    /// # Errors
+    /// A device or a display that fails.
+    pub fn fit(&mut self, size: (u32, u32), anew: bool) -> Result<Option<(u32, u32)>> {
+        if size.0 == 0 || size.1 == 0 {
+            return Ok(None);
+        }
+        if self.surface.is_none() {
+            self.swapchain = None;
+            self.surface = Some(Arc::new(Surface::new(&self.instance, &self.window)?));
+        }
+        if let Some(surface) = &self.surface
+            && (anew || self.swapchain.is_none())
+        {
+            let before = self.swapchain.take();
+            self.swapchain = Swapchain::new(&self.device, surface, size, before)?;
+        }
+        let Some(swapchain) = &self.swapchain else {
+            return Ok(None);
+        };
+        if swapchain.format() != self.format {
+            return Err(Error::Display(
+                "the window has changed its format: open it again".into(),
+            ));
+        }
+        let size = swapchain.size();
+        if self.target.as_ref().is_none_or(|t| t.colour.size() != size) {
+            self.target = None;
+            self.target = Some(Target::new(&self.device, &self.pass, self.format, size)?);
+        }
+        Ok(Some(size))
+    }
+
+    /// Draws a frame by what `record` draws within the render pass, and shows it; with `capture`, reads it back. To be called
+    /// when [`Self::fit`] has given a size.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn show(
+        &mut self,
+        capture: bool,
+        record: impl FnOnce(&Commands),
+    ) -> Result<(Shown, Option<Captured>)> {
+        let (Some(swapchain), Some(target)) = (&mut self.swapchain, &self.target) else {
+            return Ok((Shown::Stale, None));
+        };
+        let (width, height) = target.colour.size();
+        let bytes = u64::from(width) * u64::from(height) * 4;
+        let readback = match capture {
+            true => {
+                let name = "window readback";
+                Some(Buffer::new(&self.device, name, bytes, BufferUse::Readback)?)
+            }
+            false => None,
+        };
+        let shown = swapchain.show(&target.colour, |cmd| {
+            cmd.begin_render_pass(&self.pass, &target.framebuffer, [0; 4]);
+            cmd.viewport(0, 0, width, height);
+            record(cmd);
+            cmd.end_render_pass();
+            if let Some(readback) = &readback {
+                cmd.copy_image_to_buffer(&target.colour, readback);
+                cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
+            }
+            Ok(())
+        })?;
+        if shown == Shown::Lost {
+            self.lose();
+        }
+        // A frame that was given up has drawn nothing.
+        let readback = readback.filter(|_| shown == Shown::Yes);
+        let captured = readback.map(|readback| {
+            let blue_first = self.format == Format::B8G8R8A8_UNORM;
+            let texels: Vec<[u8; 4]> = readback.read(0, (bytes / 4) as usize);
+            let codes = texels.iter().flat_map(|&[a, b, c, _]| match blue_first {
+                true => [c, b, a],
+                false => [a, b, c],
+            });
+            Captured {
+                size: (width, height),
+                codes: codes.collect(),
+            }
+        });
+        Ok((shown, captured))
+    }
+}
+
+impl Target {
+    fn new(
+        device: &Arc<Device>,
+        pass: &RenderPass,
+        format: Format,
+        size: (u32, u32),
+    ) -> Result<Self> {
+        let colour = Image::new(device, "window frame", size, format, ImageUse::ColourTarget)?;
+        let depth = Image::new(
+            device,
+            "window depth",
+            size,
+            Format::D32_SFLOAT,
+            ImageUse::DepthTarget,
+        )?;
+        Ok(Self {
+            framebuffer: Framebuffer::new(device, "window frame", pass, &colour, &depth)?,
+            colour,
+            _depth: depth,
+        })
+    }
+}

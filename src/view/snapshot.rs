@@ -1,0 +1,194 @@
+//! A solution as the window shows it: finished, or as far as it has come.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use glam::{DVec3, Vec3};
+
+use crate::error::Result;
+use crate::render::{Lighting, corner_irradiance, tone};
+use crate::scene::Scene;
+use crate::solution::{Bake, DirectionalLight, Solution};
+use crate::solver::{Ambient, Solver, StopReason};
+
+/// How far a bake has come.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Progress {
+    pub shots: u32,
+    pub sources: u32,
+    pub unshot_share: f64,
+    /// None where nothing bounds what is left.
+    pub error_bound: Option<f64>,
+    pub elapsed: Duration,
+    pub left: Option<Duration>,
+    pub done: bool,
+}
+
+/// Light of a scene; values `[triangle]` in the order of the input, W·m⁻².
+pub struct Snapshot {
+    /// Counts the lightings of the session: a later one is of other lights or another bake.
+    pub epoch: u64,
+    /// The scene that is lit.
+    pub scene: Arc<Scene>,
+    pub irradiance: Vec<Vec3>,
+    pub direct: Vec<Vec3>,
+    pub relief: Option<DirectionalLight>,
+    /// The same at the corners, smoothed over each surface.
+    pub corners: Vec<[Vec3; 3]>,
+    pub corners_direct: Vec<[Vec3; 3]>,
+    /// What has not been shot, spread evenly.
+    pub ambient: Ambient,
+    /// Stops by which the light is exposed if nobody asks otherwise.
+    pub exposure: f32,
+    pub progress: Progress,
+}
+
+/// Share of the area that is darker than what the exposure is for, and the luminance which that is brought to, as in pictures.
+const METERED_SHARE: f64 = 0.9;
+const METER_TARGET: f32 = 0.6;
+
+impl Snapshot {
+    fn new(
+        epoch: u64,
+        scene: &Arc<Scene>,
+        (irradiance, direct): (Vec<Vec3>, Vec<Vec3>),
+        relief: Option<DirectionalLight>,
+        ambient: Ambient,
+        progress: Progress,
+    ) -> Self {
+        Self {
+            epoch,
+            corners: corner_irradiance(scene, &irradiance),
+            corners_direct: corner_irradiance(scene, &direct),
+            exposure: exposure(scene, &irradiance, ambient.irradiance),
+            scene: Arc::clone(scene),
+            irradiance,
+            direct,
+            relief,
+            ambient,
+            progress,
+        }
+    }
+
+    /// What a solver has found.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn of_solver(
+        epoch: u64,
+        scene: &Arc<Scene>,
+        solver: &Solver,
+        progress: Progress,
+    ) -> Result<Self> {
+        let ambient = solver.ambient()?;
+        let report = solver.report().clone();
+        let Solution {
+            irradiance,
+            irradiance_direct,
+            relief,
+            ..
+        } = Solution::new(scene, &solver.elements, &solver.light()?, report);
+        let light = (irradiance, irradiance_direct);
+        Ok(Self::new(epoch, scene, light, relief, ambient, progress))
+    }
+
+    /// What a bake holds.
+    pub fn of_bake(scene: &Arc<Scene>, bake: Bake) -> Self {
+        let progress = Progress {
+            done: true,
+            ..Progress::default()
+        };
+        let light = (bake.irradiance, bake.irradiance_direct);
+        Self::new(0, scene, light, bake.relief, Ambient::default(), progress)
+    }
+
+    /// Nothing lit yet but what emits.
+    pub fn dark(scene: &Arc<Scene>) -> Self {
+        let none = vec![Vec3::ZERO; scene.triangles.len()];
+        let light = (none.clone(), none);
+        let progress = Progress::default();
+        Self::new(0, scene, light, None, Ambient::default(), progress)
+    }
+
+    /// The light as pictures show it; `irradiance` stands in place of this one's own.
+    pub fn lighting<'a>(&'a self, irradiance: &'a [Vec3]) -> Lighting<'a> {
+        Lighting {
+            irradiance_direct: Some(&self.direct),
+            relief: self.relief.as_ref(),
+            ..Lighting::from(irradiance)
+        }
+    }
+}
+
+/// Why a bake that has stopped will not go on by itself.
+pub fn is_done(stop: StopReason) -> bool {
+    matches!(
+        stop,
+        StopReason::Residual | StopReason::Shots | StopReason::Budget
+    )
+}
+
+/// Stops that bring the luminance under which METERED_SHARE of the area that does not emit lies to METER_TARGET. It does not
+/// depend on the view: a window that orbits does not flicker.
+fn exposure(scene: &Scene, irradiance: &[Vec3], ambient: Vec3) -> f32 {
+    let mut lit: Vec<(f32, f64)> = scene
+        .triangles
+        .iter()
+        .zip(irradiance)
+        .filter(|(t, _)| !scene.materials[t.material as usize].emits())
+        .map(|(triangle, irradiance)| {
+            let material = &scene.materials[triangle.material as usize];
+            let map = material
+                .map_kd
+                .as_ref()
+                .map_or([1.0; 3], |map| map.mean_over_triangle(&triangle.uv));
+            let rho = Vec3::from(material.kd) * Vec3::from(map);
+            let radiance = rho * (*irradiance + ambient) / std::f32::consts::PI;
+            let [a, b, c] = scene.corners(triangle);
+            let area = DVec3::length((b - a).cross(c - a)) / 2.0;
+            (tone::luminance(radiance.to_array()), area)
+        })
+        // What no light reaches, backs of walls most of all, is not exposed for.
+        .filter(|(luminance, _)| *luminance > 0.0)
+        .collect();
+    lit.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let whole: f64 = lit.iter().map(|l| l.1).sum();
+    let mut below = 0.0;
+    let bright = lit.iter().find(|(_, area)| {
+        below += area;
+        below >= METERED_SHARE * whole
+    });
+    bright.map_or(0.0, |(luminance, _)| (METER_TARGET / luminance).log2())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Material, Triangle};
+
+    /// Ten triangles of one area: the exposure is for the ninth of them by brightness.
+    #[test]
+    fn exposure_is_for_the_brightest_tenth_by_area() {
+        let scene = Scene {
+            vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
+            triangles: vec![
+                Triangle {
+                    vertices: [0, 1, 2],
+                    uv: [[0.0; 2]; 3],
+                    material: 0,
+                };
+                10
+            ],
+            materials: vec![Material {
+                kd: [1.0; 3],
+                ..Material::default()
+            }],
+            ..Scene::default()
+        };
+        let light: Vec<_> = (1..=10)
+            .map(|i| Vec3::splat(i as f32 * std::f32::consts::PI))
+            .collect();
+        let stops = exposure(&scene, &light, Vec3::ZERO);
+        assert!((stops.exp2() * 9.0 - METER_TARGET).abs() < 1e-5, "{stops}");
+    }
+}

@@ -1,0 +1,111 @@
+//! How long frames and answers take.
+
+use std::time::{Duration, Instant};
+
+/// Times of a session, seconds.
+#[derive(Debug, Default)]
+pub struct Timing {
+    /// Of frames, from the first thought to the picture on the screen, while a bake is under way and while none is.
+    baking: Vec<f64>,
+    idle: Vec<f64>,
+    /// From what a person did to the end of the first frame that could show it.
+    answers: Vec<f64>,
+    /// From a change of the lights to the end of the first frame that shows its light.
+    relit: Vec<f64>,
+    /// From the start of the program to the end of the first frame that shows light.
+    first_light: Option<f64>,
+}
+
+impl Timing {
+    pub fn frame(&mut self, taken: Duration, baking: bool) {
+        let frames = if baking {
+            &mut self.baking
+        } else {
+            &mut self.idle
+        };
+        frames.push(taken.as_secs_f64());
+    }
+
+    /// Whether a frame has been shown.
+    pub fn has_begun(&self) -> bool {
+        !(self.baking.is_empty() && self.idle.is_empty())
+    }
+
+    pub fn answer(&mut self, since: Instant) {
+        self.answers.push(since.elapsed().as_secs_f64());
+    }
+
+    pub fn relit(&mut self, since: Instant) {
+        self.relit.push(since.elapsed().as_secs_f64());
+    }
+
+    pub fn first_light(&mut self, since: Instant) {
+        self.first_light
+            .get_or_insert_with(|| since.elapsed().as_secs_f64());
+    }
+
+    /// The last frame's, by whether a bake is under way.
+    pub fn last(&self, baking: bool) -> Option<f64> {
+        let frames = if baking { &self.baking } else { &self.idle };
+        frames.last().copied()
+    }
+
+    /// One line each for what there was.
+    pub fn lines(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        if let Some(seconds) = self.first_light {
+            lines.push(format!("first picture with light after {seconds:.2} s"));
+        }
+        for (what, frames) in [("while baking", &self.baking), ("without", &self.idle)] {
+            if let Some((median, most)) = spread(frames) {
+                lines.push(format!(
+                    "frame {what}: {median:.1} ms in the middle, {most:.1} ms at the 95th percentile of {}",
+                    frames.len()
+                ));
+            }
+        }
+        if let (Some((baking, _)), Some((idle, _))) = (spread(&self.baking), spread(&self.idle)) {
+            lines.push(format!(
+                "frame while baking over frame without: {:.2}",
+                baking / idle
+            ));
+        }
+        if let Some((median, most)) = spread(&self.answers) {
+            let worst = 1e3 * self.answers.iter().copied().fold(0.0, f64::max);
+            lines.push(format!(
+                "input answered in {median:.1} ms in the middle, {most:.1} ms at the 95th percentile, {worst:.1} ms at most, of {}",
+                self.answers.len()
+            ));
+        }
+        for seconds in &self.relit {
+            lines.push(format!("lights changed on the screen after {seconds:.2} s"));
+        }
+        lines
+    }
+}
+
+/// The median and the 95th percentile in milliseconds; none of nothing.
+fn spread(seconds: &[f64]) -> Option<(f64, f64)> {
+    let mut sorted = seconds.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let at = |share: f64| sorted.get(((sorted.len().max(1) - 1) as f64 * share).round() as usize);
+    Some((1e3 * at(0.5)?, 1e3 * at(0.95)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_tell_what_there_was() {
+        let mut timing = Timing::default();
+        assert!(timing.lines().is_empty());
+        for ms in 1..=20 {
+            timing.frame(Duration::from_millis(2 * ms), true);
+            timing.frame(Duration::from_millis(ms), false);
+        }
+        let lines = timing.lines();
+        assert_eq!(lines.len(), 3, "{lines:?}");
+        assert!(lines[2].ends_with("2.00"), "{lines:?}");
+    }
+}

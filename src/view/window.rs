@@ -1,0 +1,264 @@
+//! The window itself: events of the system in, frames out.
+
+use std::sync::Arc;
+
+use winit::application::ApplicationHandler;
+use winit::dpi::PhysicalSize;
+use winit::event::{ElementState, MouseButton, MouseScrollDelta, WindowEvent};
+use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy};
+use winit::keyboard::{Key as WinitKey, KeyCode, PhysicalKey};
+use winit::window::{Window, WindowId};
+
+use glam::DVec3;
+
+use super::event::{Event, Key, Modifiers, PointerButton};
+use super::runner::Runner;
+use super::viewer::Viewer;
+use super::{Options, Wake, calm_workers};
+use crate::error::{Error, Result};
+
+/// Another thread has something new.
+struct Woken;
+
+/// Opens the window and shows the scene until it is closed; returns lines on how long frames and answers took.
+///
+/// # Errors
+/// No display, or one without a Vulkan surface; a device that fails.
+pub fn run(options: Options) -> Result<Vec<String>> {
+    calm_workers();
+    let events = EventLoop::<Woken>::with_user_event()
+        .build()
+        .map_err(|e| Error::Display(format!("no display to open a window on: {}", line(&e))))?;
+    let mut app = App {
+        proxy: events.create_proxy(),
+        title: format!("Mesolux: {}", options.scene.name),
+        size: options.size,
+        runner: options.script.clone().map(Runner::new),
+        options: Some(options),
+        open: None,
+        lines: Vec::new(),
+        error: None,
+    };
+    let ran = events.run_app(&mut app);
+    app.close();
+    match (app.error, ran) {
+        (Some(error), _) => Err(error),
+        (None, Err(e)) => Err(Error::Display(format!("the window failed: {}", line(&e)))),
+        (None, Ok(())) => Ok(app.lines),
+    }
+}
+
+/// What an error says in the end, in one line: before that stands where in its code winit noticed it.
+fn line(error: &impl std::fmt::Display) -> String {
+    let text = error.to_string();
+    let words: Vec<_> = text.split_whitespace().collect();
+    let text = words.join(" ");
+    let said = text.rsplit(": ").next().unwrap_or_default();
+    said.trim_end_matches('.').to_owned()
+}
+
+struct App {
+    proxy: EventLoopProxy<Woken>,
+    title: String,
+    size: (u32, u32),
+    /// Until the window is open.
+    options: Option<Options>,
+    runner: Option<Runner>,
+    open: Option<(Viewer, Arc<Window>)>,
+    lines: Vec<String>,
+    error: Option<Error>,
+}
+
+impl App {
+    fn open(&mut self, events: &ActiveEventLoop) -> Result<()> {
+        let Some(options) = self.options.take() else {
+            return Ok(());
+        };
+        let attributes = Window::default_attributes()
+            .with_title(self.title.clone())
+            .with_inner_size(PhysicalSize::new(self.size.0, self.size.1));
+        let window = events
+            .create_window(attributes)
+            .map_err(|e| Error::Display(format!("no window: {}", line(&e))))?;
+        let window = Arc::new(window);
+        let proxy = self.proxy.clone();
+        let wake: Wake = Arc::new(move || {
+            // A window that is gone needs no waking.
+            let _ = proxy.send_event(Woken);
+        });
+        let PhysicalSize { width, height } = window.inner_size();
+        let mut viewer = Viewer::new(options, &window, (width, height), wake)?;
+        viewer.scale = window.scale_factor() as f32;
+        viewer.input.scripted = self.runner.is_some();
+        self.open = Some((viewer, window));
+        Ok(())
+    }
+
+    /// Draws what is due, and says when the next frame is.
+    fn go_on(&mut self, events: &ActiveEventLoop) -> Result<()> {
+        let Some((viewer, window)) = &mut self.open else {
+            return Ok(());
+        };
+        if let Some(runner) = &mut self.runner {
+            runner.advance(viewer, |width, height| {
+                // A system that obeys at once sends no event of it.
+                let given = window.request_inner_size(PhysicalSize::new(width, height));
+                if let Some(PhysicalSize { width, height }) = given {
+                    viewer_resized(window, width, height);
+                }
+            })?;
+        }
+        if viewer.closing {
+            events.exit();
+            return Ok(());
+        }
+        let wanted = self.runner.as_ref().is_some_and(Runner::wants_frames);
+        let now = std::time::Instant::now();
+        let due = viewer.next_frame(now).is_some_and(|at| at <= now);
+        if (due || wanted)
+            && viewer.frame()?
+            && let Some(runner) = &mut self.runner
+        {
+            runner.shown();
+        }
+        let now = std::time::Instant::now();
+        let of_script = self.runner.as_ref().and_then(|runner| runner.next(now));
+        let next = [viewer.next_frame(now), of_script]
+            .into_iter()
+            .flatten()
+            .min();
+        events.set_control_flow(next.map_or(ControlFlow::Wait, ControlFlow::WaitUntil));
+        Ok(())
+    }
+
+    /// Closes the window: everything on the devices is freed before it.
+    fn close(&mut self) {
+        if let Some((viewer, window)) = self.open.take() {
+            self.lines = viewer.timing.lines();
+            drop(viewer);
+            drop(window);
+        }
+    }
+
+    fn stop_on_error(&mut self, events: &ActiveEventLoop, done: Result<()>) {
+        if let Err(error) = done {
+            self.error.get_or_insert(error);
+            events.exit();
+        }
+    }
+}
+
+/// On systems that give a size at once, its event comes with the next round.
+fn viewer_resized(window: &Window, width: u32, height: u32) {
+    tracing::debug!(width, height, "resized at once");
+    window.request_redraw();
+}
+
+impl ApplicationHandler<Woken> for App {
+    fn resumed(&mut self, events: &ActiveEventLoop) {
+        let done = self.open(events);
+        self.stop_on_error(events, done);
+    }
+
+    fn user_event(&mut self, _: &ActiveEventLoop, Woken: Woken) {
+        if let Some((viewer, _)) = &mut self.open {
+            viewer.wake();
+        }
+    }
+
+    fn window_event(&mut self, _: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        if let Some((viewer, _)) = &mut self.open {
+            for event in translated(event) {
+                viewer.handle(event);
+            }
+        }
+    }
+
+    fn about_to_wait(&mut self, events: &ActiveEventLoop) {
+        if self.error.is_none() {
+            let done = self.go_on(events);
+            self.stop_on_error(events, done);
+        }
+    }
+}
+
+/// Sides from which the number pad looks.
+const SIDES: [(KeyCode, DVec3); 3] = [
+    (KeyCode::Numpad1, DVec3::Z),
+    (KeyCode::Numpad3, DVec3::X),
+    (KeyCode::Numpad7, DVec3::Y),
+];
+
+/// What an event of the system means here.
+fn translated(event: WindowEvent) -> Vec<Event> {
+    match event {
+        WindowEvent::CloseRequested | WindowEvent::Destroyed => vec![Event::Close],
+        WindowEvent::Resized(PhysicalSize { width, height }) => {
+            vec![Event::Resized { width, height }]
+        }
+        WindowEvent::ScaleFactorChanged { scale_factor, .. } => {
+            vec![Event::Scale(scale_factor as f32)]
+        }
+        WindowEvent::Focused(focused) => vec![Event::Focus(focused)],
+        WindowEvent::CursorMoved { position, .. } => vec![Event::Pointer {
+            x: position.x as f32,
+            y: position.y as f32,
+        }],
+        WindowEvent::CursorLeft { .. } => vec![Event::PointerGone],
+        WindowEvent::MouseInput { state, button, .. } => {
+            let button = match button {
+                MouseButton::Left => PointerButton::Primary,
+                MouseButton::Right => PointerButton::Secondary,
+                MouseButton::Middle => PointerButton::Middle,
+                _ => return Vec::new(),
+            };
+            let pressed = state == ElementState::Pressed;
+            vec![Event::Button { button, pressed }]
+        }
+        WindowEvent::MouseWheel { delta, .. } => vec![Event::Wheel(match delta {
+            MouseScrollDelta::LineDelta(_, lines) => lines,
+            // Touch pads: pixels of about a line each.
+            MouseScrollDelta::PixelDelta(pixels) => pixels.y as f32 / 20.0,
+        })],
+        WindowEvent::ModifiersChanged(modifiers) => {
+            let state = modifiers.state();
+            vec![Event::Modifiers(Modifiers {
+                alt: state.alt_key(),
+                ctrl: state.control_key(),
+                shift: state.shift_key(),
+                mac_cmd: cfg!(target_os = "macos") && state.super_key(),
+                command: match cfg!(target_os = "macos") {
+                    true => state.super_key(),
+                    false => state.control_key(),
+                },
+            })]
+        }
+        // What an uncovered window shows is drawn anew.
+        WindowEvent::KeyboardInput { event, .. } => {
+            let pressed = event.state == ElementState::Pressed;
+            let side = SIDES
+                .iter()
+                .find(|(code, _)| event.physical_key == PhysicalKey::Code(*code));
+            if let Some((_, side)) = side {
+                return match pressed {
+                    true => vec![Event::See(*side)],
+                    false => Vec::new(),
+                };
+            }
+            let mut events = Vec::new();
+            let name = match &event.logical_key {
+                WinitKey::Named(named) => format!("{named:?}"),
+                WinitKey::Character(text) => text.to_uppercase(),
+                _ => String::new(),
+            };
+            if let Some(key) = Key::from_name(&name).filter(|_| !event.repeat) {
+                events.push(Event::Key { key, pressed });
+            }
+            let text = event.text.filter(|_| pressed).map(|t| t.to_string());
+            let text = text.filter(|t| t.chars().all(|c| !c.is_control()));
+            events.extend(text.map(Event::Text));
+            events
+        }
+        _ => Vec::new(),
+    }
+}

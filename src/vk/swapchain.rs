@@ -1,0 +1,295 @@
+//! The images of a window, one of which is shown at a time.
+
+use std::sync::Arc;
+
+use ash::{khr, vk};
+
+use super::{Commands, Device, Image, Surface};
+use crate::error::{Error, Result};
+
+/// What became of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shown {
+    Yes,
+    /// The window has another size by now, or none of its images was free in time: make the swapchain anew.
+    Stale,
+    /// The surface is gone: make both anew.
+    Lost,
+}
+
+/// Images of a window, each of which takes a copy of what was drawn.
+pub struct Swapchain {
+    raw: vk::SwapchainKHR,
+    loader: khr::swapchain::Device,
+    images: Vec<vk::Image>,
+    /// An image may be written; one frame is under way at a time.
+    free: vk::Semaphore,
+    /// `[image]`: it has been written.
+    written: Vec<vk::Semaphore>,
+    size: (u32, u32),
+    format: vk::Format,
+    device: Arc<Device>,
+    // Last: the surface outlives its swapchain.
+    _surface: Arc<Surface>,
+}
+
+/// Formats of a byte a channel that hold sRGB codes, each with what is drawn for it: a copy keeps the codes.
+const FORMATS: [(vk::Format, vk::Format); 4] = [
+    (vk::Format::B8G8R8A8_UNORM, vk::Format::B8G8R8A8_UNORM),
+    (vk::Format::R8G8B8A8_UNORM, vk::Format::R8G8B8A8_UNORM),
+    (vk::Format::B8G8R8A8_SRGB, vk::Format::B8G8R8A8_UNORM),
+    (vk::Format::R8G8B8A8_SRGB, vk::Format::R8G8B8A8_UNORM),
+];
+
+/// Nanoseconds until a frame is given up because the window frees no image: then the window still hears its events.
+const PATIENCE: u64 = 100_000_000;
+
+impl Swapchain {
+    /// For a window of so many pixels; none while it has no area. `before` is what the window had until now, of which nothing may
+    /// be under way.
+    ///
+    /// # Errors
+    /// A surface that is lost or takes no 8-bit sRGB.
+    pub fn new(
+        device: &Arc<Device>,
+        surface: &Arc<Surface>,
+        (width, height): (u32, u32),
+        before: Option<Self>,
+    ) -> Result<Option<Self>> {
+        let physical = device.candidate().raw;
+        // SAFETY: plain queries on a live surface of the device's instance.
+        let (capabilities, formats) = unsafe {
+            (
+                surface
+                    .loader
+                    .get_physical_device_surface_capabilities(physical, surface.raw)
+                    .map_err(device.error("asking for the window's size"))?,
+                surface
+                    .loader
+                    .get_physical_device_surface_formats(physical, surface.raw)
+                    .map_err(device.error("asking for the window's formats"))?,
+            )
+        };
+        let (least, most) = (capabilities.min_image_extent, capabilities.max_image_extent);
+        // All ones: the window takes the size of what is shown.
+        let extent = match capabilities.current_extent.width {
+            u32::MAX => vk::Extent2D {
+                width: width.clamp(least.width, most.width.max(least.width)),
+                height: height.clamp(least.height, most.height.max(least.height)),
+            },
+            _ => capabilities.current_extent,
+        };
+        if extent.width == 0 || extent.height == 0 {
+            return Ok(None);
+        }
+        let found = FORMATS.iter().find_map(|&(shown, drawn)| {
+            let of = formats.iter().find(|f| f.format == shown)?;
+            Some((*of, drawn))
+        });
+        let Some((shown, format)) = found else {
+            return Err(Error::Display(format!(
+                "the window takes no 8-bit sRGB on {}",
+                device.name()
+            )));
+        };
+        let wanted = capabilities.min_image_count + 1;
+        let count = match capabilities.max_image_count {
+            0 => wanted,
+            most => wanted.min(most),
+        };
+        let opaque = vk::CompositeAlphaFlagsKHR::OPAQUE;
+        let info = vk::SwapchainCreateInfoKHR::default()
+            .surface(surface.raw)
+            .min_image_count(count)
+            .image_format(shown.format)
+            .image_color_space(shown.color_space)
+            .image_extent(extent)
+            .image_array_layers(1)
+            .image_usage(vk::ImageUsageFlags::TRANSFER_DST)
+            .pre_transform(capabilities.current_transform)
+            .composite_alpha(if capabilities.supported_composite_alpha.contains(opaque) {
+                opaque
+            } else {
+                vk::CompositeAlphaFlagsKHR::INHERIT
+            })
+            .present_mode(vk::PresentModeKHR::FIFO)
+            .clipped(true)
+            .old_swapchain(before.as_ref().map_or(vk::SwapchainKHR::null(), |b| b.raw));
+        let loader = khr::swapchain::Device::new(&device.instance.raw, &device.raw);
+        // SAFETY: surface and old swapchain are alive, and nothing of the old one is under way.
+        let raw = unsafe { loader.create_swapchain(&info, None) }
+            .map_err(device.error("creating a swapchain"))?;
+        drop(before);
+        let mut swapchain = Self {
+            raw,
+            loader,
+            images: Vec::new(),
+            free: vk::Semaphore::null(),
+            written: Vec::new(),
+            size: (extent.width, extent.height),
+            format,
+            device: Arc::clone(device),
+            _surface: Arc::clone(surface),
+        };
+        device.set_name(raw, "window");
+        // SAFETY: a plain query on the swapchain.
+        swapchain.images = unsafe { swapchain.loader.get_swapchain_images(raw) }
+            .map_err(device.error("asking for the window's images"))?;
+        swapchain.free = semaphore(device, "window image free")?;
+        for &image in &swapchain.images {
+            device.set_name(image, "window image");
+            swapchain
+                .written
+                .push(semaphore(device, "window image written")?);
+        }
+        Ok(Some(swapchain))
+    }
+
+    pub fn size(&self) -> (u32, u32) {
+        self.size
+    }
+
+    /// What is to be drawn in.
+    pub fn format(&self) -> vk::Format {
+        self.format
+    }
+
+    /// Records what `record` says, which leaves `image` to be copied from, submits it, shows the image and waits until the
+    /// device is done with it.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn show(
+        &mut self,
+        image: &Image,
+        record: impl FnOnce(&Commands) -> Result<()>,
+    ) -> Result<Shown> {
+        assert_eq!(image.size(), self.size, "a frame has the window's size");
+        let device = &self.device;
+        // SAFETY: the semaphore is free: the last frame that waited for it is done.
+        let next = unsafe {
+            self.loader
+                .acquire_next_image(self.raw, PATIENCE, self.free, vk::Fence::null())
+        };
+        let (index, suboptimal) = match next {
+            Ok(found) => found,
+            Err(e) => return shown(device, e),
+        };
+        let place = index as usize;
+        let mut commands = Commands::record(device, "frame", |cmd| {
+            record(cmd)?;
+            self.copy(cmd, image, self.images[place]);
+            Ok(())
+        })?;
+        commands.submit_between(&[self.free], &[self.written[place]])?;
+        let (semaphores, swapchains, indices) = ([self.written[place]], [self.raw], [index]);
+        let info = vk::PresentInfoKHR::default()
+            .wait_semaphores(&semaphores)
+            .swapchains(&swapchains)
+            .image_indices(&indices);
+        let presented = {
+            let queue = device.queue.lock().unwrap_or_else(|e| e.into_inner());
+            // SAFETY: the image was acquired and is written before the semaphore is signalled; the queue is locked.
+            unsafe { self.loader.queue_present(*queue, &info) }
+        };
+        commands.wait()?;
+        match presented {
+            Ok(also) if also || suboptimal => Ok(Shown::Stale),
+            Ok(_) => Ok(Shown::Yes),
+            Err(e) => shown(device, e),
+        }
+    }
+
+    fn copy(&self, cmd: &Commands, image: &Image, to: vk::Image) {
+        use vk::ImageLayout as L;
+        let layers = vk::ImageSubresourceLayers::default()
+            .aspect_mask(vk::ImageAspectFlags::COLOR)
+            .layer_count(1);
+        let regions = [vk::ImageCopy::default()
+            .src_subresource(layers)
+            .dst_subresource(layers)
+            .extent(vk::Extent3D {
+                width: self.size.0,
+                height: self.size.1,
+                depth: 1,
+            })];
+        self.transition(cmd, to, L::UNDEFINED, L::TRANSFER_DST_OPTIMAL);
+        // SAFETY: the render pass left the image to be copied from; both have this size and formats of four bytes.
+        unsafe {
+            self.device.raw.cmd_copy_image(
+                cmd.raw,
+                image.raw,
+                L::TRANSFER_SRC_OPTIMAL,
+                to,
+                L::TRANSFER_DST_OPTIMAL,
+                &regions,
+            );
+        }
+        self.transition(cmd, to, L::TRANSFER_DST_OPTIMAL, L::PRESENT_SRC_KHR);
+    }
+
+    fn transition(
+        &self,
+        cmd: &Commands,
+        image: vk::Image,
+        old: vk::ImageLayout,
+        new: vk::ImageLayout,
+    ) {
+        let copies = vk::PipelineStageFlags2::ALL_TRANSFER;
+        let barriers = [vk::ImageMemoryBarrier2::default()
+            .src_stage_mask(copies)
+            .src_access_mask(vk::AccessFlags2::TRANSFER_WRITE)
+            .dst_stage_mask(copies)
+            .dst_access_mask(vk::AccessFlags2::TRANSFER_WRITE)
+            .old_layout(old)
+            .new_layout(new)
+            .image(image)
+            .subresource_range(
+                vk::ImageSubresourceRange::default()
+                    .aspect_mask(vk::ImageAspectFlags::COLOR)
+                    .level_count(1)
+                    .layer_count(1),
+            )];
+        let info = vk::DependencyInfo::default().image_memory_barriers(&barriers);
+        // SAFETY: the image is acquired, and in the layout `old` or its content may be lost.
+        unsafe { self.device.raw.cmd_pipeline_barrier2(cmd.raw, &info) };
+    }
+}
+
+/// What an answer other than success says of a frame.
+fn shown(device: &Device, answer: vk::Result) -> Result<Shown> {
+    match answer {
+        vk::Result::ERROR_OUT_OF_DATE_KHR | vk::Result::TIMEOUT | vk::Result::NOT_READY => {
+            Ok(Shown::Stale)
+        }
+        vk::Result::ERROR_SURFACE_LOST_KHR => Ok(Shown::Lost),
+        e => Err(device.error("showing a frame")(e)),
+    }
+}
+
+fn semaphore(device: &Device, name: &str) -> Result<vk::Semaphore> {
+    // SAFETY: a plain creation on a live device.
+    let semaphore = unsafe {
+        device
+            .raw
+            .create_semaphore(&vk::SemaphoreCreateInfo::default(), None)
+    }
+    .map_err(device.error("creating a semaphore"))?;
+    device.set_name(semaphore, name);
+    Ok(semaphore)
+}
+
+impl Drop for Swapchain {
+    fn drop(&mut self) {
+        // What presents waits for semaphores after the frame's fence is signalled.
+        let _ = self.device.wait_idle();
+        // SAFETY: nothing of the swapchain is under way; null handles are allowed.
+        unsafe {
+            self.device.raw.destroy_semaphore(self.free, None);
+            for &semaphore in &self.written {
+                self.device.raw.destroy_semaphore(semaphore, None);
+            }
+            self.loader.destroy_swapchain(self.raw, None);
+        }
+    }
+}
