@@ -166,6 +166,6 @@ fn form_factors_are_those_of_the_finer_size() {
         hemicube: 4 * FACE,
         ..settings(Some(4 * FACE))
     });
-    assert_eq!(fine.irradiance, all.irradiance);
+    assert!(fine.irradiance == all.irradiance);
     assert_silent();
 }

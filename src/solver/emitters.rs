@@ -29,7 +29,7 @@ pub(super) fn new(
 ) -> Result<Option<BatchLoop>> {
     let face = settings
         .emitter_face()
-        .min(device.limits().max_image_side / 3 & !1);
+        .min(device.limits().max_image_side / 6 * 2);
     let power: f64 = sources.iter().map(Source::emitted_power).sum();
     let least = LEAST * settings.grouping.max_power * power;
     let is_kept = |i: usize, source: &Source| {
