@@ -71,6 +71,7 @@ fn finer_faces_sharpen_shadows() {
             (floor_error(&build, &floor, &solved), solved.report)
         });
         println!("{estimator:?}: error {:.4}, finer {:.4}", plain.0, fine.0);
+        assert!(fine.0 <= SHARPER * plain.0);
         assert_eq!(
             (plain.1.emitter_hemicube, plain.1.emitter_hemicubes),
             (FACE, 0)
@@ -80,7 +81,6 @@ fn finer_faces_sharpen_shadows() {
             (fine.1.emitter_hemicube, fine.1.emitter_hemicubes),
             (4 * FACE, 2)
         );
-        assert!(fine.0 <= SHARPER * plain.0);
     }
     assert_silent();
 }
@@ -166,6 +166,6 @@ fn form_factors_are_those_of_the_finer_size() {
         hemicube: 4 * FACE,
         ..settings(Some(4 * FACE))
     });
-    assert_eq!(fine.irradiance, all.irradiance);
+    assert!(fine.irradiance == all.irradiance);
     assert_silent();
 }

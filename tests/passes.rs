@@ -52,6 +52,8 @@ fn solver(build: &Build, estimator: Estimator, culling: Culling, shots: u32) -> 
         estimator,
         culling,
         hemicube: FACE,
+        // The twins look at one batch after another, all of one size.
+        emitter_hemicube: Some(FACE),
         shots: Some(shots),
         batch: 6,
         ..Settings::default()

@@ -60,6 +60,8 @@ fn solver_by(estimator: Estimator, transport: Transport, k: u32, shots: Option<u
     let settings = Settings {
         estimator,
         hemicube: FACE,
+        // The twins look at one batch after another, all of one size.
+        emitter_hemicube: Some(FACE),
         batch: BATCH,
         shots,
         // Every shot is drawn, so that a batch is BATCH of them.
