@@ -1,6 +1,6 @@
 //! The window under a display in memory: what a script or real keys and mouse do shows on the screen, nothing is left behind, and
 //! the validation layer stays silent.
-#![cfg(target_os = "linux")]
+#![cfg(all(target_os = "linux", feature = "window"))]
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;

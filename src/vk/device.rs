@@ -20,6 +20,7 @@ pub struct Device {
     names: Option<ext::debug_utils::Device>,
     candidate: Candidate,
     limits: Limits,
+    #[cfg_attr(not(feature = "window"), allow(dead_code))] // read by swapchains, held by all
     pub(super) instance: Arc<Instance>,
 }
 
