@@ -1,6 +1,6 @@
 //! The window under a display in memory: what a script or real keys and mouse do shows on the screen, nothing is left behind, and
 //! the validation layer stays silent.
-#![cfg(target_os = "linux")]
+#![cfg(all(target_os = "linux", feature = "window"))]
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -255,7 +255,12 @@ fn opens_orbits_and_flies() {
     }
 }
 
-/// Once the view stays, the window shows what `render` draws, code by code; and without details nearly so.
+/// Mean difference of codes between a picture drawn in tiles of 96 pixels and in one: corners are rounded in the frame of their
+/// tile, so that of the samples along edges a few fall on the other side. Edges are on some 5 % of the pixels, and one sample of
+/// sixteen moves a pixel by less than 10 codes; of them one in 25 or fewer.
+const EDGES: f64 = 0.02;
+
+/// Once the view stays, the window shows what `render` draws; and without details nearly so.
 #[test]
 fn the_detailed_picture_is_that_of_render() {
     let room = Room::baked();
@@ -264,7 +269,8 @@ fn the_detailed_picture_is_that_of_render() {
         set detail on\ndetail\nscreenshot slots.png";
     view(room.path(), "room.safetensors", script);
     let (detail, saved) = (room.picture("detail.png"), room.picture("saved.png"));
-    assert!(detail == saved, "differ by {}", difference(&detail, &saved));
+    let found = difference(&detail, &saved);
+    assert!(found < EDGES, "differ by {found}");
     // One sample a pixel against sixteen: edges differ, walls by rounding.
     let (plain, slots) = (room.picture("plain.png"), room.picture("slots.png"));
     let found = difference(&plain, &slots);

@@ -118,11 +118,11 @@ pub fn run(options: &Options, start: Instant) -> Result<()> {
     for line in lines {
         tracing::info!("{line}");
     }
-    match mesolux::vk::left_bytes() {
-        0 => tracing::info!("closed: nothing is left in buffers and images"),
-        bytes => {
+    match mesolux::vk::left() {
+        None => tracing::info!("closed: nothing is left on the devices"),
+        Some((devices, bytes)) => {
             return Err(Error::Device(format!(
-                "{bytes} bytes in buffers and images were not freed"
+                "{devices} devices and {bytes} bytes in buffers and images were not freed"
             )));
         }
     }

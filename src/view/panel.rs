@@ -62,6 +62,7 @@ pub fn show(context: &egui::Context, told: &Told<'_>, changed: &mut Changed<'_>)
         .default_width(230.0)
         .resizable(false)
         .fade_in(false)
+        .vscroll(true)
         .show(context, |ui| {
             status(ui, told);
             ui.separator();

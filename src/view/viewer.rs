@@ -577,7 +577,8 @@ impl Viewer {
     fn marks(&self, context: &egui::Context, size: (u32, u32)) {
         let layer = egui::LayerId::new(egui::Order::Background, egui::Id::new("marks"));
         let painter = context.layer_painter(layer);
-        for (i, lamp) in self.lamps.iter().enumerate() {
+        let marked_lamps = self.lamps.iter().enumerate();
+        for (i, lamp) in marked_lamps.filter(|_| self.switches.panel) {
             if let Some(at) = lamp.position.and_then(|p| self.eye.pixel(p, size)) {
                 let name = (i == self.lamp).then_some(lamp.name.as_str());
                 overlay::lamp(&painter, at, self.scale, lamp.colour, name);

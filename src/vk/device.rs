@@ -20,6 +20,7 @@ pub struct Device {
     names: Option<ext::debug_utils::Device>,
     candidate: Candidate,
     limits: Limits,
+    #[cfg_attr(not(feature = "window"), allow(dead_code))] // read by swapchains, held by all
     pub(super) instance: Arc<Instance>,
 }
 
@@ -116,6 +117,7 @@ impl Device {
         };
         // SAFETY: the family and index were asked for above.
         let queue = unsafe { raw.get_device_queue(family, 0) };
+        DEVICES.fetch_add(1, Ordering::Relaxed);
         let names = instance
             .debug_utils
             .then(|| ext::debug_utils::Device::new(raw_instance, &raw));
@@ -193,14 +195,23 @@ impl Device {
 /// Bytes in buffers and images that devices of this process took with them when they went; anything but 0 is a leak.
 static LEFT_BYTES: AtomicU64 = AtomicU64::new(0);
 
-/// Bytes in buffers and images that were not freed before their device; 0 is the only good answer.
-pub fn left_bytes() -> u64 {
-    LEFT_BYTES.load(Ordering::Relaxed)
+/// Devices of this process that live: whatever is left of one keeps it.
+static DEVICES: AtomicU64 = AtomicU64::new(0);
+
+/// What is left when everything should be gone: devices that something still holds, and bytes in buffers and images that were not
+/// freed before their device. None is the only good answer.
+pub fn left() -> Option<(u64, u64)> {
+    let left = (
+        DEVICES.load(Ordering::Relaxed),
+        LEFT_BYTES.load(Ordering::Relaxed),
+    );
+    (left != (0, 0)).then_some(left)
 }
 
 impl Drop for Device {
     fn drop(&mut self) {
         LEFT_BYTES.fetch_add(self.allocated_bytes(), Ordering::Relaxed);
+        DEVICES.fetch_sub(1, Ordering::Relaxed);
         // SAFETY: every object of the device holds it by `Arc`, so none is left; the allocator goes before the device.
         unsafe {
             let _ = self.raw.device_wait_idle();

@@ -23,7 +23,7 @@ pub use buffer::{Buffer, BufferUse};
 pub use commands::Commands;
 pub use compute::ComputePipeline;
 pub use descriptors::{Bind, Binding, DescriptorLayout, DescriptorSet};
-pub use device::{Device, Limits, left_bytes};
+pub use device::{Device, Limits, left};
 pub use graphics::{
     AfterPass, Attachment, Framebuffer, GraphicsPipeline, GraphicsState, RenderPass,
     VertexAttribute,
