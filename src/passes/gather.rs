@@ -119,8 +119,8 @@ fn sets(pipeline: &ComputePipeline, name: &str, binds: &[Vec<&Buffer>; 2]) -> Re
 }
 
 /// Has the elements without and with relief gather emitted light in the batches that have some.
-fn command_emitting(device: &Arc<Device>, batch: &Batch, elements: [u32; 2]) -> Result<()> {
-    let commands = elements.map(|count| ReceiverList::idle(groups(count)));
+fn command_emitting(device: &Arc<Device>, batch: &Batch, factors: &FactorBuffers) -> Result<()> {
+    let commands = kinds(factors).map(|kind| ReceiverList::idle(groups(kind.elements)));
     write(device, &batch.emitting_commands, &commands)
 }
 
@@ -128,25 +128,32 @@ fn command_emitting(device: &Arc<Device>, batch: &Batch, elements: [u32; 2]) -> 
 const EMITTED: u32 = 0;
 const REFLECTED: u32 = 1;
 
+/// Fresh slots, and all.
+type Slots = (u32, u32);
+
+fn slots_of(batch: &Batch) -> Slots {
+    (batch.slot_count, batch.all_slots())
+}
+
 /// Over the elements without relief.
-fn plain(batch: &Batch, factors: &FactorBuffers, reflected: u32) -> Parameters {
+fn plain((fresh_slots, slot_count): Slots, factors: &FactorBuffers, reflected: u32) -> Parameters {
     Parameters {
         first_element: 0,
         element_count: factors.plain_count,
-        fresh_slots: batch.slot_count,
-        slot_count: batch.all_slots(),
+        fresh_slots,
+        slot_count,
         first_block: 0,
         reflected,
     }
 }
 
 /// Over the elements with a relief.
-fn meso(batch: &Batch, factors: &FactorBuffers, reflected: u32) -> Parameters {
+fn meso(slots: Slots, factors: &FactorBuffers, reflected: u32) -> Parameters {
     Parameters {
         first_element: factors.plain_count,
         element_count: factors.meso_count,
         first_block: factors.plain_blocks(),
-        ..plain(batch, factors, reflected)
+        ..plain(slots, factors, reflected)
     }
 }
 
@@ -213,37 +220,21 @@ impl Gather {
     pub fn bind(
         &self,
         device: &Arc<Device>,
-        scene: &SceneBuffers,
         state: &State,
         batch: &Batch,
         factors: &FactorBuffers,
     ) -> Result<Sets> {
-        command_emitting(device, batch, [scene.element_count, 0])?;
+        command_emitting(device, batch, factors)?;
         let binds = binds(state, batch, factors, &factors.fresh);
         sets(&self.pipeline, "gather", &binds)
     }
 
-    pub fn record(&self, cmd: &Commands, sets: &Sets, scene: &SceneBuffers, batch: &Batch) {
-        let all = Kind {
-            elements: scene.element_count,
-            command: 0,
-        };
+    pub fn record(&self, cmd: &Commands, sets: &Sets, batch: &Batch, factors: &FactorBuffers) {
+        let [all, _] = kinds(factors);
         for light in [EMITTED, REFLECTED] {
-            let parameters = Parameters {
-                first_element: 0,
-                element_count: scene.element_count,
-                fresh_slots: batch.slot_count,
-                slot_count: batch.all_slots(),
-                first_block: 0,
-                reflected: light,
-            };
-            gather_light(
-                cmd,
-                (&self.pipeline, sets),
-                &parameters,
-                batch,
-                (light, all),
-            );
+            let parameters = plain(slots_of(batch), factors, light);
+            let (gather, light) = ((&self.pipeline, sets), (light, all));
+            gather_light(cmd, gather, &parameters, batch, light);
         }
     }
 }
@@ -270,9 +261,8 @@ impl GatherRelief {
         factors: &FactorBuffers,
         relief: &ReliefBuffers,
     ) -> Result<ReliefSets> {
-        let (plain_count, meso_count) = (factors.plain_count, factors.meso_count);
-        command_emitting(device, batch, [plain_count, meso_count])?;
-        let loose = ReceiverList::idle(groups(meso_count));
+        command_emitting(device, batch, factors)?;
+        let loose = ReceiverList::idle(groups(factors.meso_count));
         write(device, &batch.loose_command, &[loose])?;
         let sending = [&relief.exits, &scene.sources, &scene.balls];
         let plain = binds(state, batch, factors, &factors.fresh);
@@ -309,9 +299,9 @@ impl GatherRelief {
     ) {
         let [without, with] = kinds(factors);
         for light in [EMITTED, REFLECTED] {
-            let from = by_direction(relief, plain(batch, factors, light));
+            let from = by_direction(relief, plain(slots_of(batch), factors, light));
             let to = ToReliefParameters {
-                common: by_direction(relief, meso(batch, factors, light)),
+                common: by_direction(relief, meso(slots_of(batch), factors, light)),
                 first_slot: 0,
                 part: EVERYTHING,
             };
@@ -338,8 +328,8 @@ impl GatherRelief {
     ) {
         let [without, with] = kinds(factors);
         for light in [EMITTED, REFLECTED] {
-            let from = plain(batch, factors, light);
-            let to = meso(batch, factors, light);
+            let from = plain(slots_of(batch), factors, light);
+            let to = meso(slots_of(batch), factors, light);
             let moments = ToReliefParameters {
                 common: evenly(relief, to),
                 first_slot: 0,
@@ -370,14 +360,8 @@ impl GatherRelief {
         let size = [groups(factors.meso_count), 1, 1];
         for light in [EMITTED, REFLECTED] {
             for first_slot in (0..source_count).step_by(RECALLED_SLOTS) {
-                let common = Parameters {
-                    first_element: factors.plain_count,
-                    element_count: factors.meso_count,
-                    fresh_slots: 0,
-                    slot_count: source_count.min(first_slot + RECALLED_SLOTS as u32),
-                    first_block: factors.plain_blocks(),
-                    reflected: light,
-                };
+                let end = source_count.min(first_slot + RECALLED_SLOTS as u32);
+                let common = meso((0, end), factors, light);
                 let parameters = ToReliefParameters {
                     common: evenly(relief, common),
                     first_slot,

@@ -109,7 +109,7 @@ impl Estimate {
                     .transpose()?,
                 gather: match (gather, relief) {
                     (GatherBy::Plain(gather), _) => {
-                        GatherSets::Plain(gather.bind(device, scene, state, batch, factors)?)
+                        GatherSets::Plain(gather.bind(device, state, batch, factors)?)
                     }
                     (GatherBy::Relief(gather), Some(relief)) => {
                         let lit = (scene, state);
@@ -167,7 +167,7 @@ impl Estimate {
                 }
                 match (gather, gather_sets, relief) {
                     (GatherBy::Plain(gather), GatherSets::Plain(sets), _) => {
-                        gather.record(cmd, sets, on.scene, batch);
+                        gather.record(cmd, sets, batch, factors);
                     }
                     (GatherBy::Relief(gather), GatherSets::Relief(sets), Some(relief)) => {
                         match sending {

@@ -1,8 +1,11 @@
 //! The window's state: what it shows, and how it changes.
 
+mod frame;
+mod layout;
+
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use glam::Vec3;
 use winit::window::Window;
@@ -13,19 +16,17 @@ use super::detailer::{Detailer, Drawn, PAUSE, Wanted};
 use super::event::Event;
 use super::input::Input;
 use super::lamps::{Lamp, lamps, lit};
-use super::panel::{self, Asked, Changed, Told};
 use super::panel_pass::PanelPass;
-use super::screen::{Captured, Screen};
+use super::screen::Screen;
 use super::snapshot::{Progress, Snapshot};
-use super::surface_pass::{self, SurfacePass};
+use super::surface_pass::SurfacePass;
 use super::switches::Switches;
 use super::timing::Timing;
-use super::{Options, Wake, overlay};
+use super::{Options, Wake};
 use crate::error::{Error, Result};
 use crate::render::Light;
 use crate::scene::Scene;
 use crate::solver::{ItemPicture, Settings};
-use crate::vk::Shown;
 
 pub struct Viewer {
     // The threads first: they stop before what they show is gone.
@@ -386,233 +387,4 @@ impl Viewer {
             }
         }
     }
-
-    /// Asks for a detailed picture once the view has stayed for a while, and for none while it changes.
-    fn want_detail(&mut self, size: (u32, u32)) {
-        let now = self.wanted_now(size);
-        match &self.seen {
-            Some((before, _)) if before.looks_like(&now) => {}
-            _ => {
-                self.seen = Some((now.clone(), Instant::now()));
-                if self.wanted.take().is_some() {
-                    self.detailer.want(None);
-                }
-            }
-        }
-        let since = self.seen.as_ref().map(|(_, since)| since.elapsed());
-        let stays = since.is_some_and(|since| since >= PAUSE);
-        if !(self.switches.detail && stays && self.is_lit()) {
-            return;
-        }
-        // While a bake goes on, a picture is finished before a brighter one is begun.
-        let same = |wanted: &Wanted| Arc::ptr_eq(&wanted.snapshot, &now.snapshot);
-        let finished = self
-            .detail
-            .as_ref()
-            .is_some_and(|drawn| drawn.size == size && drawn.of.looks_like(&now));
-        let ask = match &self.wanted {
-            None => true,
-            Some(wanted) => !same(wanted) && (finished || now.snapshot.progress.done),
-        };
-        if ask {
-            self.wanted = Some(now.clone());
-            self.detailer.want(Some(now));
-        }
-    }
-
-    /// Draws a frame if the window has an area; returns what was read back of it, where that was asked for.
-    ///
-    /// # Errors
-    /// A device or a display that fails.
-    pub fn frame(&mut self) -> Result<bool> {
-        let begin = Instant::now();
-        let unanswered = self.unanswered.take();
-        self.dirty = false;
-        self.update()?;
-        let seconds = begin.duration_since(self.last_frame).as_secs_f64();
-        self.last_frame = begin;
-        self.fly(seconds.min(0.1));
-        let Some(size) = self.screen.fit(self.size, self.stale)? else {
-            return Ok(false);
-        };
-        self.stale = false;
-        let primitives = self.panel(size)?;
-        self.want_detail(size);
-        let prepared = self.panel_pass.prepare(&primitives, size, self.scale)?;
-        let rows = self.eye.rows(&self.scene, size);
-        let [all, direct, emission] = match self.switches.part {
-            Light::Global => [1.0, 0.0, 1.0],
-            Light::Direct => [0.0, 1.0, 1.0],
-            Light::Indirect => [1.0, -1.0, 0.0],
-        };
-        let shown = surface_pass::Shown {
-            exposure: self.exposure().exp2(),
-            ambient: self.ambient(),
-            parts: [all, direct, emission],
-            elements: self.switches.elements,
-            sources: self.switches.sources,
-            picture: self.shown_detail().is_some(),
-            chosen: self.input.chosen.or(self.input.hovered),
-        };
-        let capture = self.capture.is_some();
-        let (surfaces, panel_pass) = (&self.surfaces, &self.panel_pass);
-        let (answer, captured) = self.screen.show(capture, |cmd| {
-            if shown.picture {
-                panel_pass.record_picture(cmd, &prepared);
-            }
-            // The picture has all but what lies over the surfaces.
-            if !shown.picture || shown.elements || shown.sources || shown.chosen.is_some() {
-                surfaces.record(cmd, &rows, &shown);
-            }
-            panel_pass.record(cmd, &prepared);
-        })?;
-        if answer != Shown::Yes {
-            self.stale = true;
-            self.unanswered = unanswered;
-            return Ok(false);
-        }
-        self.timing.frame(begin.elapsed(), self.is_baking());
-        if let Some(since) = unanswered {
-            self.timing.answer(since);
-        }
-        if let Some((epoch, since)) = self.edited
-            && self.snapshot.epoch >= epoch
-        {
-            self.timing.relit(since);
-            self.edited = None;
-        }
-        if self.is_lit() {
-            self.timing.first_light(self.start);
-        }
-        if let (Some(path), Some(captured)) = (self.capture.take(), captured) {
-            write(&path, &captured)?;
-        }
-        Ok(true)
-    }
-
-    /// Lays out the panel and what lies over the view; takes what was changed there.
-    fn panel(&mut self, (width, height): (u32, u32)) -> Result<Vec<egui::ClippedPrimitive>> {
-        let points = egui::vec2(width as f32, height as f32) / self.scale;
-        let mut raw = self.input.take_raw();
-        raw.screen_rect = Some(egui::Rect::from_min_size(egui::Pos2::ZERO, points));
-        raw.time = Some(self.start.elapsed().as_secs_f64());
-        raw.viewports
-            .entry(egui::ViewportId::ROOT)
-            .or_default()
-            .native_pixels_per_point = Some(self.scale);
-        let context = self.egui.clone();
-        let switches = self.switches;
-        let mut asked = Vec::new();
-        let output = context.run(raw, |context| {
-            self.marks(context, (width, height));
-            if self.switches.panel {
-                asked = self.controls(context);
-            }
-        });
-        if switches.items && !self.switches.items {
-            self.items = None;
-        }
-        for asked in asked {
-            match asked {
-                Asked::Camera(i) => self.see_camera(i),
-                Asked::SeeAll => self.eye.see_all(),
-                Asked::Save => self.save(None),
-                Asked::Bake => self.bake(),
-                Asked::Relight => self.relight(),
-            }
-        }
-        self.panel_pass.update(&output.textures_delta)?;
-        let delay = output
-            .viewport_output
-            .get(&egui::ViewportId::ROOT)
-            .map_or(Duration::MAX, |viewport| viewport.repaint_delay);
-        // Later than an hour is never.
-        let soon = delay < Duration::from_secs(3600);
-        self.repaint = soon.then(|| Instant::now() + delay);
-        Ok(context.tessellate(output.shapes, output.pixels_per_point))
-    }
-
-    fn controls(&mut self, context: &egui::Context) -> Vec<Asked> {
-        let cameras: Vec<_> = self.scene.cameras.iter().map(|c| c.name.clone()).collect();
-        let baking = self.is_baking();
-        let marked = self.input.chosen.or(self.input.hovered);
-        let device = self.screen.device().name().to_owned();
-        let told = Told {
-            scene: &self.scene.name,
-            triangles: self.scene.triangles.len(),
-            device: &device,
-            cameras: &cameras,
-            progress: self.progress,
-            baking,
-            frame: self.timing.last(baking),
-            detail: self.shown_detail().map(|drawn| drawn.seconds),
-            has_relief: self.base.materials.iter().any(|m| m.has_relief()),
-            messages: &self.messages,
-            bounds: &self.bounds,
-            element: marked.map(|e| self.describe(e)),
-        };
-        let mut changed = Changed {
-            switches: &mut self.switches,
-            lamps: &mut self.lamps,
-            lamp: &mut self.lamp,
-            directions: &mut self.directions,
-            relief_scale: &mut self.relief_scale,
-        };
-        panel::show(context, &told, &mut changed)
-    }
-
-    /// An element in a line.
-    fn describe(&self, element: u32) -> String {
-        let e = element as usize;
-        let material = self.scene.triangles[e].material as usize;
-        let name = &self.scene.materials[material].name;
-        let light = self.snapshot.irradiance[e];
-        format!(
-            "element {element}, {name}: E = {:.3}, {:.3}, {:.3} W/m²",
-            light.x, light.y, light.z
-        )
-    }
-
-    /// What lies over the view: marks of lights, light by direction, an item buffer.
-    fn marks(&self, context: &egui::Context, size: (u32, u32)) {
-        let layer = egui::LayerId::new(egui::Order::Background, egui::Id::new("marks"));
-        let painter = context.layer_painter(layer);
-        let marked_lamps = self.lamps.iter().enumerate();
-        for (i, lamp) in marked_lamps.filter(|_| self.switches.panel) {
-            if let Some(at) = lamp.position.and_then(|p| self.eye.pixel(p, size)) {
-                let name = (i == self.lamp).then_some(lamp.name.as_str());
-                overlay::lamp(&painter, at, self.scale, lamp.colour, name);
-            }
-        }
-        let exposure = self.exposure().exp2();
-        let picture = |name: &str, image: egui::ColorImage, place: egui::Rect| {
-            let texture = context.load_texture(name, image, egui::TextureOptions::LINEAR);
-            let uv = egui::Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
-            painter.image(texture.id(), place, uv, egui::Color32::WHITE);
-            // Drawn in this frame: the texture lives until the next one.
-            context.data_mut(|data| data.insert_temp(egui::Id::new(name), texture));
-        };
-        let screen = context.content_rect();
-        let marked = self.input.chosen.or(self.input.hovered);
-        if self.switches.slots
-            && let (Some(relief), Some(e)) = (&self.snapshot.relief, marked)
-            && let Some(image) = overlay::hemisphere(relief, e, exposure)
-        {
-            let at = self.input.pointer.unwrap_or_default();
-            let corner = egui::pos2(at.0 / self.scale + 16.0, at.1 / self.scale + 16.0);
-            let place = egui::Rect::from_min_size(corner, egui::vec2(96.0, 96.0));
-            picture("hemisphere", image, place);
-        }
-        if let Some(items) = self.items.as_ref().filter(|_| self.switches.items) {
-            let image = overlay::items(items, &self.snapshot.irradiance, exposure);
-            let side = 0.35 * screen.width().min(screen.height());
-            let corner = screen.right_bottom() - egui::vec2(side + 8.0, side + 8.0);
-            let place = egui::Rect::from_min_size(corner, egui::vec2(side, side));
-            picture("items", image, place);
-        }
-    }
-}
-
-fn write(path: &std::path::Path, captured: &Captured) -> Result<()> {
-    crate::render::write_png(path, captured.size, &captured.codes)
 }

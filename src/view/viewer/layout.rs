@@ -1,0 +1,135 @@
+//! What lies over the view: the panel, marks of lights, light by direction, an item buffer.
+
+use std::time::{Duration, Instant};
+
+use super::Viewer;
+use crate::error::Result;
+use crate::view::overlay;
+use crate::view::panel::{self, Asked, Changed, Told};
+
+impl Viewer {
+    /// Lays out the panel and what lies over the view; takes what was changed there.
+    pub(super) fn panel(
+        &mut self,
+        (width, height): (u32, u32),
+    ) -> Result<Vec<egui::ClippedPrimitive>> {
+        let points = egui::vec2(width as f32, height as f32) / self.scale;
+        let mut raw = self.input.take_raw();
+        raw.screen_rect = Some(egui::Rect::from_min_size(egui::Pos2::ZERO, points));
+        raw.time = Some(self.start.elapsed().as_secs_f64());
+        raw.viewports
+            .entry(egui::ViewportId::ROOT)
+            .or_default()
+            .native_pixels_per_point = Some(self.scale);
+        let context = self.egui.clone();
+        let switches = self.switches;
+        let mut asked = Vec::new();
+        let output = context.run(raw, |context| {
+            self.marks(context, (width, height));
+            if self.switches.panel {
+                asked = self.controls(context);
+            }
+        });
+        if switches.items && !self.switches.items {
+            self.items = None;
+        }
+        for asked in asked {
+            match asked {
+                Asked::Camera(i) => self.see_camera(i),
+                Asked::SeeAll => self.eye.see_all(),
+                Asked::Save => self.save(None),
+                Asked::Bake => self.bake(),
+                Asked::Relight => self.relight(),
+            }
+        }
+        self.panel_pass.update(&output.textures_delta)?;
+        let delay = output
+            .viewport_output
+            .get(&egui::ViewportId::ROOT)
+            .map_or(Duration::MAX, |viewport| viewport.repaint_delay);
+        // Later than an hour is never.
+        let soon = delay < Duration::from_secs(3600);
+        self.repaint = soon.then(|| Instant::now() + delay);
+        Ok(context.tessellate(output.shapes, output.pixels_per_point))
+    }
+
+    fn controls(&mut self, context: &egui::Context) -> Vec<Asked> {
+        let cameras: Vec<_> = self.scene.cameras.iter().map(|c| c.name.clone()).collect();
+        let baking = self.is_baking();
+        let marked = self.input.chosen.or(self.input.hovered);
+        let device = self.screen.device().name().to_owned();
+        let told = Told {
+            scene: &self.scene.name,
+            triangles: self.scene.triangles.len(),
+            device: &device,
+            cameras: &cameras,
+            progress: self.progress,
+            baking,
+            frame: self.timing.last(baking),
+            detail: self.shown_detail().map(|drawn| drawn.seconds),
+            has_relief: self.base.materials.iter().any(|m| m.has_relief()),
+            messages: &self.messages,
+            bounds: &self.bounds,
+            element: marked.map(|e| self.describe(e)),
+        };
+        let mut changed = Changed {
+            switches: &mut self.switches,
+            lamps: &mut self.lamps,
+            lamp: &mut self.lamp,
+            directions: &mut self.directions,
+            relief_scale: &mut self.relief_scale,
+        };
+        panel::show(context, &told, &mut changed)
+    }
+
+    /// An element in a line.
+    fn describe(&self, element: u32) -> String {
+        let e = element as usize;
+        let material = self.scene.triangles[e].material as usize;
+        let name = &self.scene.materials[material].name;
+        let light = self.snapshot.irradiance[e];
+        format!(
+            "element {element}, {name}: E = {:.3}, {:.3}, {:.3} W/m²",
+            light.x, light.y, light.z
+        )
+    }
+
+    /// What lies over the view: marks of lights, light by direction, an item buffer.
+    fn marks(&self, context: &egui::Context, size: (u32, u32)) {
+        let layer = egui::LayerId::new(egui::Order::Background, egui::Id::new("marks"));
+        let painter = context.layer_painter(layer);
+        let marked_lamps = self.lamps.iter().enumerate();
+        for (i, lamp) in marked_lamps.filter(|_| self.switches.panel) {
+            if let Some(at) = lamp.position.and_then(|p| self.eye.pixel(p, size)) {
+                let name = (i == self.lamp).then_some(lamp.name.as_str());
+                overlay::lamp(&painter, at, self.scale, lamp.colour, name);
+            }
+        }
+        let exposure = self.exposure().exp2();
+        let picture = |name: &str, image: egui::ColorImage, place: egui::Rect| {
+            let texture = context.load_texture(name, image, egui::TextureOptions::LINEAR);
+            let uv = egui::Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
+            painter.image(texture.id(), place, uv, egui::Color32::WHITE);
+            // Drawn in this frame: the texture lives until the next one.
+            context.data_mut(|data| data.insert_temp(egui::Id::new(name), texture));
+        };
+        let screen = context.content_rect();
+        let marked = self.input.chosen.or(self.input.hovered);
+        if self.switches.slots
+            && let (Some(relief), Some(e)) = (&self.snapshot.relief, marked)
+            && let Some(image) = overlay::hemisphere(relief, e, exposure)
+        {
+            let at = self.input.pointer.unwrap_or_default();
+            let corner = egui::pos2(at.0 / self.scale + 16.0, at.1 / self.scale + 16.0);
+            let place = egui::Rect::from_min_size(corner, egui::vec2(96.0, 96.0));
+            picture("hemisphere", image, place);
+        }
+        if let Some(items) = self.items.as_ref().filter(|_| self.switches.items) {
+            let image = overlay::items(items, &self.snapshot.irradiance, exposure);
+            let side = 0.35 * screen.width().min(screen.height());
+            let corner = screen.right_bottom() - egui::vec2(side + 8.0, side + 8.0);
+            let place = egui::Rect::from_min_size(corner, egui::vec2(side, side));
+            picture("items", image, place);
+        }
+    }
+}
