@@ -10,34 +10,38 @@ layout(push_constant, scalar) uniform Parameters {
     uint count;
 };
 
-float point(ivec2 at) {
-    ivec2 size = ivec2(columns, rows);
-    ivec2 wrapped = at % size;
-    wrapped += size * ivec2(lessThan(wrapped, ivec2(0)));
-    return heights[wrapped.y * columns + wrapped.x];
+// The cell at a place, in the first period. A quotient of integers rounds to no other integer, and division of integers is dear.
+vec2 cell_at(vec2 at) {
+    vec2 low = floor(at);
+    vec2 size = vec2(columns, rows);
+    return low - size * floor(low / size);
+}
+
+// The corner at a facet's right angle, and those to its right (or left) and above (or below) it.
+vec3 corners_of(vec2 cell, bool lower) {
+    vec2 next = cell + 1.0;
+    next = mix(next, vec2(0.0), equal(next, vec2(columns, rows)));
+    uvec2 i = uvec2(cell);
+    uvec2 j = uvec2(next);
+    float right = heights[i.y * columns + j.x];
+    float up = heights[j.y * columns + i.x];
+    uvec2 square = lower ? i : j;
+    return vec3(heights[square.y * columns + square.x], lower ? vec2(right, up) : vec2(up, right));
 }
 
 // Height of the surface at a place in cells.
 float height_at(vec2 at) {
-    vec2 low = floor(at);
-    ivec2 i = ivec2(low);
-    vec2 f = at - low;
-    float right = point(i + ivec2(1, 0));
-    float up = point(i + ivec2(0, 1));
-    if (f.x + f.y <= 1.0) {
-        float corner = point(i);
-        return corner + f.x * (right - corner) + f.y * (up - corner);
-    }
-    float corner = point(i + ivec2(1, 1));
-    return corner + (1.0 - f.x) * (up - corner) + (1.0 - f.y) * (right - corner);
+    vec2 f = at - floor(at);
+    bool lower = f.x + f.y <= 1.0;
+    vec3 corner = corners_of(cell_at(at), lower);
+    vec2 from = lower ? f : 1.0 - f;
+    return corner.x + dot(from, corner.yz - corner.x);
 }
 
 // The facet at a place in cells.
 uint facet_at(vec2 at) {
-    vec2 low = floor(at);
-    vec2 f = at - low;
-    vec2 size = vec2(columns, rows);
-    uvec2 cell = uvec2(low - size * floor(low / size));
+    vec2 f = at - floor(at);
+    uvec2 cell = uvec2(cell_at(at));
     return 2 * (cell.y * columns + cell.x) + (f.x + f.y <= 1.0 ? 0 : 1);
 }
 
@@ -47,15 +51,12 @@ struct Facet {
 };
 
 Facet facet_of(uint facet) {
-    uint cell = facet / 2;
-    ivec2 i = ivec2(cell % columns, cell / columns);
-    float right = point(i + ivec2(1, 0));
-    float up = point(i + ivec2(0, 1));
+    vec2 cell = vec2(facet / 2 % columns, facet / 2 / columns);
     bool lower = facet % 2 == 0;
-    float corner = point(lower ? i : i + ivec2(1, 1));
-    vec2 slope = lower ? vec2(right - corner, up - corner) : vec2(corner - up, corner - right);
+    vec3 corner = corners_of(cell, lower);
+    vec2 slope = (corner.yz - corner.x) * (lower ? 1.0 : -1.0);
     float share = lower ? 1.0 / 3.0 : 2.0 / 3.0;
-    return Facet(vec3(vec2(i) + share, (corner + right + up) / 3.0), normalize(vec3(-slope.x, -slope.y / aspect, 1.0)));
+    return Facet(vec3(cell + share, (corner.x + corner.y + corner.z) / 3.0), normalize(vec3(-slope.x, -slope.y / aspect, 1.0)));
 }
 
 // Distances along a straight line at which it crosses the edges of facets, in order. Between two crossings the surface

@@ -66,7 +66,7 @@ impl Response {
         let k = directions.count();
         let alike = 1.0 / normals.len() as f32;
         let share = |q: usize| shares.map_or(alike, |shares| shares[q]);
-        let columns: Vec<(Vec<Block>, Vec3)> = (0..k)
+        let (columns, emission): (Vec<Vec<Block>>, Vec<Vec3>) = (0..k)
             .map(|out| {
                 let direction = directions.centre(out);
                 let above = || (0..normals.len()).filter(|&q| normals[q].dot(direction) > 0.0);
@@ -75,25 +75,28 @@ impl Response {
                 let block = [sent.x, sent.y, sent.z].map(|s| Vec3::new(0.0, 0.0, s));
                 (vec![block; k], emission)
             })
-            .collect();
-        Self::new(directions, &columns)
+            .unzip();
+        Self::new(directions, &columns, emission)
     }
 
-    /// From the columns, `[out]` of `[in]`, and the emission.
-    pub(super) fn new(directions: &Directions, columns: &[(Vec<Block>, Vec3)]) -> Self {
+    /// From the columns, `[out]` of `[in]`, and the emission, `[out]`.
+    pub(super) fn new(
+        directions: &Directions,
+        columns: &[Vec<Block>],
+        emission: Vec<Vec3>,
+    ) -> Self {
         let k = directions.count();
         let shares = slot_shares(directions);
         let mut matrix = Vec::with_capacity(k * k);
         let mut albedo = vec![[Vec3::ZERO; 3]; k];
         for (slot, total) in albedo.iter_mut().enumerate() {
-            for (out, (column, _)) in columns.iter().enumerate() {
+            for (out, column) in columns.iter().enumerate() {
                 matrix.push(column[slot]);
                 for c in 0..3 {
                     total[c] += shares[out] as f32 * column[slot][c];
                 }
             }
         }
-        let emission: Vec<Vec3> = columns.iter().map(|c| c.1).collect();
         let mean_emission = emission
             .iter()
             .zip(&shares)

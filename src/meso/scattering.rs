@@ -7,6 +7,7 @@
 //! light is kept, not that of each footprint.
 
 use glam::{DVec2, DVec3, Vec3};
+use nalgebra::{DMatrix, DVectorView};
 use rayon::prelude::*;
 
 use super::exchange::Exchange;
@@ -26,11 +27,11 @@ const OF_TILE: f64 = 1e-3;
 pub struct Scattering<'a> {
     directions: Directions,
     field: &'a HeightField,
-    reflectance: &'a [Vec3],
     facets: Facets,
-    exchange: Exchange,
-    /// a, `[facet][in]`.
-    vectors: Vec<Vec3>,
+    /// (1 − ρG)⁻¹ ρ a: radiosity of the facets for the moment of each slot, a column for each facet of `[in][axis][colour]`.
+    lit: DMatrix<f32>,
+    /// (1 − ρG)⁻¹ 1: for light that each facet emits, `[facet]`.
+    glowing: Vec<Vec3>,
     /// For each slot, the fine cells that a bilinear look-up takes from it, with their weights.
     looks: Vec<Vec<(usize, f32)>>,
 }
@@ -42,21 +43,40 @@ impl<'a> Scattering<'a> {
         field: &'a HeightField,
         visibility: &Visibility,
         normals: &[DVec3],
-        reflectance: &'a [Vec3],
+        reflectance: &[Vec3],
     ) -> Self {
         let facets = Facets::new(field, normals, visibility);
+        let exchange = Exchange::new(visibility, &facets.sky);
         let fit = Fit::new(directions);
+        // a, `[facet][in]`.
+        let vectors: Vec<Vec3> = facets
+            .transfer
+            .par_chunks(CELLS)
+            .flat_map_iter(|row| fit.apply(row))
+            .collect();
+        let k = directions.count();
+        // `[in][axis]` of `[facet]`
+        let columns: Vec<Vec<Vec3>> = (0..3 * k)
+            .into_par_iter()
+            .map(|column| {
+                let vectors = vectors[column / 3..].iter().step_by(k);
+                let sent = vectors.zip(reflectance).map(|(v, r)| v[column % 3] * *r);
+                bounced(&exchange, sent.collect(), reflectance)
+            })
+            .collect();
+        let mut lit = DMatrix::zeros(9 * k, field.facet_count());
+        (lit.as_mut_slice().par_chunks_mut(9 * k).enumerate()).for_each(|(q, facet)| {
+            for (at, column) in facet.chunks_exact_mut(3).zip(&columns) {
+                at.copy_from_slice(&column[q].to_array());
+            }
+        });
+        let glowing = bounced(&exchange, vec![Vec3::ONE; field.facet_count()], reflectance);
         Self {
             directions: *directions,
             field,
-            reflectance,
-            vectors: facets
-                .transfer
-                .par_chunks(CELLS)
-                .flat_map_iter(|row| fit.apply(row))
-                .collect(),
-            exchange: Exchange::new(visibility, &facets.sky),
             facets,
+            lit,
+            glowing,
             looks: slots_of_cells(directions),
         }
     }
@@ -64,94 +84,82 @@ impl<'a> Scattering<'a> {
     /// Of the whole tile.
     pub fn whole(&self) -> Response {
         let k = self.directions.count();
-        let columns: Vec<(Vec<Block>, Vec3)> = (0..k)
+        let seen: Vec<Vec<f32>> = (0..k)
             .into_par_iter()
-            .map(|out| {
-                let seen = self.seen_from(out);
-                let weights = gathered(&self.exchange, &seen, self.reflectance);
-                let mut column = vec![[Vec3::ZERO; 3]; k];
-                let mut emission = Vec3::ZERO;
-                for (q, &weight) in weights.iter().enumerate() {
-                    emission += weight;
-                    let sent = weight * self.reflectance[q];
-                    for (block, v) in column.iter_mut().zip(&self.vectors[q * k..]) {
-                        for c in 0..3 {
-                            block[c] += sent[c] * *v;
-                        }
-                    }
-                }
-                (column, emission)
-            })
+            .map(|out| self.seen_from(out))
             .collect();
-        Response::new(&self.directions, &columns)
+        let emission = seen.iter().map(|shares| {
+            let glowing = self.glowing.iter().zip(shares);
+            glowing.map(|(glow, &share)| *glow * share).sum()
+        });
+        let emission = emission.collect();
+        let seen = DMatrix::from_iterator(self.glowing.len(), k, seen.into_iter().flatten());
+        Response::new(&self.directions, &blocks(&(&self.lit * seen)), emission)
     }
 
     /// `[footprint]`; `tile` is the response of the whole.
     pub fn of_footprints(&self, footprints: &Footprints, tile: &Response) -> Vec<Response> {
+        if footprints.count() == 0 {
+            return Vec::new();
+        }
         let k = self.directions.count();
-        // (1 − ρG)⁻¹ of the columns of ρ a, `[in][axis][facet]`, and of 1: all footprints have them in common.
-        let lit: Vec<Vec<Vec3>> = (0..3 * k)
-            .into_par_iter()
-            .map(|column| {
-                let vectors = self.vectors[column / 3..].iter().step_by(k);
-                let sent = vectors
-                    .zip(self.reflectance)
-                    .map(|(v, r)| v[column % 3] * *r);
-                bounced(&self.exchange, sent.collect(), self.reflectance)
-            })
-            .collect();
-        // `[facet][in][axis][colour]`: what sums over facets reads lies side by side.
-        let width = 9 * k;
-        let mut rows = vec![0.0_f32; width * self.field.facet_count()];
-        rows.par_chunks_mut(width).enumerate().for_each(|(q, row)| {
-            for (at, column) in row.chunks_exact_mut(3).zip(&lit) {
-                at.copy_from_slice(&column[q].to_array());
-            }
-        });
-        drop(lit);
-        let glowing = bounced(
-            &self.exchange,
-            vec![Vec3::ONE; self.field.facet_count()],
-            self.reflectance,
-        );
+        let windows = self.windows(footprints);
         // `[out][footprint]`
-        let columns: Vec<Vec<(Vec<Block>, Vec3)>> = (0..k)
+        let seen: Vec<Vec<Seen>> = (0..k)
             .into_par_iter()
-            .map(|out| {
-                let mut sums = vec![0.0_f32; width];
-                let column = |seen: &Seen| {
-                    sums.fill(0.0);
-                    for &(q, share) in &seen.facets {
-                        let row = &rows[q as usize * width..][..width];
-                        for (sum, lit) in sums.iter_mut().zip(row) {
-                            *sum += lit * share;
-                        }
-                    }
-                    let column = sums
-                        .chunks_exact(9)
-                        .enumerate()
-                        .map(|(slot, by_axis)| {
-                            let of_tile = &tile.matrix[slot * k + out];
-                            [0, 1, 2].map(|c| {
-                                Vec3::new(by_axis[c], by_axis[3 + c], by_axis[6 + c])
-                                    + of_tile[c] * seen.of_tile
-                            })
-                        })
-                        .collect();
-                    let facets = seen.facets.iter();
-                    let glow: Vec3 = facets.map(|&(q, share)| glowing[q as usize] * share).sum();
-                    (column, glow + tile.emission[out] * seen.of_tile)
-                };
-                self.seen_through(footprints, out)
-                    .iter()
-                    .map(column)
-                    .collect()
-            })
+            .map(|out| self.seen_through(footprints, &windows, out))
             .collect();
+        let respond = |footprint: usize| {
+            let seen: Vec<&Seen> = seen.iter().map(|of| &of[footprint]).collect();
+            // From one direction or another.
+            let mut facets: Vec<u32> = (seen.iter())
+                .flat_map(|seen| seen.facets.iter().map(|s| s.0))
+                .collect();
+            facets.sort_unstable();
+            facets.dedup();
+            let mut lit = DMatrix::zeros(9 * k, facets.len());
+            let mut shares = DMatrix::zeros(facets.len(), k);
+            for (mut to, &q) in lit.column_iter_mut().zip(&facets) {
+                to.copy_from(&self.lit.column(q as usize));
+            }
+            let mut emission = Vec::with_capacity(k);
+            for (out, seen) in seen.iter().enumerate() {
+                let mut row = 0;
+                let mut glow = tile.emission[out] * seen.of_tile;
+                for &(q, share) in &seen.facets {
+                    row += facets[row..].partition_point(|&facet| facet < q);
+                    shares[(row, out)] = share;
+                    glow += self.glowing[q as usize] * share;
+                }
+                emission.push(glow);
+            }
+            let mut columns = blocks(&(lit * shares));
+            for (out, column) in columns.iter_mut().enumerate() {
+                for (slot, block) in column.iter_mut().enumerate() {
+                    for (rows, of_tile) in block.iter_mut().zip(&tile.matrix[slot * k + out]) {
+                        *rows += *of_tile * seen[out].of_tile;
+                    }
+                }
+            }
+            Response::new(&self.directions, &columns, emission)
+        };
         (0..footprints.count())
-            .map(|f| {
-                let columns: Vec<_> = columns.iter().map(|of| of[f].clone()).collect();
-                Response::new(&self.directions, &columns)
+            .into_par_iter()
+            .map(respond)
+            .collect()
+    }
+
+    /// Through which cell of the mesh's plane each facet is seen from each fine cell, `[facet][fine cell]`.
+    fn windows(&self, footprints: &Footprints) -> Vec<u32> {
+        // With the slope of the view in the field's lengths.
+        let slopes: Vec<DVec2> = FineCell::all()
+            .map(|cell| cell.direction.truncate() / cell.direction.z)
+            .collect();
+        (0..self.field.facet_count())
+            .into_par_iter()
+            .flat_map_iter(|q| {
+                let facet = self.field.facet(q);
+                (slopes.iter()).map(move |&slope| footprints.window(&facet, slope) as u32)
             })
             .collect()
     }
@@ -174,28 +182,20 @@ impl<'a> Scattering<'a> {
         seen.into_iter().map(|s| s as f32).collect()
     }
 
-    /// The same of each footprint, `[footprint]`.
-    fn seen_through(&self, footprints: &Footprints, slot: usize) -> Vec<Seen> {
+    /// The same of each footprint, `[footprint]`, their facets in order.
+    fn seen_through(&self, footprints: &Footprints, windows: &[u32], slot: usize) -> Vec<Seen> {
         let mut seen: Vec<Vec<(u32, f32)>> = vec![Vec::new(); footprints.count()];
         let mut of_facet = vec![0.0_f32; footprints.count()];
         let mut touched = Vec::new();
-        let cells: Vec<FineCell> = FineCell::all().collect();
-        // With the slope of the view in the field's lengths.
-        let looks: Vec<(usize, f32, DVec2)> = self.looks[slot]
-            .iter()
-            .map(|&(i, weight)| {
-                let d = cells[i].direction;
-                (i, weight, DVec2::new(d.x, d.y) / d.z)
-            })
-            .collect();
-        for (q, row) in self.facets.transfer.chunks_exact(CELLS).enumerate() {
-            let facet = self.field.facet(q);
-            for &(i, weight, slope) in &looks {
-                let projected = weight * row[i] * facet.area as f32;
+        let rows = self.facets.transfer.chunks_exact(CELLS);
+        for (q, (row, windows)) in rows.zip(windows.chunks_exact(CELLS)).enumerate() {
+            let area = self.facets.area[q] as f32;
+            for &(i, weight) in &self.looks[slot] {
+                let projected = weight * row[i] * area;
                 if projected <= 0.0 {
                     continue;
                 }
-                for &(f, density) in &footprints.over[footprints.window(&facet, slope)] {
+                for &(f, density) in &footprints.over[windows[i] as usize] {
                     if of_facet[f as usize] == 0.0 {
                         touched.push(f);
                     }
@@ -209,9 +209,9 @@ impl<'a> Scattering<'a> {
         }
         // What fills the view of a tile fills that of a footprint: their densities have the same mean.
         let plane = 0.5 * self.field.aspect * self.field.facet_count() as f64;
-        let heights = looks
-            .iter()
-            .map(|&(i, weight, _)| f64::from(weight) * cells[i].direction.z);
+        let cells: Vec<FineCell> = FineCell::all().collect();
+        let looks = self.looks[slot].iter();
+        let heights = looks.map(|&(i, weight)| f64::from(weight) * cells[i].direction.z);
         let rest = OF_TILE * plane * heights.sum::<f64>();
         seen.into_iter()
             .map(|mut facets| {
@@ -247,33 +247,14 @@ fn slots_of_cells(directions: &Directions) -> Vec<Vec<(usize, f32)>> {
     looks
 }
 
-/// What each facet's own light adds to what is seen, all bounces inside the relief included: y = w + Gᵀ ρ y.
-fn gathered(exchange: &Exchange, seen: &[f32], reflectance: &[Vec3]) -> Vec<Vec3> {
-    let mut total: Vec<Vec3> = seen.iter().map(|&w| Vec3::splat(w)).collect();
-    let mut bounce = total.clone();
-    let mut highest = total.iter().map(|v| v.max_element()).fold(0.0, f32::max);
-    for _ in 0..MOST_BOUNCES {
-        let sent: Vec<Vec3> = bounce
-            .iter()
-            .zip(reflectance)
-            .map(|(y, r)| *y * *r)
-            .collect();
-        let mut change = 0.0_f32;
-        for (q, y) in bounce.iter_mut().enumerate() {
-            *y = exchange
-                .to(q)
-                .iter()
-                .map(|&(from, weight)| sent[from as usize] * weight)
-                .sum();
-            total[q] += *y;
-            change = change.max(y.max_element());
-            highest = highest.max(total[q].max_element());
-        }
-        if change <= CONVERGED * highest {
-            break;
-        }
-    }
-    total
+/// Columns of sums over `[in][axis][colour]`, as blocks: `[out]` of `[in]`.
+fn blocks(sums: &DMatrix<f32>) -> Vec<Vec<Block>> {
+    let column = |sums: DVectorView<'_, f32>| -> Vec<Block> {
+        (sums.as_slice().chunks_exact(9))
+            .map(|by_axis| [0, 1, 2].map(|c| Vec3::new(by_axis[c], by_axis[3 + c], by_axis[6 + c])))
+            .collect()
+    };
+    sums.column_iter().map(column).collect()
 }
 
 /// Radiosity of the facets with all bounces inside the relief, for what they send at first: B = b + ρ G B.
