@@ -116,11 +116,14 @@ impl Footprints {
     /// The cell of the mesh's plane through which a facet is seen from a direction whose tangents to the normal, along u
     /// and v in widths of a cell, are `slope`.
     pub(super) fn window(&self, facet: &Facet, slope: DVec2) -> usize {
-        let at = |place: f64, size: u32| (place.floor() as i64).rem_euclid(i64::from(size));
+        let at = |place: f64, size: u32| {
+            let cut = place as i32;
+            (cut - i32::from(place < f64::from(cut))).rem_euclid(size as i32)
+        };
         let x = facet.centre.x - facet.centre.z * slope.x;
         let y = facet.centre.y - facet.centre.z * slope.y / self.aspect;
         let [columns, rows] = self.size;
-        (at(y, rows) * i64::from(columns) + at(x, columns)) as usize
+        at(y, rows) as usize * columns as usize + at(x, columns) as usize
     }
 
     /// Shares of the facets in a footprint as the mesh's plane shows it, `[facet]`; they sum to 1.

@@ -7,7 +7,7 @@
 //! light is kept, not that of each footprint.
 
 use glam::{DVec2, DVec3, Vec3};
-use nalgebra::{DMatrix, DVectorView};
+use nalgebra::{DMatrix, DMatrixView, DVectorView};
 use rayon::prelude::*;
 
 use super::exchange::Exchange;
@@ -32,8 +32,8 @@ pub struct Scattering<'a> {
     lit: DMatrix<f32>,
     /// (1 − ρG)⁻¹ 1: for light that each facet emits, `[facet]`.
     glowing: Vec<Vec3>,
-    /// For each slot, the fine cells that a bilinear look-up takes from it, with their weights.
-    looks: Vec<Vec<(usize, f32)>>,
+    /// See [`slots_of_cells`].
+    looks: DMatrix<f32>,
 }
 
 impl<'a> Scattering<'a> {
@@ -83,61 +83,64 @@ impl<'a> Scattering<'a> {
 
     /// Of the whole tile.
     pub fn whole(&self) -> Response {
-        let k = self.directions.count();
-        let seen: Vec<Vec<f32>> = (0..k)
-            .into_par_iter()
-            .map(|out| self.seen_from(out))
-            .collect();
-        let emission = seen.iter().map(|shares| {
-            let glowing = self.glowing.iter().zip(shares);
-            glowing.map(|(glow, &share)| *glow * share).sum()
-        });
-        let emission = emission.collect();
-        let seen = DMatrix::from_iterator(self.glowing.len(), k, seen.into_iter().flatten());
+        let transfer = DMatrixView::from_slice(&self.facets.transfer, CELLS, self.glowing.len());
+        let mut seen = transfer.tr_mul(&self.looks);
+        for (mut facet, &area) in seen.row_iter_mut().zip(&self.facets.area) {
+            facet *= area as f32;
+        }
+        for mut out in seen.column_iter_mut() {
+            let whole: f64 = out.iter().map(|&s| f64::from(s)).sum();
+            out /= whole as f32;
+        }
+        let emission = self.emission(&seen, 0..self.glowing.len());
         Response::new(&self.directions, &blocks(&(&self.lit * seen)), emission)
     }
 
     /// `[footprint]`; `tile` is the response of the whole.
     pub fn of_footprints(&self, footprints: &Footprints, tile: &Response) -> Vec<Response> {
-        if footprints.count() == 0 {
-            return Vec::new();
-        }
         let k = self.directions.count();
-        let windows = self.windows(footprints);
-        // `[out][footprint]`
-        let seen: Vec<Vec<Seen>> = (0..k)
-            .into_par_iter()
-            .map(|out| self.seen_through(footprints, &windows, out))
+        let seen = self.seen_through(footprints);
+        // What fills the view of a tile fills that of a footprint: their densities have the same mean.
+        let plane = 0.5 * self.field.aspect * self.field.facet_count() as f64;
+        let rest: Vec<f64> = (self.looks.column_iter())
+            .map(|looks| {
+                let heights = looks.iter().zip(FineCell::all());
+                let height: f64 = heights
+                    .map(|(&l, cell)| f64::from(l) * cell.direction.z)
+                    .sum();
+                OF_TILE * plane * height
+            })
             .collect();
         let respond = |footprint: usize| {
-            let seen: Vec<&Seen> = seen.iter().map(|of| &of[footprint]).collect();
-            // From one direction or another.
-            let mut facets: Vec<u32> = (seen.iter())
-                .flat_map(|seen| seen.facets.iter().map(|s| s.0))
-                .collect();
-            facets.sort_unstable();
+            let seen = || seen.iter().flat_map(|facets| &facets[footprint]);
+            let mut facets: Vec<u32> = seen().map(|s| s.facet).collect();
             facets.dedup();
             let mut lit = DMatrix::zeros(9 * k, facets.len());
-            let mut shares = DMatrix::zeros(facets.len(), k);
             for (mut to, &q) in lit.column_iter_mut().zip(&facets) {
                 to.copy_from(&self.lit.column(q as usize));
             }
-            let mut emission = Vec::with_capacity(k);
-            for (out, seen) in seen.iter().enumerate() {
-                let mut row = 0;
-                let mut glow = tile.emission[out] * seen.of_tile;
-                for &(q, share) in &seen.facets {
-                    row += facets[row..].partition_point(|&facet| facet < q);
-                    shares[(row, out)] = share;
-                    glow += self.glowing[q as usize] * share;
-                }
-                emission.push(glow);
+            // Projected areas, `[fine cell][facet]`.
+            let mut areas = DMatrix::zeros(CELLS, facets.len());
+            let mut column = 0;
+            for s in seen() {
+                column += usize::from(facets[column] != s.facet);
+                areas[(s.cell as usize, column)] += s.area;
             }
+            let mut shares = areas.tr_mul(&self.looks);
+            let mut of_tile = vec![0.0; k];
+            for (out, mut shares) in shares.column_iter_mut().enumerate() {
+                let whole = rest[out] + shares.iter().map(|&s| f64::from(s)).sum::<f64>();
+                shares /= whole as f32;
+                of_tile[out] = (rest[out] / whole) as f32;
+            }
+            let facets = facets.iter().map(|&q| q as usize);
+            let mut emission = self.emission(&shares, facets);
             let mut columns = blocks(&(lit * shares));
             for (out, column) in columns.iter_mut().enumerate() {
+                emission[out] += tile.emission[out] * of_tile[out];
                 for (slot, block) in column.iter_mut().enumerate() {
-                    for (rows, of_tile) in block.iter_mut().zip(&tile.matrix[slot * k + out]) {
-                        *rows += *of_tile * seen[out].of_tile;
+                    for (rows, of_whole) in block.iter_mut().zip(&tile.matrix[slot * k + out]) {
+                        *rows += *of_whole * of_tile[out];
                     }
                 }
             }
@@ -149,99 +152,70 @@ impl<'a> Scattering<'a> {
             .collect()
     }
 
-    /// Through which cell of the mesh's plane each facet is seen from each fine cell, `[facet][fine cell]`.
-    fn windows(&self, footprints: &Footprints) -> Vec<u32> {
+    /// H of facets with their shares in what is seen, `[facet][out]`.
+    fn emission(
+        &self,
+        shares: &DMatrix<f32>,
+        facets: impl Iterator<Item = usize> + Clone,
+    ) -> Vec<Vec3> {
+        let of_column = |shares: DVectorView<'_, f32>| {
+            let shares = shares.iter().zip(facets.clone());
+            shares.map(|(&share, q)| self.glowing[q] * share).sum()
+        };
+        shares.column_iter().map(of_column).collect()
+    }
+
+    /// What is seen through each footprint, facets in order: `[part of the facets][footprint]`.
+    fn seen_through(&self, footprints: &Footprints) -> Vec<Vec<Vec<Seen>>> {
         // With the slope of the view in the field's lengths.
         let slopes: Vec<DVec2> = FineCell::all()
             .map(|cell| cell.direction.truncate() / cell.direction.z)
             .collect();
-        (0..self.field.facet_count())
-            .into_par_iter()
-            .flat_map_iter(|q| {
-                let facet = self.field.facet(q);
-                (slopes.iter()).map(move |&slope| footprints.window(&facet, slope) as u32)
-            })
-            .collect()
-    }
-
-    /// W of one slot: the share of each facet in what is seen from its directions.
-    fn seen_from(&self, slot: usize) -> Vec<f32> {
-        let mut seen: Vec<f64> = self
-            .facets
-            .transfer
-            .chunks_exact(CELLS)
-            .zip(&self.facets.area)
-            .map(|(row, area)| {
-                let looks = self.looks[slot].iter();
-                let sum: f32 = looks.map(|&(i, weight)| weight * row[i]).sum();
-                area * f64::from(sum)
-            })
-            .collect();
-        let sum: f64 = seen.iter().sum();
-        seen.iter_mut().for_each(|s| *s /= sum);
-        seen.into_iter().map(|s| s as f32).collect()
-    }
-
-    /// The same of each footprint, `[footprint]`, their facets in order.
-    fn seen_through(&self, footprints: &Footprints, windows: &[u32], slot: usize) -> Vec<Seen> {
-        let mut seen: Vec<Vec<(u32, f32)>> = vec![Vec::new(); footprints.count()];
-        let mut of_facet = vec![0.0_f32; footprints.count()];
-        let mut touched = Vec::new();
-        let rows = self.facets.transfer.chunks_exact(CELLS);
-        for (q, (row, windows)) in rows.zip(windows.chunks_exact(CELLS)).enumerate() {
-            let area = self.facets.area[q] as f32;
-            for &(i, weight) in &self.looks[slot] {
-                let projected = weight * row[i] * area;
-                if projected <= 0.0 {
-                    continue;
-                }
-                for &(f, density) in &footprints.over[windows[i] as usize] {
-                    if of_facet[f as usize] == 0.0 {
-                        touched.push(f);
+        (self.facets.transfer)
+            .par_chunks(PART * CELLS)
+            .enumerate()
+            .map(|(part, rows)| {
+                let mut seen = vec![Vec::new(); footprints.count()];
+                for (i, row) in rows.chunks_exact(CELLS).enumerate() {
+                    let q = part * PART + i;
+                    let facet = self.field.facet(q);
+                    for (cell, (&slope, &transfer)) in slopes.iter().zip(row).enumerate() {
+                        if transfer == 0.0 {
+                            continue;
+                        }
+                        for &(f, density) in &footprints.over[footprints.window(&facet, slope)] {
+                            seen[f as usize].push(Seen {
+                                facet: q as u32,
+                                cell: cell as u32,
+                                area: transfer * facet.area as f32 * density,
+                            });
+                        }
                     }
-                    of_facet[f as usize] += projected * density;
                 }
-            }
-            for f in touched.drain(..) {
-                seen[f as usize].push((q as u32, of_facet[f as usize]));
-                of_facet[f as usize] = 0.0;
-            }
-        }
-        // What fills the view of a tile fills that of a footprint: their densities have the same mean.
-        let plane = 0.5 * self.field.aspect * self.field.facet_count() as f64;
-        let cells: Vec<FineCell> = FineCell::all().collect();
-        let looks = self.looks[slot].iter();
-        let heights = looks.map(|&(i, weight)| f64::from(weight) * cells[i].direction.z);
-        let rest = OF_TILE * plane * heights.sum::<f64>();
-        seen.into_iter()
-            .map(|mut facets| {
-                let whole = rest + facets.iter().map(|s| f64::from(s.1)).sum::<f64>();
-                for (_, share) in &mut facets {
-                    *share = (f64::from(*share) / whole) as f32;
-                }
-                Seen {
-                    facets,
-                    of_tile: (rest / whole) as f32,
-                }
+                seen
             })
             .collect()
     }
 }
 
-/// What is seen of a footprint: facets with their shares, and the share of the whole tile. They sum to 1.
+/// Facets that one thread looks at in one go.
+const PART: usize = 512;
+
+/// A facet as it is seen through a footprint from a fine cell.
+#[derive(Clone, Copy)]
 struct Seen {
-    facets: Vec<(u32, f32)>,
-    of_tile: f32,
+    facet: u32,
+    cell: u32,
+    /// Projected.
+    area: f32,
 }
 
-/// For each slot, the fine cells that a bilinear look-up takes from it, with their weights.
-fn slots_of_cells(directions: &Directions) -> Vec<Vec<(usize, f32)>> {
-    let mut looks = vec![Vec::new(); directions.count()];
+/// How much of each fine cell a bilinear look-up takes from each slot, `[fine cell][slot]`.
+fn slots_of_cells(directions: &Directions) -> DMatrix<f32> {
+    let mut looks = DMatrix::zeros(CELLS, directions.count());
     for (i, cell) in FineCell::all().enumerate() {
         for (slot, weight) in directions.bilinear(cell.direction) {
-            if weight > 0.0 {
-                looks[slot].push((i, weight as f32));
-            }
+            looks[(i, slot)] += weight as f32;
         }
     }
     looks

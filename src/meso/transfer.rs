@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::visibility::Azimuth;
 use super::{HeightField, Visibility};
 use crate::directions::{Directions, FINE, FineCell};
 
@@ -20,7 +21,8 @@ pub(super) struct Facets {
 /// How much of each fine cell of the sky a facet sees, 0..=1.
 pub(super) struct Sight<'a> {
     pub(super) cells: Vec<FineCell>,
-    azimuths: Vec<f64>,
+    /// Of each cell, as [`Visibility::horizon`] takes it.
+    azimuths: Vec<Azimuth>,
     visibility: &'a Visibility,
 }
 
@@ -30,7 +32,7 @@ impl<'a> Sight<'a> {
         Self {
             azimuths: cells
                 .iter()
-                .map(|c| c.direction.y.atan2(c.direction.x))
+                .map(|c| Azimuth::new(c.direction.y.atan2(c.direction.x)))
                 .collect(),
             cells,
             visibility,
@@ -38,7 +40,7 @@ impl<'a> Sight<'a> {
     }
 
     pub(super) fn of(&self, facet: usize, i: usize) -> f64 {
-        let slope = self.visibility.horizon(facet, self.azimuths[i]).max(0.0);
+        let slope = self.visibility.horizon(facet, &self.azimuths[i]).max(0.0);
         let horizon = slope / (1.0 + slope * slope).sqrt();
         let [low, high] = self.cells[i].z_range;
         ((high - horizon) / (high - low)).clamp(0.0, 1.0)

@@ -74,11 +74,29 @@ impl Visibility {
     }
 
     /// Tangent of the horizon of a facet towards an azimuth, linear between the kept ones.
-    pub fn horizon(&self, facet: usize, azimuth: f64) -> f64 {
-        let at = (azimuth / std::f64::consts::TAU).rem_euclid(1.0) * f64::from(AZIMUTHS);
-        let low = at as usize;
+    pub(super) fn horizon(&self, facet: usize, azimuth: &Azimuth) -> f64 {
         let kept = &self.horizons[facet * AZIMUTHS as usize..][..AZIMUTHS as usize];
-        let value = |i: usize| f64::from(kept[i % AZIMUTHS as usize]);
-        value(low) + (value(low + 1) - value(low)) * (at - low as f64)
+        let [low, high] = azimuth.between.map(|i| f64::from(kept[i]));
+        low + (high - low) * azimuth.share
+    }
+}
+
+/// An azimuth between two of those that visibility is kept for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Azimuth {
+    between: [usize; 2],
+    /// Of the second.
+    share: f64,
+}
+
+impl Azimuth {
+    /// From u towards v, in radians.
+    pub fn new(angle: f64) -> Self {
+        let at = (angle / std::f64::consts::TAU).rem_euclid(1.0) * f64::from(AZIMUTHS);
+        let low = at as usize;
+        Self {
+            between: [low, low + 1].map(|i| i % AZIMUTHS as usize),
+            share: at - low as f64,
+        }
     }
 }
