@@ -75,10 +75,14 @@ pub struct SolveOptions {
     /// Most elements of a curved surface or a relief that shoot together from one hemicube [default: that of --quality, 48 for normal]
     #[arg(long, value_name = "N")]
     source_elements: Option<usize>,
-    /// Most area that shoots together, as a share of the scene's; larger elements are cut [default: that of --quality, 1/512 for
+    /// Most area that shoots together, as a share of the scene's; larger elements are cut [default: that of --quality, 1/256 for
     /// normal]
     #[arg(long, value_name = "X")]
     source_area: Option<f64>,
+    /// Most area of a plane source that has another surface close before it, as a share of the scene's [default: by --quality;
+    /// normal: a quarter of --source-area]
+    #[arg(long, value_name = "SHARE")]
+    source_area_near: Option<f64>,
     /// Most emitted power that shoots together, as a share of the scene's [default: that of --quality, 1/128 for normal]
     #[arg(long, value_name = "X")]
     source_power: Option<f64>,
@@ -162,6 +166,7 @@ impl SolveOptions {
             residual: Some(settings.residual),
             source_elements: Some(settings.grouping.max_elements),
             source_area: Some(settings.grouping.max_area),
+            source_area_near: Some(settings.grouping.max_area_near),
             source_power: Some(settings.grouping.max_power),
             ..self.clone()
         })
@@ -182,9 +187,13 @@ impl SolveOptions {
                 "--source-elements 0: must be at least 1".into(),
             ));
         }
+        let max_area = share("--source-area", self.source_area, preset.max_area)?;
+        let preset_near = preset.max_area_near * max_area / preset.max_area;
+        let max_area_near = share("--source-area-near", self.source_area_near, preset_near)?;
         Ok(Grouping {
             max_elements: self.source_elements.unwrap_or(preset.max_elements),
-            max_area: share("--source-area", self.source_area, preset.max_area)?,
+            max_area,
+            max_area_near,
             max_power: share("--source-power", self.source_power, preset.max_power)?,
         })
     }

@@ -52,7 +52,7 @@ struct Parameters {
 
 /// Place of the item buffer among the bindings, and how many there are for sorting and in all.
 const ITEMS: usize = 6;
-const SORT: usize = 8;
+const SORT: usize = 9;
 const PLAIN: usize = 12;
 
 fn pipeline(
@@ -116,8 +116,8 @@ impl FormFactors {
                 .map(Bind::Buffer)
                 .to_vec();
                 binds.push(Bind::Image(&batch.items, &batch.sampler));
-                let behind = Bind::Buffer(&state.behind);
-                let sort = [&binds[..], &[behind]].concat();
+                let own = [&state.behind, &scene.triangles].map(Bind::Buffer);
+                let sort = [&binds[..], &own].concat();
                 let sort = self.sort.bind("sort receivers", &sort)?;
                 let rest = [
                     &scene.contours,

@@ -5,6 +5,7 @@
 //! several sources. A point light is two sources, one for each half of its sphere.
 
 mod group;
+mod near;
 mod single;
 
 use glam::{DVec3, Vec3};
@@ -16,6 +17,7 @@ use crate::elements::Elements;
 use crate::error::{Error, Result};
 use crate::scene::PointLight;
 use group::{Shape, bisect, group};
+use near::near_others;
 use single::{halves, part, point};
 
 /// Where groups are cut.
@@ -25,6 +27,9 @@ pub struct Grouping {
     pub max_elements: usize,
     /// Most area of a source, as a share of the scene's.
     pub max_area: f64,
+    /// The same of a plane source that has another surface closer before it than its side: there its light is uneven, and so is
+    /// what the other surface takes of it.
+    pub max_area_near: f64,
     /// Most emitted power of a source, as a share of the scene's.
     pub max_power: f64,
 }
@@ -33,7 +38,8 @@ impl Default for Grouping {
     fn default() -> Self {
         Self {
             max_elements: 48,
-            max_area: 1.0 / 512.0,
+            max_area: 1.0 / 256.0,
+            max_area_near: 1.0 / 1024.0,
             max_power: 1.0 / 128.0,
         }
     }
@@ -162,6 +168,8 @@ pub fn build(
     let mut groups = Vec::new();
     let mut chart_of = Vec::with_capacity(elements.len());
     let mut charts = charts(elements, &connections, &morton_order(elements));
+    let reach = (grouping.max_area * total_area).sqrt();
+    let near = near_others(elements, &charts, reach);
     // Elements with a relief come last, and so do their sources.
     charts.sort_by_key(|chart| elements.is_meso(chart[0] as usize));
     for (c, chart) in charts.into_iter().enumerate() {
@@ -170,9 +178,12 @@ pub fn build(
             let area = members.iter().map(|&e| elements.area[e as usize]).sum();
             let emitted = members.iter().map(|&e| power(e as usize)).sum();
             // A plane group's outline stands for all its members, however many.
-            let many = members.len() > grouping.max_elements
-                && (elements.is_meso(members[0] as usize) || !is_flat(&members));
-            let large = many || too_much(area, emitted);
+            let plane = !elements.is_meso(members[0] as usize) && is_flat(&members);
+            let many = members.len() > grouping.max_elements && !plane;
+            let uneven = plane
+                && area > grouping.max_area_near * total_area
+                && members.iter().any(|&e| near[e as usize]);
+            let large = many || uneven || too_much(area, emitted);
             if large && members.len() > 1 {
                 let at = bisect(elements, &mut members);
                 stack.push(members.split_off(at));
