@@ -25,16 +25,16 @@ pub fn open_devices(wanted: Option<&str>, validation: bool) -> Result<Vec<Arc<De
     let Some(list) = wanted.filter(|wanted| wanted.contains(',')) else {
         return Ok(vec![open_device(wanted, validation)?]);
     };
-    // Names have commas too.
-    let instance = Instance::new(validation)?;
-    if choose_device(&instance, wanted).is_ok() {
-        return Ok(vec![open_device(wanted, validation)?]);
-    }
     let names: Vec<&str> = list.split(',').map(str::trim).collect();
     if names.contains(&"") {
         return Err(Error::Usage(format!(
             "--device {list}: a device is missing between two commas or at an end"
         )));
+    }
+    // Names have commas too.
+    let instance = Instance::new(validation)?;
+    if choose_device(&instance, wanted).is_ok() {
+        return Ok(vec![open_device(wanted, validation)?]);
     }
     // All are looked for before the first is opened.
     for name in &names {
