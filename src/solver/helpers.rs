@@ -76,6 +76,13 @@ impl Helper {
         self.board.changed.notify_all();
     }
 
+    /// Has what is not being drawn yet drawn in the order of these places; what has none comes last.
+    pub fn order(&self, places: &HashMap<u32, usize>) {
+        let place = |source: &u32| places.get(source).copied().unwrap_or(usize::MAX);
+        let wanted = &mut self.board.notes().wanted;
+        wanted.make_contiguous().sort_by_key(place);
+    }
+
     /// What is not being drawn yet need not be.
     pub fn let_be(&self) {
         self.board.notes().wanted.clear();

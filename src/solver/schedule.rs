@@ -9,7 +9,7 @@ use std::collections::HashMap;
 /// Measured on lavapipe; where they are off, devices wait for one another, and nothing else changes.
 const SELECT: f64 = 0.7;
 const SHOT: f64 = 0.02;
-const FINE: f64 = 2.0;
+const FINE: f64 = 3.0;
 /// What is asked for at once waits until a device has drawn what it is at.
 const LATE: f64 = 3.0;
 

@@ -1,6 +1,7 @@
 //! Batches on several devices. The first one holds the solution: it chooses and gathers as if it were alone. Form factors of fresh sources
 //! come from all devices, as rows in the host's memory, and take their places in the order of the slots, so that the sums are the same.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::batch::{BatchResult, OnDevice, Passes, Sets, Stages};
@@ -17,8 +18,8 @@ use crate::passes::types::{KeptRow, Progress, Slot};
 use crate::sources::Source;
 use crate::vk::{Buffer, BufferUse, Commands, Device, Stage, Timestamps};
 
-/// Rows that are drawn ahead, in batches, and their bytes, at most.
-const BATCHES_AHEAD: usize = 4;
+/// Rows that are drawn ahead, in batches, and their bytes, at most: while emitters are shot, others have all that time.
+const BATCHES_AHEAD: usize = 32;
 const BYTES_AHEAD: u64 = 128 << 20;
 
 /// What other devices are to do, and the first one for them.
@@ -302,8 +303,12 @@ impl Several {
         let by_bytes = (BYTES_AHEAD / self.words.bytes().max(1)) as usize;
         let most = (BATCHES_AHEAD * self.put.len()).min(by_bytes.max(self.put.len()));
         let sources = waiting.iter().map(|s| s.index);
+        let places: HashMap<u32, usize> = sources.clone().zip(0..).collect();
         for (device, source) in self.schedule.foresee(sources, most) {
             self.team.helpers[device - 1].ask(source);
+        }
+        for helper in &self.team.helpers {
+            helper.order(&places);
         }
     }
 }
