@@ -175,9 +175,11 @@ impl Several {
 
     fn batch(&mut self, sending: Sending, last: bool) -> Result<BatchResult> {
         self.choose.of(sending).wait()?;
-        let mut stages = Stages::default();
-        stages.select = self.choose_stamps.intervals()?[0];
-        stages.gather = self.gathered(sending)?;
+        let mut stages = Stages {
+            select: self.choose_stamps.intervals()?[0],
+            gather: self.gathered(sending)?,
+            ..Stages::default()
+        };
         let chosen = self.layout.read(&self.chosen);
         let progress = chosen.progress;
         let shots = progress.selected + progress.replayed;
