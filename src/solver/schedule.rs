@@ -138,6 +138,9 @@ fn least(values: impl Iterator<Item = f64>) -> usize {
 mod tests {
     use super::*;
 
+    /// What is given ahead of 16 a batch.
+    const MOST: usize = 32 * 16;
+
     /// Batches of 16 that choose what was foreseen: how many sources each device draws.
     fn drawn(others: usize, shots: u32) -> Vec<u32> {
         let mut schedule = Schedule::new(others);
@@ -151,10 +154,10 @@ mod tests {
                 assert_eq!(asked.remove(source).unwrap_or(device), device);
             }
             let next = 16 * (batch + 1)..1600;
-            for (device, source) in schedule.foresee(next, 64) {
+            for (device, source) in schedule.foresee(next, MOST) {
                 assert!(device > 0 && asked.insert(source, device).is_none());
             }
-            assert!(schedule.given.len() <= 64);
+            assert!(schedule.given.len() <= MOST);
         }
         drawn
     }
@@ -169,7 +172,7 @@ mod tests {
             );
             let all = drawn[1..].iter().map(|&d| f64::from(d)).chain([first]);
             let mean = all.clone().sum::<f64>() / (1 + others) as f64;
-            // A look ahead of four batches of a hundred.
+            // The first one may wait for what it chooses before the others have got ahead.
             assert!(all.into_iter().all(|work| (work / mean - 1.0).abs() < 0.1));
         }
     }
