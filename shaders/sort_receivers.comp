@@ -5,7 +5,10 @@
 #extension GL_GOOGLE_include_directive : require
 #include "shared/receivers.glsl"
 
-// Form factors that were passed over because the source lies behind the element's plane.
+// 1: what is passed over is counted by slot, so that a row of form factors that is drawn ahead brings its own count.
+layout(constant_id = 0) const uint BEHIND_BY_SLOT = 0;
+
+// Form factors that were passed over because the source lies behind the element's plane, by element or by slot.
 layout(scalar, binding = 7) buffer Behind { uint behind_count[]; };
 
 // Lane k of a subgroup makes room in the list of kind k for all lanes.
@@ -75,12 +78,19 @@ void main() {
             bool behind;
             uint kind = kind_of(slot, s, first_element + i, ball[j], n[j], behind);
             append(slot, kind, i < element_count && kind < RECEIVE_KINDS, i);
-            passed_over[j] += behind ? 1 : 0;
+            if (BEHIND_BY_SLOT == 1) {
+                uint lanes = subgroupBallotBitCount(subgroupBallot(behind && i < element_count));
+                if (subgroupElect()) {
+                    atomicAdd(behind_count[slot], lanes);
+                }
+            } else {
+                passed_over[j] += behind ? 1 : 0;
+            }
         }
     }
     for (uint j = 0; j < SORT_ELEMENTS; j++) {
         uint i = first + j * GROUP;
-        if (i < element_count) {
+        if (BEHIND_BY_SLOT == 0 && i < element_count) {
             behind_count[first_element + i] += passed_over[j];
         }
     }

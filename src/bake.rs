@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::meso::Relief;
 use crate::scene::Scene;
 use crate::solution::Solution;
-use crate::solver::{Settings, Solver, Update, Visibility};
+use crate::solver::{self, Settings, Solver, Update, Visibility};
 use crate::vk::Device;
 
 /// Bakes a scene. `go_on` sees every step and may stop it; what has been solved by then is a valid solution.
@@ -31,15 +31,24 @@ pub fn solve(
     kept: Option<&Visibility>,
     go_on: impl FnMut(&Update) -> bool,
 ) -> Result<Solver> {
-    let elements = elements(device, scene, settings)?;
+    solve_on(&[Arc::clone(device)], scene, settings, kept, go_on)
+}
+
+/// As [`solve`], with several devices; see [`Solver::on_devices`].
+pub fn solve_on(
+    devices: &[Arc<Device>],
+    scene: &Scene,
+    settings: &Settings,
+    kept: Option<&Visibility>,
+    go_on: impl FnMut(&Update) -> bool,
+) -> Result<Solver> {
+    let (first, _) = solver::check_devices(devices, settings)?;
+    let elements = elements(first, scene, settings)?;
+    if let Some(kept) = kept {
+        kept.check(scene, settings)?;
+    }
     let lights = &scene.point_lights;
-    let mut solver = match kept {
-        None => Solver::new(device, elements, lights, settings)?,
-        Some(kept) => {
-            kept.check(scene, settings)?;
-            Solver::relit(device, elements, lights, settings, kept)?
-        }
-    };
+    let mut solver = Solver::on_devices(devices, elements, lights, settings, kept)?;
     solver.run(go_on)?;
     Ok(solver)
 }

@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use super::progress::{Bar, catch_interrupts, interrupted};
-use super::{Builtin, DeviceOptions};
+use super::{BakingDevices, Builtin};
 use mesolux::directions::Directions;
 use mesolux::error::{Error, Result};
 use mesolux::meso::{self, Transport};
@@ -43,7 +43,7 @@ pub struct Options {
     #[command(flatten)]
     builtin: Builtin,
     #[command(flatten)]
-    device: DeviceOptions,
+    device: BakingDevices,
     /// Threads of the CPU's own work; the result does not depend on it
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
@@ -281,8 +281,8 @@ pub fn run(options: &Options) -> Result<()> {
         .as_ref()
         .map(|bake| kept_with(bake))
         .transpose()?;
-    let device = options.device.open()?;
-    let solver = solve_visibly(&device, &scene, &settings, kept.as_ref())?;
+    let devices = options.device.open()?;
+    let solver = solve_visibly(&devices, &scene, &settings, kept.as_ref())?;
     let solution = mesolux::bake::solution(&scene, &solver)?;
     options.device.check()?;
     if options.keep_visibility {
@@ -331,18 +331,19 @@ pub fn run(options: &Options) -> Result<()> {
 
 /// Bakes with progress on stderr; Ctrl-C stops the bake and keeps what it has.
 pub fn bake_visibly(device: &Arc<Device>, scene: &Scene, settings: &Settings) -> Result<Solution> {
-    mesolux::bake::solution(scene, &solve_visibly(device, scene, settings, None)?)
+    let devices = [Arc::clone(device)];
+    mesolux::bake::solution(scene, &solve_visibly(&devices, scene, settings, None)?)
 }
 
 fn solve_visibly(
-    device: &Arc<Device>,
+    devices: &[Arc<Device>],
     scene: &Scene,
     settings: &Settings,
     kept: Option<&Visibility>,
 ) -> Result<Solver> {
     catch_interrupts();
     let bar = Bar::new();
-    let solver = mesolux::bake::solve(device, scene, settings, kept, |update| {
+    let solver = mesolux::bake::solve_on(devices, scene, settings, kept, |update| {
         bar.show(progress(update));
         !interrupted()
     });

@@ -119,12 +119,42 @@ impl DeviceOptions {
 
     /// Fails when the validation layer had something to say.
     fn check(&self) -> Result<()> {
-        match mesolux::vk::validation_messages() {
-            0 => Ok(()),
-            n => Err(Error::Device(format!(
-                "the validation layer sent {n} messages"
-            ))),
+        check_validation()
+    }
+}
+
+/// Which devices bake, and whether they are watched.
+#[derive(Args, Clone)]
+struct BakingDevices {
+    /// Vulkan device by its index or a part of its name (see `mesolux info`); the best one if not given. Several, as in 0,1, bake
+    /// together, and 0,0 opens a software device twice; the result is the same to the byte as with one of their kind
+    #[arg(long, value_name = "INDEX|NAME[,…]")]
+    device: Option<String>,
+    /// Watch every Vulkan call with the validation layer
+    #[arg(long)]
+    validate: bool,
+}
+
+impl BakingDevices {
+    fn open(&self) -> Result<Vec<std::sync::Arc<mesolux::vk::Device>>> {
+        let devices = mesolux::solver::open_devices(self.device.as_deref(), self.validate)?;
+        for device in &devices {
+            tracing::info!("device: {}", device.name());
         }
+        Ok(devices)
+    }
+
+    fn check(&self) -> Result<()> {
+        check_validation()
+    }
+}
+
+fn check_validation() -> Result<()> {
+    match mesolux::vk::validation_messages() {
+        0 => Ok(()),
+        n => Err(Error::Device(format!(
+            "the validation layer sent {n} messages"
+        ))),
     }
 }
 

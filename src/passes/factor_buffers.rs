@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use super::buffers::{SceneBuffers, download, filled, upload, write};
 use super::groups;
-use super::relief_buffers::ReliefBuffers;
 use super::types::{KeptState, ReceiverList};
 use crate::constants::{GROUP, RECEIVE_KINDS};
 use crate::error::Result;
@@ -68,15 +67,15 @@ const CHUNK: u64 = 256 << 20;
 
 impl FactorBuffers {
     /// Keeps rows in `memory` bytes at most, and no more than all sources need. A device that has less keeps fewer. Where form factors
-    /// are to be restored, the words of a chunk and how many chunks there were come with the memory, and are made anyway.
+    /// are to be restored, the words of a chunk and how many chunks there were come with the memory, and are made anyway. `meso_count`
+    /// elements have a relief.
     pub fn new(
         device: &Arc<Device>,
         scene: &SceneBuffers,
-        relief: Option<&ReliefBuffers>,
+        meso_count: u32,
         slots: u32,
         (memory, chunks_of): (u64, Option<(u32, usize)>),
     ) -> Result<Self> {
-        let meso_count = relief.map_or(0, |r| r.element_count);
         let plain_count = scene.element_count - meso_count;
         let blocks = u64::from(groups(plain_count) + groups(meso_count));
         let row = 4 * blocks

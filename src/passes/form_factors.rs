@@ -6,9 +6,8 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::buffers::{Batch, SceneBuffers, State, write};
+use super::buffers::{Batch, SceneBuffers, write};
 use super::factor_buffers::{FactorBuffers, ReceiverLists};
-use super::relief_buffers::ReliefBuffers;
 use super::types::ReceiverList;
 use super::{groups, shaders};
 use crate::constants::{RECEIVE_KINDS, SORT_ELEMENTS};
@@ -21,6 +20,15 @@ pub struct FormFactors {
     plain: Vec<ComputePipeline>,
     /// For elements with relief, in scenes that have some.
     meso: Vec<ComputePipeline>,
+}
+
+/// How elements are counted that a source lies behind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Behind {
+    /// Shots by element, over all batches.
+    ByElement,
+    /// Elements by slot, of one batch.
+    BySlot,
 }
 
 /// Sets of [`FormFactors`].
@@ -75,7 +83,7 @@ fn pipeline(
 }
 
 impl FormFactors {
-    pub fn new(device: &Arc<Device>, with_relief: bool) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, with_relief: bool, behind: Behind) -> Result<Self> {
         let kinds = |shader, bindings| -> Result<Vec<_>> {
             (0..RECEIVE_KINDS)
                 .map(|kind| pipeline(device, shader, bindings, &[kind]))
@@ -85,7 +93,7 @@ impl FormFactors {
         let plain = ("form factors", shaders::FORM_FACTORS_COMP);
         let meso = ("form factors to relief", shaders::FORM_FACTORS_RELIEF_COMP);
         Ok(Self {
-            sort: pipeline(device, sort, SORT, &[])?,
+            sort: pipeline(device, sort, SORT, &[(behind == Behind::BySlot).into()])?,
             plain: kinds(plain, PLAIN)?,
             meso: if with_relief {
                 kinds(meso, PLAIN + 1)?
@@ -95,13 +103,19 @@ impl FormFactors {
         })
     }
 
+    /// Workgroups that sort the elements without and with relief.
+    pub fn sort_groups(&self, factors: &FactorBuffers) -> [u32; 2] {
+        [factors.plain_count, factors.meso_count].map(|count| groups(count.div_ceil(SORT_ELEMENTS)))
+    }
+
+    /// `behind` counts as [`Behind`] says; `meso` are the elements with a relief.
     pub fn bind(
         &self,
         device: &Arc<Device>,
-        (scene, state): (&SceneBuffers, &State),
+        (scene, behind): (&SceneBuffers, &Buffer),
         batch: &Batch,
         factors: &FactorBuffers,
-        relief: Option<&ReliefBuffers>,
+        meso: Option<&Buffer>,
     ) -> Result<Sets> {
         let bind =
             |pipelines: &[ComputePipeline], lists: &ReceiverLists, fresh, more: Option<&Buffer>| {
@@ -116,7 +130,7 @@ impl FormFactors {
                 .map(Bind::Buffer)
                 .to_vec();
                 binds.push(Bind::Image(&batch.items, &batch.sampler));
-                let own = [&state.behind, &scene.triangles].map(Bind::Buffer);
+                let own = [behind, &scene.triangles].map(Bind::Buffer);
                 let sort = [&binds[..], &own].concat();
                 let sort = self.sort.bind("sort receivers", &sort)?;
                 let rest = [
@@ -131,8 +145,7 @@ impl FormFactors {
                 let kinds = pipelines.iter().map(|p| p.bind("form factors", &binds));
                 Ok::<_, crate::error::Error>((sort, kinds.collect::<Result<Vec<_>>>()?))
             };
-        let commands = [factors.plain_count, factors.meso_count]
-            .map(|count| ReceiverList::idle(groups(count.div_ceil(SORT_ELEMENTS))));
+        let commands = self.sort_groups(factors).map(ReceiverList::idle);
         write(device, &batch.drawn_commands, &commands)?;
         let (sort, kinds) = bind(&self.plain, &factors.plain_lists, &factors.fresh, None)?;
         let plain = Range {
@@ -142,9 +155,9 @@ impl FormFactors {
             sort,
             kinds,
         };
-        let meso = relief.map(|relief| {
+        let meso = meso.map(|elements| {
             let (lists, fresh) = (&factors.meso_lists, &factors.fresh_meso);
-            let (sort, kinds) = bind(&self.meso, lists, fresh, Some(&relief.elements))?;
+            let (sort, kinds) = bind(&self.meso, lists, fresh, Some(elements))?;
             Ok::<_, crate::error::Error>(Range {
                 first_element: factors.plain_count,
                 element_count: factors.meso_count,

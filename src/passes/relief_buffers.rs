@@ -14,6 +14,18 @@ use crate::meso::{Relief, slot_shares};
 use crate::sources::Sources;
 use crate::vk::{Buffer, BufferUse, Commands, Device};
 
+/// The elements with a relief, in their order.
+pub fn meso_elements(elements: &Elements, relief: &Relief) -> Vec<MesoElement> {
+    (elements.len() - relief.count()..elements.len())
+        .map(|e| MesoElement {
+            tangent: relief.tangent[e],
+            response: relief.class[e],
+            bitangent: relief.bitangent[e],
+            scale: relief.scale[e],
+        })
+        .collect()
+}
+
 /// Elements and sources with a relief are the last of their kinds (point lights aside), so that ranges tell them.
 pub struct ReliefBuffers {
     pub directions: Directions,
@@ -91,15 +103,7 @@ impl ReliefBuffers {
         let glows = sources.list[of_relief.clone()]
             .iter()
             .any(|s| s.emitted != Vec3::ZERO);
-        let gpu_elements: Vec<MesoElement> = meso
-            .clone()
-            .map(|e| MesoElement {
-                tangent: relief.tangent[e],
-                response: relief.class[e],
-                bitangent: relief.bitangent[e],
-                scale: relief.scale[e],
-            })
-            .collect();
+        let gpu_elements = meso_elements(elements, relief);
         let (texels, facets) = match &relief.texels {
             Some(on) if by_pixel => (on.elements[meso.clone()].to_vec(), on.facets.clone()),
             _ => (vec![Zeroable::zeroed()], vec![Zeroable::zeroed()]),

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::Settings;
 use super::estimate::{self, Estimate, ReliefSets, ReliefSources, Sending};
+use super::several::{Several, Team};
 use crate::constants::FACES;
 use crate::error::Result;
 use crate::hemicube::pixel_count;
@@ -30,6 +31,16 @@ pub struct Stages {
     pub gather: f64,
 }
 
+impl std::ops::AddAssign for Stages {
+    fn add_assign(&mut self, other: Self) {
+        self.select += other.select;
+        self.cull += other.cull;
+        self.item_buffer += other.item_buffer;
+        self.bin += other.bin;
+        self.gather += other.gather;
+    }
+}
+
 /// What a batch did.
 #[derive(Debug, Clone)]
 pub struct BatchResult {
@@ -48,6 +59,8 @@ pub struct BatchLoop {
     /// Where sources with a relief send evenly first: the batches of that time.
     evenly: Option<Evenly>,
     measure_only: Commands,
+    /// Where other devices draw too: it runs the batches instead of these commands.
+    several: Option<Several>,
     readback: [Buffer; 2],
     timestamps: [Timestamps; 2],
     batch: Batch,
@@ -81,7 +94,7 @@ pub(super) struct Passes {
 }
 
 /// What they are bound to for one batch.
-struct Sets {
+pub(super) struct Sets {
     measure: DescriptorSet,
     select: DescriptorSet,
     cull: DescriptorSet,
@@ -108,6 +121,7 @@ impl BatchLoop {
         batch: Batch,
         on: &OnDevice<'_>,
         rule: Rule,
+        team: Option<Team>,
     ) -> Result<Self> {
         let (scene, state) = (on.scene, on.state);
         let passes = Arc::clone(passes);
@@ -136,12 +150,7 @@ impl BatchLoop {
                     &[Stage::Compute],
                 );
                 cmd.timestamp(stamps, 0);
-                passes.measure(cmd, &sets, on, sending);
-                passes.select.record(cmd, &sets.select, &parameters);
-                cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-                if let Some((sources, sets, relief)) = passes.directed(&sets, on, sending) {
-                    sources.send(cmd, sets, relief, &batch);
-                }
+                passes.choose(cmd, &sets, on, &batch, (&parameters, sending));
                 cmd.timestamp(stamps, 1);
                 passes.cull.record(cmd, &sets.cull, scene, &batch);
                 cmd.barrier(&[Stage::Compute], &[Stage::Draw]);
@@ -173,7 +182,7 @@ impl BatchLoop {
             record("batch a", 0, by_direction)?,
             record("batch b", 1, by_direction)?,
         ];
-        let first_evenly = passes.estimate.sends_evenly_first(on);
+        let first_evenly = passes.sends_evenly_first(on);
         let directed = passes.directed(&sets, on, by_direction);
         let evenly = match directed.filter(|_| first_evenly) {
             Some((sources, of_relief, relief)) => Some(Evenly {
@@ -192,10 +201,19 @@ impl BatchLoop {
             None => None,
         };
         let measure_only = measure_only("remeasure", by_direction)?;
+        let several = match (team, on.factors) {
+            (Some(team), Some(factors)) => {
+                let passes = (&*passes, &sets);
+                let on = (on, factors);
+                Some(Several::new(device, passes, &batch, on, parameters, team)?)
+            }
+            _ => None,
+        };
         Ok(Self {
             commands,
             evenly,
             measure_only,
+            several,
             readback,
             timestamps,
             batch,
@@ -210,18 +228,51 @@ impl BatchLoop {
 
     /// Runs batches, one always ahead of what is read, until `look` says no; then waits for the one ahead, whose results
     /// are looked at too.
-    pub fn run(&mut self, mut look: impl FnMut(&BatchResult) -> bool) -> Result<()> {
+    pub fn run(&mut self, look: impl FnMut(&BatchResult) -> bool) -> Result<()> {
+        let sending = match &self.evenly {
+            Some(_) => Sending::Evenly,
+            None => Sending::ByDirection,
+        };
+        match &mut self.several {
+            Some(several) => several.run(sending, look),
+            None => self.run_alone(None, look),
+        }
+    }
+
+    /// As [`Self::run`], before `next` runs, whose other devices may begin meanwhile.
+    pub(super) fn run_before(
+        &mut self,
+        next: &mut Self,
+        look: impl FnMut(&BatchResult) -> bool,
+    ) -> Result<()> {
+        self.run_alone(next.several.as_mut(), look)
+    }
+
+    fn run_alone(
+        &mut self,
+        mut next: Option<&mut Several>,
+        mut look: impl FnMut(&BatchResult) -> bool,
+    ) -> Result<()> {
         let mut now = 0;
         self.batch(now).submit()?;
         loop {
             self.batch(1 - now).submit()?;
-            let go_on = look(&self.finish(now)?);
+            let result = self.finish(now)?;
+            if let Some(next) = &mut next {
+                next.foresee(result.progress.selected)?;
+            }
+            let go_on = look(&result);
             now = 1 - now;
             if !go_on {
                 look(&self.finish(now)?);
                 return Ok(());
             }
         }
+    }
+
+    /// Pairs of shot and element in which the source lay behind the element, where several devices counted them.
+    pub(super) fn behind(&self) -> u64 {
+        self.several.as_ref().map_or(0, Several::behind)
     }
 
     fn batch(&mut self, i: usize) -> &mut Commands {
@@ -334,6 +385,40 @@ impl Passes {
             estimate: self.estimate.bind(device, batch, on)?,
             relief,
         })
+    }
+
+    pub fn sends_evenly_first(&self, on: &OnDevice<'_>) -> bool {
+        self.estimate.sends_evenly_first(on)
+    }
+
+    /// Measures, chooses the sources of a batch, and finds what they send by direction.
+    pub fn choose(
+        &self,
+        cmd: &Commands,
+        sets: &Sets,
+        on: &OnDevice<'_>,
+        batch: &Batch,
+        (parameters, sending): (&Parameters, Sending),
+    ) {
+        self.measure(cmd, sets, on, sending);
+        self.select.record(cmd, &sets.select, parameters);
+        cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+        if let Some((sources, sets, relief)) = self.directed(sets, on, sending) {
+            sources.send(cmd, sets, relief, batch);
+        }
+    }
+
+    /// Keeps fresh form factors and gathers.
+    pub fn gather(
+        &self,
+        cmd: &Commands,
+        sets: &Sets,
+        on: &OnDevice<'_>,
+        batch: &Batch,
+        sending: Sending,
+    ) {
+        let (estimate, bound) = (&self.estimate, &sets.estimate);
+        estimate.record_gather(cmd, bound, batch, on, sending);
     }
 
     /// The sources that send by direction.

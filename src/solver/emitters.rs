@@ -49,5 +49,5 @@ pub(super) fn new(
         stop_power: 0.0,
         least_emitted: least as f32,
     };
-    BatchLoop::new(device, passes, batch, on, rule).map(Some)
+    BatchLoop::new(device, passes, batch, on, rule, None).map(Some)
 }

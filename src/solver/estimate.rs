@@ -8,7 +8,7 @@ use super::batch::OnDevice;
 use crate::error::Result;
 use crate::passes::bin_pixels::{self, BinPixels};
 use crate::passes::buffers::Batch;
-use crate::passes::form_factors::{self, FormFactors};
+use crate::passes::form_factors::{self, Behind, FormFactors};
 use crate::passes::gather::{self, Gather, GatherRelief};
 use crate::passes::keep::{self, Keep};
 use crate::passes::measure_relief::MeasureRelief;
@@ -77,7 +77,7 @@ impl Estimate {
         let normalise = on.scene.enclosed.then(|| Normalise::new(device));
         let keep = factors.keeps().then(|| Keep::new(device));
         Ok(Self::Receivers {
-            form_factors: FormFactors::new(device, on.relief.is_some())?,
+            form_factors: FormFactors::new(device, on.relief.is_some(), Behind::ByElement)?,
             normalise: normalise.transpose()?,
             keep: keep.transpose()?,
             gather: match on.relief {
@@ -100,7 +100,13 @@ impl Estimate {
                 Some(factors),
                 relief,
             ) => Bound::Receivers {
-                form_factors: form_factors.bind(device, (scene, state), batch, factors, relief)?,
+                form_factors: form_factors.bind(
+                    device,
+                    (scene, &state.behind),
+                    batch,
+                    factors,
+                    relief.map(|relief| &relief.elements),
+                )?,
                 normalise: (normalise.as_ref())
                     .map(|n| n.bind(scene, batch, factors))
                     .transpose()?,
@@ -141,17 +147,15 @@ impl Estimate {
                 Self::Receivers {
                     form_factors,
                     normalise,
-                    keep,
-                    gather,
+                    ..
                 },
                 Bound::Receivers {
                     form_factors: sets,
                     normalise: normalise_set,
-                    keep: keep_sets,
-                    gather: gather_sets,
+                    ..
                 },
                 Some(factors),
-                relief,
+                _,
             ) => {
                 cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
                 form_factors.record(cmd, sets, batch, factors);
@@ -161,26 +165,7 @@ impl Estimate {
                     cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
                 }
                 found();
-                if let (Some(keep), Some(sets)) = (keep, keep_sets) {
-                    keep.record(cmd, sets, batch, factors);
-                    cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-                }
-                match (gather, gather_sets, relief) {
-                    (GatherBy::Plain(gather), GatherSets::Plain(sets), _) => {
-                        gather.record(cmd, sets, batch, factors);
-                    }
-                    (GatherBy::Relief(gather), GatherSets::Relief(sets), Some(relief)) => {
-                        match sending {
-                            Sending::Evenly => {
-                                gather.record_evenly(cmd, sets, relief, batch, factors);
-                            }
-                            Sending::ByDirection => {
-                                gather.record(cmd, sets, relief, batch, factors);
-                            }
-                        }
-                    }
-                    _ => unreachable!("bound as it was made"),
-                }
+                self.record_gather(cmd, bound, batch, on, sending);
             }
             (Self::Pixels(pass), Bound::Pixels(buffers), ..) => {
                 pass.record(cmd, buffers, on.scene, batch);
@@ -190,6 +175,43 @@ impl Estimate {
                 pass.record(cmd, buffers, relief, batch);
                 found();
             }
+            _ => unreachable!("bound as it was made"),
+        }
+    }
+
+    /// Keeps fresh form factors and gathers by all; of the `receiver` estimator.
+    pub fn record_gather(
+        &self,
+        cmd: &Commands,
+        bound: &Bound,
+        batch: &Batch,
+        on: &OnDevice<'_>,
+        sending: Sending,
+    ) {
+        let (
+            Self::Receivers { keep, gather, .. },
+            Bound::Receivers {
+                keep: keep_sets,
+                gather: gather_sets,
+                ..
+            },
+            Some(factors),
+        ) = (self, bound, on.factors)
+        else {
+            unreachable!("asked for where there are form factors")
+        };
+        if let (Some(keep), Some(sets)) = (keep, keep_sets) {
+            keep.record(cmd, sets, batch, factors);
+            cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+        }
+        match (gather, gather_sets, on.relief) {
+            (GatherBy::Plain(gather), GatherSets::Plain(sets), _) => {
+                gather.record(cmd, sets, batch, factors);
+            }
+            (GatherBy::Relief(gather), GatherSets::Relief(sets), Some(relief)) => match sending {
+                Sending::Evenly => gather.record_evenly(cmd, sets, relief, batch, factors),
+                Sending::ByDirection => gather.record(cmd, sets, relief, batch, factors),
+            },
             _ => unreachable!("bound as it was made"),
         }
     }

@@ -5,13 +5,18 @@
 
 mod ambient;
 mod batch;
+mod devices;
+mod drawer;
 mod emitters;
 mod estimate;
+mod helpers;
 mod look;
 mod relief_light;
 mod report;
+mod schedule;
 mod self_test;
 mod settings;
+mod several;
 mod visibility;
 
 use std::cell::Cell;
@@ -36,6 +41,7 @@ use crate::vk::Device;
 
 pub use ambient::Ambient;
 use batch::{BatchLoop, OnDevice, Passes, Rule};
+pub use devices::{check_devices, open_devices};
 pub use look::ItemPicture;
 pub use relief_light::ReliefLight;
 pub use report::{Report, Seconds, Skipped, StopReason};
@@ -96,7 +102,7 @@ impl Solver {
         lights: &[PointLight],
         settings: &Settings,
     ) -> Result<Self> {
-        Self::with_kept(device, elements, lights, settings, None)
+        Self::on_devices(&[Arc::clone(device)], elements, lights, settings, None)
     }
 
     /// As [`Self::new`], for the `elements` of a scene whose form factors were kept when it was lit otherwise. The sources are cut
@@ -111,17 +117,24 @@ impl Solver {
         settings: &Settings,
         kept: &Visibility,
     ) -> Result<Self> {
-        Self::with_kept(device, elements, lights, settings, Some(kept))
+        let devices = [Arc::clone(device)];
+        Self::on_devices(&devices, elements, lights, settings, Some(kept))
     }
 
-    fn with_kept(
-        device: &Arc<Device>,
+    /// As [`Self::new`] or [`Self::relit`], with all of `devices`, the first of which holds the solution. The others draw for it. Devices
+    /// that draw alike, as those of one kind and driver do, give the same bytes as one.
+    ///
+    /// # Errors
+    /// No device, or several for what one alone can do; see [`check_devices`].
+    pub fn on_devices(
+        devices: &[Arc<Device>],
         mut elements: Elements,
         lights: &[PointLight],
         settings: &Settings,
         kept: Option<&Visibility>,
     ) -> Result<Self> {
         settings.check()?;
+        let (device, others) = check_devices(devices, settings)?;
         let start = Instant::now();
         let (grouping, seed) = (&settings.grouping, settings.seed);
         let (sources, connections) = match kept {
@@ -139,7 +152,13 @@ impl Solver {
             Estimator::Receiver if settings.merging => Occluders::merged(&elements, &connections),
             _ => Occluders::elements(&elements),
         };
-        let scene = SceneBuffers::new(device, &elements, &sources, &connections, &occluders)?;
+        let parts = devices::Parts {
+            elements: &elements,
+            sources: &sources,
+            connections: &connections,
+            occluders: &occluders,
+        };
+        let scene = parts.scene(device)?;
         let state = State::new(device, &scene)?;
         let item_buffer = ItemBuffer::new(device)?;
         let wanted = settings.batch.clamp(1, scene.source_count.max(1));
@@ -166,7 +185,7 @@ impl Solver {
             Estimator::Receiver => Some(FactorBuffers::new(
                 device,
                 &scene,
-                relief.as_ref(),
+                relief.as_ref().map_or(0, |r| r.element_count),
                 slots.0,
                 (memory, kept.map(|k| (k.header.chunk_words, k.chunks.len()))),
             )?),
@@ -199,8 +218,9 @@ impl Solver {
             stop_power: stop_power as f32,
             least_emitted: 0.0,
         };
-        let batches = BatchLoop::new(device, &passes, batch, &on, rule)?;
-        let mut report = Report::new(device, settings, &elements, &sources, slots.0);
+        let team = parts.team(settings, (device, &scene), others)?;
+        let batches = BatchLoop::new(device, &passes, batch, &on, rule, team)?;
+        let mut report = Report::new(devices, settings, &elements, &sources, slots.0);
         report.emitter_hemicube = emitters.as_ref().map_or(face, BatchLoop::face_size);
         report.set_meshlets(scene.meshlet_count);
         report.skipped.triangles_merged = (elements.len() - occluders.len()) as u64;
@@ -293,7 +313,7 @@ impl Solver {
             stop.get().is_none()
         };
         if let Some(emitters) = &mut self.emitters {
-            emitters.run(|batch| look(batch, true))?;
+            emitters.run_before(&mut self.batches, |batch| look(batch, true))?;
         }
         if stop.get().is_none() {
             self.emitters = None;
@@ -315,7 +335,8 @@ impl Solver {
             report.kept_sources = state.rows.into();
         }
         let behind: Vec<u32> = download(&self.device, &self.state.behind, self.elements.len())?;
-        report.skipped.receivers_behind_source = behind.iter().map(|&b| u64::from(b)).sum();
+        let behind: u64 = behind.iter().map(|&b| u64::from(b)).sum();
+        report.skipped.receivers_behind_source = behind + self.batches.behind();
         if let Some(relief) = &self.relief {
             let sources = relief.source_count as usize;
             let dark: Vec<u32> = download(&self.device, &relief.dark_slots, sources)?;

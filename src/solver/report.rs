@@ -1,5 +1,7 @@
 //! What a bake says of itself.
 
+use std::sync::Arc;
+
 use serde::Serialize;
 
 use super::{BatchResult, Estimator, Settings};
@@ -20,7 +22,7 @@ pub enum StopReason {
     Interrupted,
 }
 
-/// Seconds by stage.
+/// Seconds by stage; of several devices together.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Seconds {
     /// Wall time of grouping the elements and bringing them to the device.
@@ -61,6 +63,8 @@ pub struct Skipped {
 #[derive(Debug, Clone, Serialize)]
 pub struct Report {
     pub device: String,
+    /// Those that drew for it.
+    pub other_devices: Vec<String>,
     pub estimator: &'static str,
     pub hemicube: u32,
     /// Of strong emitters; `hemicube` where none is drawn more finely.
@@ -114,14 +118,16 @@ impl ReliefReport {
 
 impl Report {
     pub(super) fn new(
-        device: &Device,
+        devices: &[Arc<Device>],
         settings: &Settings,
         elements: &Elements,
         sources: &Sources,
         batch: u32,
     ) -> Self {
+        let mut names = devices.iter().map(|device| device.name().to_owned());
         Self {
-            device: device.name().to_owned(),
+            device: names.next().unwrap_or_default(),
+            other_devices: names.collect(),
             estimator: match settings.estimator {
                 Estimator::Receiver => "receiver",
                 Estimator::Pixel => "pixel",

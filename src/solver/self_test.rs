@@ -41,9 +41,15 @@ pub fn choose_device(instance: &Instance, wanted: Option<&str>) -> Result<Candid
                 .and_then(|i| candidates.iter().find(|c| c.index == i));
             by_index.or_else(|| {
                 let lower = wanted.to_lowercase();
-                candidates
-                    .iter()
-                    .find(|c| c.name.to_lowercase().contains(&lower))
+                // A number is an index or a model: that of a version somewhere in a name is neither.
+                let number = lower.bytes().all(|b| b.is_ascii_digit());
+                candidates.iter().find(|c| {
+                    let name = c.name.to_lowercase();
+                    match number {
+                        true => name.split_whitespace().any(|word| word == lower),
+                        false => name.contains(&lower),
+                    }
+                })
             })
         }
     };
