@@ -1,5 +1,5 @@
-// A surface in a window as sRGB codes: its radiance L = ρ(u, v) · E / π + Le by the light of the corners, or a picture drawn
-// before; over it, outlines of elements and colours of sources.
+// A surface in a window as sRGB codes: its radiance L = ρ(u, v) · E / π + Le by the light of the corners, or what a picture drawn
+// before shows there, from here or from elsewhere; over it, outlines of elements and colours of sources.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 
@@ -14,10 +14,30 @@ layout(location = 6) flat in uint corner_triangle;
 layout(location = 0) out vec4 code;
 
 layout(binding = 0) uniform sampler2D albedo;
-// [drawn triangle]: its place in the input, and its source.
-layout(scalar, binding = 3) readonly buffer About { uvec2 about[]; };
-// sRGB codes of the whole view.
-layout(binding = 4) uniform sampler2D picture;
+struct About {
+    uint triangle;         // its place in the input
+    uint source;
+    float rise;            // how far relief reaches above or below it, internal units
+};
+
+// The view that a picture was drawn of: rows over (p, 1).
+struct PictureView {
+    vec4 x;
+    vec4 y;
+    vec4 w;
+    vec3 eye;
+    float pixel;           // half a pixel's angle, as a tangent; 0: the picture is not to be shown
+    vec2 share;            // of the image that is the picture
+};
+
+// [drawn triangle]
+layout(scalar, binding = 3) readonly buffer AboutTriangles { About about[]; };
+// sRGB codes of whole views, with how far along the view each pixel is: the last with all its pixels, and a later coarse one.
+layout(binding = 4) uniform sampler2D whole;
+layout(binding = 5) uniform sampler2D coarse;
+layout(binding = 6) uniform sampler2D whole_distances;
+layout(binding = 7) uniform sampler2D coarse_distances;
+layout(scalar, binding = 8) readonly buffer Views { PictureView views[2]; };
 
 layout(push_constant, scalar) uniform Parameters {
     vec4 x;
@@ -32,7 +52,7 @@ layout(push_constant, scalar) uniform Parameters {
     vec2 parts;            // how often all light and direct light count
     float elements;        // 1: outlined
     float sources;         // 1: coloured
-    uint from_picture;     // 1: the surface is what the picture shows
+    uint from_picture;     // 1 and 2: the surface is what the whole or the coarse picture shows; 3: what they show from elsewhere
     uint chosen;           // element that is marked
 };
 
@@ -60,11 +80,47 @@ vec3 srgb(vec3 linear) {
     return mix(1.055 * pow(linear, vec3(1.0 / 2.4)) - 0.055, 12.92 * linear, lessThanEqual(linear, vec3(0.0031308)));
 }
 
+// Least cosine under which a picture saw what it is laid over: a pixel there is as wide as four here.
+const float LEAST_COSINE = 0.25;
+// Half pixels by which a surface may lie before or behind what the picture's pixel shows beside it.
+const float SLACK = 3.0;
+
+// Where in a picture's image this place is shown, 0 to 1; elsewhere `found` is false.
+vec2 in_picture(uint i, sampler2D distances, out bool found) {
+    PictureView view = views[i];
+    vec4 p = vec4(corner_position, 1.0);
+    float away = dot(p, view.w);
+    vec2 at = 0.5 * vec2(dot(p, view.x), dot(p, view.y)) / away + 0.5;
+    vec3 way = view.eye - corner_position;
+    float cosine = dot(normalize(way), triangle_normal);
+    found = view.pixel > 0.0 && away > 0.0 && cosine > LEAST_COSINE
+         && all(greaterThan(at, vec2(0.0))) && all(lessThan(at, vec2(1.0)));
+    if (found) {
+        // Relief is where its mesh is by so much; what stands before it is nearer.
+        float seen = texelFetch(distances, ivec2(at * view.share * vec2(textureSize(distances, 0))), 0).r;
+        float slack = (about[corner_triangle].rise + SLACK * view.pixel * away) / cosine;
+        found = abs(seen - away) <= slack;
+    }
+    return at * view.share;
+}
+
 vec3 shown() {
-    if (from_picture == 1) {
+    if (from_picture == 1 || from_picture == 2) {
         vec4 p = vec4(corner_position, 1.0);
-        vec2 at = vec2(dot(p, x), dot(p, y)) / dot(p, w);
-        return texture(picture, 0.5 * at + 0.5).rgb;
+        vec2 at = 0.5 * vec2(dot(p, x), dot(p, y)) / dot(p, w) + 0.5;
+        at *= views[from_picture - 1].share;
+        return from_picture == 1 ? textureLod(whole, at, 0.0).rgb : textureLod(coarse, at, 0.0).rgb;
+    }
+    if (from_picture == 3) {
+        bool found;
+        vec2 at = in_picture(0, whole_distances, found);
+        if (found) {
+            return textureLod(whole, at, 0.0).rgb;
+        }
+        at = in_picture(1, coarse_distances, found);
+        if (found) {
+            return textureLod(coarse, at, 0.0).rgb;
+        }
     }
     if (dot(triangle_normal, eye - corner_position) <= 0.0) {
         return vec3(0.0);
@@ -82,9 +138,9 @@ vec3 hue(uint number) {
 
 void main() {
     vec3 colour = shown();
-    uvec2 own = about[corner_triangle];
+    About own = about[corner_triangle];
     if (sources > 0.0) {
-        colour = mix(colour, hue(own.y), 0.45 * sources);
+        colour = mix(colour, hue(own.source), 0.45 * sources);
     }
     // Pixels to the nearest edge.
     vec3 to_edge = corner_share / max(fwidth(corner_share), vec3(1e-6));
@@ -95,7 +151,7 @@ void main() {
         float seen = elements * clamp(1.0 - 3.0 * widest, 0.0, 1.0);
         colour = mix(colour, vec3(0.0), 0.6 * seen * clamp(1.2 - edge, 0.0, 1.0));
     }
-    if (own.x == chosen) {
+    if (own.triangle == chosen) {
         colour = mix(colour, vec3(1.0, 0.6, 0.1), edge < 2.0 ? 1.0 : 0.25);
     }
     code = vec4(colour, 1.0);
