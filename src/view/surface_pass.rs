@@ -1,5 +1,5 @@
 //! Draws the surfaces of a scene by the light of their corners, from an eye that moves freely. Shaders: `view_mesh.vert`,
-//! `view_mesh.frag`.
+//! `view_mesh.frag`, `view_mesh_laid.frag`.
 
 use std::sync::Arc;
 
@@ -102,7 +102,9 @@ pub struct Shown {
 
 /// A scene ready to be drawn.
 pub struct SurfacePass {
-    pipeline: GraphicsPipeline,
+    plain: GraphicsPipeline,
+    /// With pictures laid over.
+    laid: GraphicsPipeline,
     sampler: Sampler,
     /// A picture ends at its edges.
     held: Sampler,
@@ -153,40 +155,44 @@ impl SurfacePass {
             offset: offset as u32,
         };
         let storage = Binding::Storage;
-        let pipeline = GraphicsPipeline::new(
-            device,
-            pass,
-            &GraphicsState {
-                name: "surfaces",
-                vertex: shaders::VIEW_MESH_VERT,
-                fragment: shaders::VIEW_MESH_FRAG,
-                bindings: &[
-                    Binding::Sampled,
-                    storage,
-                    storage,
-                    storage,
-                    Binding::Sampled,
-                    Binding::Sampled,
-                    Binding::Sampled,
-                    Binding::Sampled,
-                    storage,
-                ],
-                push_bytes: size_of::<Parameters>(),
-                vertex_stride: size_of::<Vertex>() as u32,
-                attributes: &[
-                    attribute(
-                        Format::R32G32B32_SFLOAT,
-                        std::mem::offset_of!(Vertex, position),
-                    ),
-                    attribute(
-                        Format::R32G32B32_SFLOAT,
-                        std::mem::offset_of!(Vertex, normal),
-                    ),
-                    attribute(Format::R32G32_SFLOAT, std::mem::offset_of!(Vertex, uv)),
-                ],
-                sums: false,
-            },
-        )?;
+        let pipeline = |name, fragment| {
+            GraphicsPipeline::new(
+                device,
+                pass,
+                &GraphicsState {
+                    name,
+                    vertex: shaders::VIEW_MESH_VERT,
+                    fragment,
+                    bindings: &[
+                        Binding::Sampled,
+                        storage,
+                        storage,
+                        storage,
+                        Binding::Sampled,
+                        Binding::Sampled,
+                        Binding::Sampled,
+                        Binding::Sampled,
+                        storage,
+                    ],
+                    push_bytes: size_of::<Parameters>(),
+                    vertex_stride: size_of::<Vertex>() as u32,
+                    attributes: &[
+                        attribute(
+                            Format::R32G32B32_SFLOAT,
+                            std::mem::offset_of!(Vertex, position),
+                        ),
+                        attribute(
+                            Format::R32G32B32_SFLOAT,
+                            std::mem::offset_of!(Vertex, normal),
+                        ),
+                        attribute(Format::R32G32_SFLOAT, std::mem::offset_of!(Vertex, uv)),
+                    ],
+                    sums: false,
+                },
+            )
+        };
+        let plain = pipeline("surfaces", shaders::VIEW_MESH_FRAG)?;
+        let laid = pipeline("surfaces under pictures", shaders::VIEW_MESH_LAID_FRAG)?;
         let mut order: Vec<u32> = (0..scene.triangles.len() as u32).collect();
         let material = |e: u32| scene.triangles[e as usize].material;
         order.sort_by_key(|&e| material(e));
@@ -225,7 +231,8 @@ impl SurfacePass {
         let mut views = stream("pictures' views", size_of::<[PictureView; 2]>() as u64)?;
         views.write(0, &[PictureView::zeroed(); 2]);
         let mut surfaces = Self {
-            pipeline,
+            plain,
+            laid,
             sampler: Sampler::new(device, "surfaces", true)?,
             held: Sampler::held(device, "detailed picture")?,
             textures,
@@ -256,7 +263,7 @@ impl SurfacePass {
     fn bind(&mut self) -> Result<()> {
         let [whole, coarse] = &self.pictures;
         let set = |image| {
-            self.pipeline.bind(
+            self.plain.bind(
                 "surfaces",
                 &[
                     Bind::Image(image, &self.sampler),
@@ -355,13 +362,17 @@ impl SurfacePass {
     /// Draws within the render pass that is under way.
     pub fn record(&self, cmd: &Commands, seen: &Rows, shown: &Shown) {
         cmd.bind_indices(&self.indices);
+        let pipeline = match shown.picture {
+            Laid::No => &self.plain,
+            Laid::Exactly | Laid::FromElsewhere => &self.laid,
+        };
         for &(material, first, count) in &self.ranges {
             let material = material as usize;
             let set = &self.sets[self.texture_of[material]];
-            cmd.bind_graphics(&self.pipeline, set, &self.vertices);
+            cmd.bind_graphics(pipeline, set, &self.vertices);
             let [all, direct, emission] = shown.parts;
             cmd.push_graphics(
-                &self.pipeline,
+                pipeline,
                 &Parameters {
                     x: seen.x,
                     y: seen.y,
