@@ -16,24 +16,8 @@ struct About {
     float rise;            // how far relief reaches above or below it, internal units
 };
 
-// The view that a picture was drawn of: rows over (p, 1).
-struct PictureView {
-    vec4 x;
-    vec4 y;
-    vec4 w;
-    vec3 eye;
-    float pixel;           // half a pixel's angle, as a tangent; 0: the picture is not to be shown
-    vec2 share;            // of the image that is the picture
-};
-
 // [drawn triangle]
 layout(scalar, binding = 3) readonly buffer AboutTriangles { About about[]; };
-// sRGB codes of whole views, with how far along the view each pixel is: the last with all its pixels, and a later coarse one.
-layout(binding = 4) uniform sampler2D whole;
-layout(binding = 5) uniform sampler2D coarse;
-layout(binding = 6) uniform sampler2D whole_distances;
-layout(binding = 7) uniform sampler2D coarse_distances;
-layout(scalar, binding = 8) readonly buffer Views { PictureView views[2]; };
 
 layout(push_constant, scalar) uniform Parameters {
     vec4 x;

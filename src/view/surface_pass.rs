@@ -1,5 +1,5 @@
 //! Draws the surfaces of a scene by the light of their corners, from an eye that moves freely. Shaders: `view_mesh.vert`,
-//! `view_mesh.frag`, `view_mesh_laid.frag`.
+//! `view_mesh.frag`, `view_mesh_laid.vert`, `view_mesh_laid.frag`.
 
 use std::sync::Arc;
 
@@ -155,13 +155,13 @@ impl SurfacePass {
             offset: offset as u32,
         };
         let storage = Binding::Storage;
-        let pipeline = |name, fragment| {
+        let pipeline = |name, vertex, fragment| {
             GraphicsPipeline::new(
                 device,
                 pass,
                 &GraphicsState {
                     name,
-                    vertex: shaders::VIEW_MESH_VERT,
+                    vertex,
                     fragment,
                     bindings: &[
                         Binding::Sampled,
@@ -191,8 +191,12 @@ impl SurfacePass {
                 },
             )
         };
-        let plain = pipeline("surfaces", shaders::VIEW_MESH_FRAG)?;
-        let laid = pipeline("surfaces under pictures", shaders::VIEW_MESH_LAID_FRAG)?;
+        let plain = pipeline("surfaces", shaders::VIEW_MESH_VERT, shaders::VIEW_MESH_FRAG)?;
+        let laid = pipeline(
+            "surfaces under pictures",
+            shaders::VIEW_MESH_LAID_VERT,
+            shaders::VIEW_MESH_LAID_FRAG,
+        )?;
         let mut order: Vec<u32> = (0..scene.triangles.len() as u32).collect();
         let material = |e: u32| scene.triangles[e as usize].material;
         order.sort_by_key(|&e| material(e));

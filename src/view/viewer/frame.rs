@@ -58,7 +58,17 @@ impl Viewer {
         };
         let capture = self.capture.is_some();
         let (surfaces, panel_pass) = (&self.surfaces, &self.panel_pass);
+        // A software driver compiles a shader when something is drawn by it first: not while a person waits.
+        let first = (!self.timing.has_begun()).then_some(surface_pass::Shown {
+            picture: Laid::FromElsewhere,
+            ..shown
+        });
         let (answer, captured) = self.screen.show(capture, |cmd| {
+            if let Some(unseen) = &first {
+                cmd.scissor(0, 0, 1, 1);
+                surfaces.record(cmd, &rows, unseen);
+                cmd.scissor(0, 0, size.0, size.1);
+            }
             if shown.picture == Laid::Exactly {
                 panel_pass.record_picture(cmd, &prepared);
             }
