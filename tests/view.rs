@@ -75,8 +75,31 @@ fn told(output: &Output) -> String {
 
 /// Shows `input` on a display of its own, driven by a script, under the validation layer; returns what the program told.
 fn view(folder: &Path, input: &str, script: &str) -> String {
+    view_in(SIZE, folder, input, script)
+}
+
+fn view_in(size: &str, folder: &Path, input: &str, script: &str) -> String {
     let display = Display::new();
-    finish(start(&display, folder, input, script), script)
+    finish(start(&display, size, folder, input, script), script)
+}
+
+/// What each thread of a process waits for in the kernel, and its time on a core.
+fn where_it_waits(process: u32) -> String {
+    let threads = std::fs::read_dir(format!("/proc/{process}/task")).into_iter();
+    let lines = threads.flatten().flatten().map(|thread| {
+        let told =
+            |what: &str| std::fs::read_to_string(thread.path().join(what)).unwrap_or_default();
+        let stat = told("stat");
+        let ticks: Vec<_> = stat
+            .rsplit(')')
+            .next()
+            .unwrap_or_default()
+            .split(' ')
+            .collect();
+        let ticks = ticks.get(12..14).unwrap_or_default().join(" + ");
+        format!("{}: {}, {ticks} ticks", told("comm").trim(), told("wchan"))
+    });
+    lines.collect::<Vec<_>>().join("\n")
 }
 
 /// Longest run of a test's window: two cores may have much else to do.
@@ -87,8 +110,10 @@ fn finish(mut child: Child, script: &str) -> String {
     let begin = Instant::now();
     while child.try_wait().expect("a child").is_none() {
         if begin.elapsed() > PATIENCE {
+            let waits = where_it_waits(child.id());
             let _ = child.kill();
             let output = child.wait_with_output().expect("a child");
+            println!("{waits}");
             panic!("still open: {script}: {}", told(&output));
         }
         std::thread::sleep(Duration::from_millis(20));
@@ -101,11 +126,11 @@ fn finish(mut child: Child, script: &str) -> String {
     text
 }
 
-fn start(display: &Display, folder: &Path, input: &str, script: &str) -> Child {
+fn start(display: &Display, size: &str, folder: &Path, input: &str, script: &str) -> Child {
     std::fs::write(folder.join("script"), script).expect("written");
-    let args = ["view", input, "--script", "script", "--size", SIZE];
+    let args = ["view", input, "--script", "script", "--size", size];
     mesolux(folder, &args)
-        .args(["--validate", "--quality", "draft"])
+        .args(["--validate", "--quality", "draft", "--directions", "16"])
         .args(device())
         .env("DISPLAY", &display.name)
         .stderr(Stdio::piped())
@@ -136,7 +161,7 @@ fn mean(picture: &RgbImage) -> [f64; 3] {
 }
 
 /// A room of 2 × 2 × 2 with a red and a green wall, a lamp in its ceiling and a point light, seen through the side that it
-/// lacks; and its bake with what --relight needs.
+/// lacks; and its bake with what --relight needs. As `relief.toml` its back wall has a bump on each of its squares.
 struct Room {
     folder: tempfile::TempDir,
 }
@@ -155,7 +180,7 @@ impl Room {
                         corner[axis]
                             + (u[axis] * column as f64 + v[axis] * row as f64) / side as f64
                     };
-                    obj += &format!("v {} {} {}\n", at(0), at(1), at(2));
+                    obj += &format!("v {} {} {}\nvt {column} {row}\n", at(0), at(1), at(2));
                 }
             }
             obj += &format!("usemtl {material}\n");
@@ -163,7 +188,9 @@ impl Room {
                 for column in 0..side {
                     let a = vertices + row * (side + 1) + column + 1;
                     let b = a + side + 1;
-                    obj += &format!("f {a} {} {} {b}\n", a + 1, b + 1);
+                    let corner = |i: usize| format!("{i}/{i}");
+                    let corners = [a, a + 1, b + 1, b].map(corner).join(" ");
+                    obj += &format!("f {corners}\n");
                 }
             }
             vertices += (side + 1) * (side + 1);
@@ -171,17 +198,27 @@ impl Room {
         let (x, y, z) = ([2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]);
         wall("white", [-1.0, -1.0, 1.0], x, [0.0, 0.0, -2.0], SIDE);
         wall("white", [-1.0, 1.0, -1.0], x, z, SIDE);
-        wall("white", [-1.0, -1.0, -1.0], x, y, SIDE);
+        wall("back", [-1.0, -1.0, -1.0], x, y, SIDE);
         wall("red", [-1.0, -1.0, 1.0], [0.0, 0.0, -2.0], y, SIDE);
         wall("green", [1.0, -1.0, -1.0], z, y, SIDE);
         let lamp = ([-0.3, 0.98, -0.3], [0.6, 0.0, 0.0], [0.0, 0.0, 0.6]);
         wall("lamp", lamp.0, lamp.1, lamp.2, 2);
-        let materials = "newmtl white\nKd 0.7 0.7 0.7\nnewmtl red\nKd 0.7 0.1 0.1\nnewmtl green\nKd 0.1 0.6 0.1\n\
+        let materials = "newmtl white\nKd 0.7 0.7 0.7\nnewmtl back\nKd 0.7 0.7 0.7\nnewmtl red\nKd 0.7 0.1 0.1\nnewmtl green\nKd 0.1 0.6 0.1\n\
              newmtl lamp\nKd 0 0 0\nKe 8 8 8\n";
         let toml = "[[mesh]]\nfile = \"room.obj\"\n\
              [[point_light]]\nname = \"bulb\"\nposition = [0.5, 0.0, 0.0]\nintensity = [0.2, 0.2, 0.2]\n\
              [[camera]]\nname = \"front\"\nposition = [0.0, 0.0, 3.6]\nlook_at = [0.0, 0.0, 0.0]\nfov = 42.0\n";
+        let relief = format!(
+            "{toml}[[camera]]\nname = \"corner\"\nposition = [0.8, 0.7, 0.9]\nlook_at = [-0.3, -0.3, -1.0]\nfov = 60.0\n\
+             [material.back]\nheight_map = \"bump.png\"\nheight_scale = 0.08\n"
+        );
+        let hill = |i: u32| 0.5 - 0.5 * (std::f64::consts::TAU * (f64::from(i) + 0.5) / 16.0).cos();
+        let bump = image::GrayImage::from_fn(16, 16, |x, y| {
+            image::Luma([(255.0 * hill(x) * hill(y)).round() as u8])
+        });
+        bump.save(folder.path().join("bump.png")).expect("written");
         for (name, text) in [
+            ("relief.toml", &relief[..]),
             ("room.obj", &obj[..]),
             ("room.mtl", materials),
             ("room.toml", toml),
@@ -191,16 +228,21 @@ impl Room {
         Self { folder }
     }
 
-    fn baked() -> Self {
+    /// With the bake of `scene` beside it.
+    fn baked(scene: &str) -> Self {
         let room = Self::new();
-        let output = mesolux(
-            room.path(),
-            &["bake", "room.toml", "-o", "room.safetensors"],
-        )
-        .args(["--keep-visibility", "--quality", "draft"])
-        .args(device())
-        .output()
-        .expect("the program runs");
+        let (toml, bake) = (format!("{scene}.toml"), format!("{scene}.safetensors"));
+        let output = mesolux(room.path(), &["bake", &toml, "-o", &bake])
+            .args([
+                "--keep-visibility",
+                "--quality",
+                "draft",
+                "--directions",
+                "16",
+            ])
+            .args(device())
+            .output()
+            .expect("the program runs");
         assert!(output.status.success(), "{}", told(&output));
         room
     }
@@ -219,7 +261,7 @@ const QUIET: &str = "set panel off\nset detail off\n";
 
 #[test]
 fn opens_orbits_and_flies() {
-    let room = Room::baked();
+    let room = Room::baked("room");
     let script = format!(
         "{QUIET}frames 2\nscreenshot front.png
          move 200 120\npress middle\nmove 240 140\nrelease middle\nframes 1\nscreenshot orbit.png
@@ -255,22 +297,42 @@ fn opens_orbits_and_flies() {
     }
 }
 
-/// Mean difference of codes between a picture drawn in tiles of 96 pixels and in one: corners are rounded in the frame of their
-/// tile, so that of the samples along edges a few fall on the other side. Edges are on some 5 % of the pixels, and one sample of
-/// sixteen moves a pixel by less than 10 codes; of them one in 25 or fewer.
-const EDGES: f64 = 0.02;
+/// Two pictures of one view that were drawn in tiles of other sizes: corners are rounded in the frame of their tile, so that a sample
+/// which lies on an edge falls on either side of it. From the front, the four edges between the side walls, floor and ceiling run
+/// through the corners of samples, along 75 pixels each; elsewhere edges pass between samples. One sample of sixteen changes
+/// sides, which is at most the code of 1/16. All other pixels are the same.
+const ON_EDGES: usize = 4 * 75;
+const ONE_SAMPLE: u8 = 71;
+
+#[track_caller]
+fn assert_alike(a: &RgbImage, b: &RgbImage, name: &str) {
+    let pixels = a.pixels().zip(b.pixels()).filter(|(a, b)| a != b);
+    let differences: Vec<u8> = pixels
+        .map(|(a, b)| (0..3).map(|c| a[c].abs_diff(b[c])).max().unwrap_or(0))
+        .collect();
+    let most = differences.iter().copied().max().unwrap_or(0);
+    println!(
+        "{name}: {} pixels differ, by at most {most}",
+        differences.len()
+    );
+    assert_eq!(a.dimensions(), b.dimensions());
+    assert!(
+        differences.len() <= ON_EDGES && most <= ONE_SAMPLE,
+        "{name}: {} pixels differ, by up to {most}",
+        differences.len()
+    );
+}
 
 /// Once the view stays, the window shows what `render` draws; and without details nearly so.
 #[test]
 fn the_detailed_picture_is_that_of_render() {
-    let room = Room::baked();
+    let room = Room::baked("room");
     let script = "set panel off\nframes 1\ndetail\nscreenshot detail.png\nsave saved.png
         set detail off\nset direct slots\nscreenshot plain.png
         set detail on\ndetail\nscreenshot slots.png";
     view(room.path(), "room.safetensors", script);
     let (detail, saved) = (room.picture("detail.png"), room.picture("saved.png"));
-    let found = difference(&detail, &saved);
-    assert!(found < EDGES, "differ by {found}");
+    assert_alike(&detail, &saved, "detail");
     // One sample a pixel against sixteen: edges differ, walls by rounding.
     let (plain, slots) = (room.picture("plain.png"), room.picture("slots.png"));
     let found = difference(&plain, &slots);
@@ -278,9 +340,241 @@ fn the_detailed_picture_is_that_of_render() {
     assert!(detail != slots, "light points are sharper than elements");
 }
 
+/// A part of a picture: left, top, width, height.
+fn part(picture: &RgbImage, [left, top, width, height]: [u32; 4]) -> RgbImage {
+    image::imageops::crop_imm(picture, left, top, width, height).to_image()
+}
+
+/// Where the back wall is seen from the front, without its edges.
+const BACK_WALL: [u32; 4] = [105, 65, 110, 110];
+
+/// Each way of shading relief is that of `render`, and no two of them are alike.
+#[test]
+fn relief_is_shaded_as_render_does() {
+    let room = Room::baked("relief");
+    let shadings = ["factored", "clusters", "normal", "parallax", "none"];
+    let mut script = String::from("set panel off\nframes 1\n");
+    for shading in shadings {
+        script += &format!("set shading {shading}\ndetail\nscreenshot {shading}.png\n");
+    }
+    script += "save saved.png\n";
+    let text = view(room.path(), "relief.safetensors", &script);
+    let exposure = text.split("exposure ").nth(1).expect("told when saved");
+    let exposure = exposure.split_whitespace().next().unwrap_or_default();
+    for shading in shadings {
+        let to = format!("render-{shading}.png");
+        let args = ["render", "relief.safetensors", "-o", &to, "--size", SIZE];
+        let output = mesolux(room.path(), &args)
+            .args(["--shading", shading, "--exposure", exposure])
+            .args(device())
+            .output()
+            .expect("the program runs");
+        assert!(output.status.success(), "{}", told(&output));
+        let shown = room.picture(&format!("{shading}.png"));
+        assert_alike(&shown, &room.picture(&to), shading);
+        for other in shadings.iter().filter(|other| **other < shading) {
+            let other = part(&room.picture(&format!("{other}.png")), BACK_WALL);
+            let found = difference(&part(&shown, BACK_WALL), &other);
+            println!("{shading}: {found:.2} from another");
+            // A fifth of a code: what tells ways of shading apart is on the whole wall.
+            assert!(found > 0.2, "{shading} looks like another: {found}");
+        }
+    }
+}
+
+/// What a detailed picture shows stays on the surfaces while the view moves; what it does not show is drawn by the corners' light.
+#[test]
+fn relief_stays_while_the_view_moves() {
+    let room = Room::baked("relief");
+    let script = "set panel off\nframes 1\ndetail\nmove 200 120\npress middle\nmove 216 124\nframes 1
+        screenshot moving.png\nrelease middle\nset detail off\nframes 1\nscreenshot plain.png
+        set detail on\ndetail\nscreenshot still.png\nset shading none\nframes 1\nscreenshot switched.png";
+    view(room.path(), "relief.safetensors", script);
+    let wall = |name: &str| part(&room.picture(name), BACK_WALL);
+    let still = wall("still.png");
+    let (moving, plain) = (
+        difference(&wall("moving.png"), &still),
+        difference(&wall("plain.png"), &still),
+    );
+    println!("while it moves {moving:.2}, plain {plain:.2}");
+    assert!(
+        moving < 0.4 * plain,
+        "while it moves {moving}, without pictures {plain}"
+    );
+    // Another way of shading has pictures of its own.
+    let found = difference(&wall("switched.png"), &wall("plain.png"));
+    assert!(
+        found < 0.5 * plain,
+        "a picture of other shading is shown: {found}"
+    );
+}
+
+/// The mouse puts a light where it points, in the plane that faces the eye; Escape puts it back.
+#[test]
+fn a_light_is_dragged() {
+    let room = Room::baked("room");
+    // The plane of the light is 3.6 away and half of the picture is 21° high.
+    let half = 3.6 * 21.0_f64.to_radians().tan();
+    let (x, y) = (
+        (110.0 / 160.0 - 1.0) * half * 4.0 / 3.0,
+        (1.0 - 160.0 / 120.0) * half,
+    );
+    let script = format!(
+        "{QUIET}frames 1\nscreenshot before.png\nmove 200 120\nkey G\nmove 150 100\nmove 110 160
+         relit\nbake\nscreenshot dragged.png\npress left\nrelease left\nmove 60 60\nframes 1\nscreenshot left.png
+         key G\nmove 200 120\nrelit\nbake\nscreenshot again.png\nkey Escape\nrelit\nbake\nscreenshot back.png
+         set lamp bulb position 0 0 0\nset lamp bulb position {x} {y} 0\nrelit\nbake\nscreenshot set.png"
+    );
+    view(room.path(), "room.safetensors", &script);
+    let dragged = room.picture("dragged.png");
+    for same in ["left.png", "back.png", "set.png"] {
+        let found = difference(&dragged, &room.picture(same));
+        assert!(found < 0.1, "{same} differs by {found}");
+    }
+    for other in ["before.png", "again.png"] {
+        let found = difference(&dragged, &room.picture(other));
+        assert!(found > 1.0, "{other} differs by {found}");
+    }
+}
+
+/// Another number of directions and other heights are baked while the window is open.
+#[test]
+fn directions_and_heights_are_baked_anew() {
+    let room = Room::new();
+    let script = "set panel off\nset ambient off\nframes 1\nscreenshot first.png\nbake\ndetail\nscreenshot 16.png\nkey K\nbake\ndetail\nscreenshot 32.png
+        set height 0.5\nbake\ndetail\nscreenshot low.png\nset height 0\nbake\ndetail\nscreenshot flat.png
+        set shading none\ndetail\nscreenshot none.png";
+    view(room.path(), "relief.toml", script);
+    let [r, g, b] = mean(&room.picture("first.png"));
+    assert!(r + g + b > 60.0, "dark before there is light: {r} {g} {b}");
+    let wall = |name: &str| part(&room.picture(name), BACK_WALL);
+    // How uneven the wall is: bumps are lit from above.
+    let unevenness = |name: &str| {
+        let wall = wall(name);
+        let shifted = part(&wall, [0, 7, 110, 103]);
+        difference(&part(&wall, [0, 0, 110, 103]), &shifted)
+    };
+    let [k16, k32, low, flat] = ["16.png", "32.png", "low.png", "flat.png"].map(unevenness);
+    println!(
+        "uneven by {k16:.2} (K = 16), {k32:.2} (K = 32), {low:.2} at half the height, {flat:.2} flat"
+    );
+    let found = difference(&wall("16.png"), &wall("32.png"));
+    assert!(
+        found > 0.05 && (k16 - k32).abs() < 0.2 * k16,
+        "K: {found}, {k16}, {k32}"
+    );
+    assert!(k32 > 1.3 * low && low > 1.3 * flat, "{k32}, {low}, {flat}");
+    let found = difference(&wall("flat.png"), &wall("none.png"));
+    assert!(found < 0.01, "without height there is no relief: {found}");
+}
+
+/// What lies over the view, of a scene that was baked here and of a bake from a file.
+#[test]
+fn overlays_show_sources_slots_and_items() {
+    let room = Room::baked("relief");
+    let script = format!(
+        "{QUIET}frames 1\nbake\nframes 1\nscreenshot none.png\nkey P\noverlays\nframes 1\nscreenshot sources.png\nkey P
+         move 150 110\nkey H\nmove 151 111\nframes 1\nscreenshot slots.png\nkey H
+         press left\nrelease left\nframes 1\nscreenshot marked.png\nkey I\noverlays\nframes 1\nscreenshot items.png
+         key I\nkey Escape\nframes 1\nscreenshot again.png"
+    );
+    for input in ["relief.safetensors", "relief.toml"] {
+        view(room.path(), input, &script);
+        let none = room.picture("none.png");
+        assert!(room.picture("again.png") == none, "{input}");
+        let changed = |name: &str, place: [u32; 4]| {
+            difference(&part(&none, place), &part(&room.picture(name), place))
+        };
+        // Every wall is tinted; the hemisphere hangs at the pointer, the item buffer in the corner, and elsewhere is nothing new.
+        assert!(changed("sources.png", [0, 0, 320, 240]) > 5.0, "{input}");
+        let disc = [167, 127, 96, 96];
+        assert!(changed("slots.png", disc) > 10.0, "{input}");
+        assert!(changed("slots.png", [0, 0, 320, 100]) == 0.0, "{input}");
+        let (near, far) = (
+            changed("marked.png", [130, 90, 40, 40]),
+            changed("marked.png", [0, 0, 100, 240]),
+        );
+        assert!(near > 3.0 && far == 0.0, "{input}: {near}, {far}");
+        let corner = [228, 148, 84, 84];
+        assert!(changed("items.png", corner) > 20.0, "{input}");
+        assert!(changed("items.png", [0, 0, 100, 240]) == 0.0, "{input}");
+        // A source on the back wall sees four walls, the lamp and the open side; walls are of one piece in an item buffer.
+        let items = part(&room.picture("items.png"), corner);
+        let colours: std::collections::HashSet<_> = items.pixels().map(|p| p.0).collect();
+        assert!(colours.len() > 5, "{input}: {} colours", colours.len());
+    }
+}
+
+/// With the light that is not shot, what is cut short has nearly its brightness; the key takes it away.
+#[test]
+fn the_estimate_of_unshot_light_is_switched() {
+    let room = Room::new();
+    let script = format!(
+        "{QUIET}frames 1\nbake\nframes 1\nscreenshot with.png\nkey T\nframes 1\nscreenshot without.png\nkey T\nframes 1
+         screenshot again.png\nkey 2\nframes 1\nscreenshot direct.png\nkey T\nframes 1\nscreenshot straight.png"
+    );
+    let display = Display::new();
+    std::fs::write(room.path().join("script"), &script).expect("written");
+    let args = ["view", "room.toml", "--script", "script", "--size", SIZE];
+    let child = mesolux(room.path(), &args)
+        .args(["--validate", "--quality", "draft", "--shots", "12"])
+        .args(device())
+        .env("DISPLAY", &display.name)
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program runs");
+    finish(child, &script);
+    let sum = |name: &str| mean(&room.picture(name)).iter().sum::<f64>();
+    assert!(sum("with.png") > sum("without.png") + 10.0);
+    assert!(room.picture("with.png") == room.picture("again.png"));
+    // What comes straight from lights has none.
+    assert!(room.picture("direct.png") == room.picture("straight.png"));
+}
+
+/// Cameras in turn, and pictures in files as `save` and F12 write them.
+#[test]
+fn cameras_are_picked_and_pictures_saved() {
+    let room = Room::baked("relief");
+    let script = format!(
+        "{QUIET}frames 1\nscreenshot front.png\nkey C\nframes 1\nscreenshot corner.png\nkey C\nframes 1\nscreenshot again.png
+         key F12\nkey F12\nsave third.png"
+    );
+    let text = view(room.path(), "relief.safetensors", &script);
+    assert_eq!(text.matches("saved ").count(), 3, "{text}");
+    let front = room.picture("front.png");
+    assert!(difference(&front, &room.picture("corner.png")) > 10.0);
+    assert!(front == room.picture("again.png"));
+    let third = room.picture("third.png");
+    for name in ["mesolux-0001.png", "mesolux-0002.png"] {
+        assert!(room.picture(name) == third, "{name}");
+    }
+    // What is saved has its relief, which the window does not draw while details are off.
+    assert!(difference(&part(&front, BACK_WALL), &part(&third, BACK_WALL)) > 1.0);
+}
+
+/// A bake's bound falls in the panel, whose other lines tell what it waits for.
+#[test]
+fn the_panel_shows_the_error_bound() {
+    let room = Room::new();
+    let script = "set detail off\nframes 1\nbake\nframes 1\nscreenshot without.png\nkey B\nframes 2\nscreenshot bound.png";
+    view_in("480x640", room.path(), "room.toml", script);
+    // The curve is drawn in a light green that nothing else of the panel has.
+    let green = |name: &str| {
+        let picture = room.picture(name);
+        let near = |a: u8, b: u8| a.abs_diff(b) < 16;
+        let is_green = |p: &&image::Rgb<u8>| near(p[0], 144) && near(p[1], 238) && near(p[2], 144);
+        picture.pixels().filter(is_green).count()
+    };
+    assert!(
+        green("without.png") < 5 && green("bound.png") > 20,
+        "{}",
+        green("bound.png")
+    );
+}
+
 #[test]
 fn follows_the_size_and_survives_a_lost_surface() {
-    let room = Room::baked();
+    let room = Room::baked("room");
     let script = format!(
         "{QUIET}frames 1\nscreenshot before.png\nresize 400 200\nframes 1\nscreenshot wide.png
          minimise\nwait 0.2\nrestore 400 200\nframes 1\nscreenshot restored.png
@@ -298,7 +592,7 @@ fn follows_the_size_and_survives_a_lost_surface() {
 
 #[test]
 fn switches_show_parts_of_the_light_and_overlays() {
-    let room = Room::baked();
+    let room = Room::baked("room");
     let script = format!(
         "{QUIET}frames 1\nscreenshot all.png\nkey 2\nscreenshot direct.png\nkey 3\nscreenshot indirect.png
          key 1\nkey O\nscreenshot elements.png\nkey O\nscreenshot again.png\nkey Tab\nframes 2\nscreenshot panel.png
@@ -320,7 +614,7 @@ fn switches_show_parts_of_the_light_and_overlays() {
 /// By what was kept with the bake; back to the first light, the picture is the first one.
 #[test]
 fn relights_what_was_baked() {
-    let room = Room::baked();
+    let room = Room::baked("room");
     let script = format!(
         "{QUIET}set ambient off\nframes 1\nscreenshot before.png
          set lamp lamp colour 1 0.1 0.1\nrelit\nbake\nscreenshot red.png
@@ -433,7 +727,7 @@ fn without_a_device_one_line_says_so() {
 /// What real keys and a real mouse do is what the same steps of a script do.
 #[test]
 fn obeys_real_keys_and_mouse() {
-    let room = Room::baked();
+    let room = Room::baked("room");
     let script = format!(
         "{QUIET}frames 1\nmove 200 120\npress middle\nmove 240 140\nrelease middle\nkey 2\nframes 2\nscreenshot script.png"
     );
@@ -441,7 +735,7 @@ fn obeys_real_keys_and_mouse() {
     let display = Display::new();
     // Long enough for a busy machine to press a few keys.
     let script = format!("{QUIET}frames 1\nscreenshot open.png\nwait 6\nscreenshot real.png");
-    let child = start(&display, room.path(), "room.safetensors", &script);
+    let child = start(&display, SIZE, room.path(), "room.safetensors", &script);
     wait_for(&room.path().join("open.png"));
     let xdotool = |args: &[&str]| {
         let done = Command::new("xdotool")

@@ -37,7 +37,7 @@ pub struct Options {
     screenshot: Option<PathBuf>,
     /// Do what a script says, one step a line, then close: move X Y, press|release left|middle|right, wheel N, key NAME [down|up],
     /// see front|right|top, resize W H, minimise, restore W H, set SWITCH VALUE, set lamp NAME colour|strength|position N...,
-    /// frames N, wait SECONDS, bake, relit, detail, screenshot FILE, save FILE, lose-surface, close
+    /// frames N, wait SECONDS, bake, relit, detail, overlays, screenshot FILE, save FILE, lose-surface, close
     #[arg(long, value_name = "FILE")]
     script: Option<PathBuf>,
     #[command(flatten)]

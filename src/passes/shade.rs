@@ -69,6 +69,8 @@ pub struct Draw<'a> {
 
 pub struct Shade {
     pass: RenderPass,
+    /// Whether depths are read back beside the radiance.
+    depths: bool,
     pipeline: GraphicsPipeline,
 }
 
@@ -78,8 +80,9 @@ pub struct Target {
     pub height: u32,
     framebuffer: Framebuffer,
     colour: Image,
-    _depth: Image,
+    depth: Image,
     readback: Buffer,
+    depth_readback: Option<Buffer>,
 }
 
 /// Radiance and the meter's flag.
@@ -87,8 +90,13 @@ const FORMAT: Format = Format::R32G32B32A32_SFLOAT;
 const TEXEL_BYTES: u64 = 16;
 
 impl Shade {
-    pub fn new(device: &Arc<Device>) -> Result<Self> {
-        let pass = RenderPass::new(device, "shade", Attachment::copied(FORMAT))?;
+    /// With `depths`, these are read back beside the radiance.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn new(device: &Arc<Device>, depths: bool) -> Result<Self> {
+        let colour = Attachment::copied(FORMAT);
+        let pass = RenderPass::with_depth(device, "shade", colour, depths)?;
         let attribute = |format, offset: usize| VertexAttribute {
             format,
             offset: offset as u32,
@@ -123,7 +131,11 @@ impl Shade {
                 sums: false,
             },
         )?;
-        Ok(Self { pass, pipeline })
+        Ok(Self {
+            pass,
+            depths,
+            pipeline,
+        })
     }
 
     pub(super) fn pass(&self) -> &RenderPass {
@@ -177,6 +189,9 @@ impl Shade {
         then();
         cmd.end_render_pass();
         cmd.copy_image_to_buffer(&target.colour, &target.readback);
+        if let Some(readback) = &target.depth_readback {
+            cmd.copy_image_to_buffer(&target.depth, readback);
+        }
         cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
     }
 }
@@ -190,20 +205,24 @@ impl Target {
             "shade depth",
             size,
             Format::D32_SFLOAT,
-            ImageUse::DepthTarget,
+            match shade.depths {
+                true => ImageUse::CopiedDepth,
+                false => ImageUse::DepthTarget,
+            },
         )?;
+        let samples = u64::from(width) * u64::from(height);
+        let readback = |name, bytes| Buffer::new(device, name, bytes, BufferUse::Readback);
         Ok(Self {
             width,
             height,
             framebuffer: Framebuffer::new(device, "shade", &shade.pass, &colour, &depth)?,
             colour,
-            _depth: depth,
-            readback: Buffer::new(
-                device,
-                "shade readback",
-                u64::from(width) * u64::from(height) * TEXEL_BYTES,
-                BufferUse::Readback,
-            )?,
+            depth,
+            readback: readback("shade readback", samples * TEXEL_BYTES)?,
+            depth_readback: match shade.depths {
+                true => Some(readback("shade depths", samples * 4)?),
+                false => None,
+            },
         })
     }
 
@@ -211,5 +230,11 @@ impl Target {
     /// flag. The submission must be done.
     pub fn rows(&self, rows: u32) -> Vec<[f32; 4]> {
         self.readback.read(0, self.width as usize * rows as usize)
+    }
+
+    /// The same rows' depths, near plane over distance along the view, 0 where nothing is; none of a shade without them.
+    pub fn depths(&self, rows: u32) -> Option<Vec<f32>> {
+        let readback = self.depth_readback.as_ref()?;
+        Some(readback.read(0, self.width as usize * rows as usize))
     }
 }

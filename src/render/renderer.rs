@@ -6,7 +6,7 @@ use super::gathered::Gathered;
 use super::lights::light_buffers;
 use super::mesh::Mesh;
 use super::picture::{Picture, SAMPLES};
-use super::projection::{Projection, Tile};
+use super::projection::{NEAR, Projection, Tile};
 use super::relief::Relief;
 use super::relief_scene::ReliefScene;
 use super::textures::{Bound, Textures};
@@ -53,6 +53,21 @@ impl<'a> Renderer<'a> {
         view: &View<'a>,
         samples: u32,
     ) -> Result<Self> {
+        Self::with_depths(device, scene, lighting, view, samples, false)
+    }
+
+    /// With `depths`, [`Self::picture_while`] tells how far away what it shows is.
+    ///
+    /// # Errors
+    /// As [`super::render`].
+    pub fn with_depths(
+        device: &Arc<Device>,
+        scene: &'a Scene,
+        lighting: Lighting<'a>,
+        view: &View<'a>,
+        samples: u32,
+        depths: bool,
+    ) -> Result<Self> {
         assert_eq!(
             lighting.irradiance.len(),
             scene.triangles.len(),
@@ -60,7 +75,7 @@ impl<'a> Renderer<'a> {
         );
         view.check()?;
         let projection = Projection::new(scene, view)?;
-        let shade = Shade::new(device)?;
+        let shade = Shade::new(device, depths)?;
         let textures = Textures::new(device, scene)?;
         let kept = ReliefScene::new(device, &shade, scene, &lighting)?;
         let (lights, shafts) = light_buffers(device, scene, &lighting, &projection)?;
@@ -125,11 +140,16 @@ impl<'a> Renderer<'a> {
         }
     }
 
-    /// As [`Self::picture`], in tiles of so many pixels a side, at each of which `go_on` may give the picture up.
+    /// As [`Self::picture`], in tiles of so many pixels a side, at each of which `go_on` may give the picture up; and of each
+    /// pixel how far along the view its middle is, internal units, 0 where nothing is. Nothing of a renderer without depths.
     ///
     /// # Errors
     /// A device that fails.
-    pub fn picture_while(&self, tile: u32, go_on: impl FnMut() -> bool) -> Result<Option<Picture>> {
+    pub fn picture_while(
+        &self,
+        tile: u32,
+        go_on: impl FnMut() -> bool,
+    ) -> Result<Option<(Picture, Vec<f32>)>> {
         self.tiles(tile.clamp(1, TILE), go_on)
     }
 
@@ -147,11 +167,15 @@ impl<'a> Renderer<'a> {
     }
 
     fn gathered(&self) -> Result<Picture> {
-        let whole = self.tiles(TILE, || true)?;
+        let whole = self.tiles(TILE, || true)?.map(|whole| whole.0);
         Ok(whole.expect("a picture that nothing gives up is whole"))
     }
 
-    fn tiles(&self, side: u32, mut go_on: impl FnMut() -> bool) -> Result<Option<Picture>> {
+    fn tiles(
+        &self,
+        side: u32,
+        mut go_on: impl FnMut() -> bool,
+    ) -> Result<Option<(Picture, Vec<f32>)>> {
         let (width, height) = self.size;
         let target = Target::new(
             &self.device,
@@ -159,6 +183,7 @@ impl<'a> Renderer<'a> {
             (width.min(side) * SAMPLES, height.min(side) * SAMPLES),
         )?;
         let mut gathered = Gathered::new(self.size);
+        let mut distances = Vec::new();
         for row in (0..height).step_by(side as usize) {
             for column in (0..width).step_by(side as usize) {
                 if !go_on() {
@@ -179,9 +204,19 @@ impl<'a> Renderer<'a> {
                     &target.rows(tile.height * SAMPLES),
                     target.width as usize,
                 );
+                if let Some(depths) = target.depths(tile.height * SAMPLES) {
+                    distances.resize(width as usize * height as usize, 0.0);
+                    for place in 0..tile.width * tile.height {
+                        let (x, y) = (place % tile.width, place / tile.width);
+                        let sample = (y * SAMPLES + SAMPLES / 2) * target.width;
+                        let depth = depths[(sample + x * SAMPLES + SAMPLES / 2) as usize];
+                        let pixel = (tile.row + y) * width + tile.column + x;
+                        distances[pixel as usize] = if depth > 0.0 { NEAR / depth } else { 0.0 };
+                    }
+                }
             }
         }
-        Ok(Some(gathered.into_picture()))
+        Ok(Some((gathered.into_picture(), distances)))
     }
 
     /// Draws the whole view `count` times with one sample a pixel, as a window would; seconds of each by GPU timestamps.

@@ -282,6 +282,11 @@ impl BatchLoop {
         }
     }
 
+    /// Whether all has been sent evenly so far.
+    pub fn sends_evenly(&self) -> bool {
+        self.evenly.is_some()
+    }
+
     /// Where all has been sent evenly so far: sources with a relief send by direction from now on, and elements with one have
     /// what came. Whether that was so.
     pub fn recall(&mut self) -> Result<bool> {

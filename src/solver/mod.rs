@@ -50,7 +50,7 @@ pub use settings::{EMITTER_SCALE, Estimator, HEMICUBE_RANGE, Settings, VISIBILIT
 pub use visibility::Visibility;
 
 /// How far a solution has come.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Update {
     pub shots: u32,
     pub sources: u32,
@@ -343,6 +343,11 @@ impl Solver {
             report.skipped.dark_slots = dark.iter().map(|&d| u64::from(d)).sum();
         }
         Ok(())
+    }
+
+    /// Whether elements with a relief lack the directions of their light still: see [`Self::turn`].
+    pub fn lacks_directions(&self) -> bool {
+        self.batches.sends_evenly()
     }
 
     /// The last batches have shot since the last look: what is left now is what a measurement finds.

@@ -15,8 +15,9 @@ use super::{DeviceChoice, Wake};
 use crate::bake;
 use crate::elements::Elements;
 use crate::error::{Error, Result};
-use crate::scene::Scene;
-use crate::solver::{ItemPicture, Settings, Solver, Visibility};
+use crate::meso::Transport;
+use crate::scene::{Material, Scene};
+use crate::solver::{ItemPicture, Settings, Solver, StopReason, Update, Visibility};
 
 /// What the window asks for.
 pub enum Order {
@@ -28,8 +29,34 @@ pub enum Order {
     },
     /// Lights the scene of the last bake, of which emission and point lights have changed, by the form factors that are kept.
     Relight { scene: Arc<Scene>, epoch: u64 },
+    /// Tells the sources of a bake from a file.
+    Sources,
     /// Draws what a source sees.
     Items { source: u32 },
+}
+
+/// What a bake does before it solves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    Device,
+    /// Groups elements, and brings the scene to the device.
+    Scene,
+    /// Lights the scene as if it were flat, before its relief is prepared.
+    Flat,
+    /// Finds what reliefs see of themselves and how they answer light; the scene is lit as if it were flat meanwhile.
+    Relief,
+}
+
+impl Stage {
+    /// As the panel tells it.
+    pub fn line(self) -> &'static str {
+        match self {
+            Self::Device => "opening the device",
+            Self::Scene => "preparing the scene",
+            Self::Flat => "lit as if flat; relief comes next",
+            Self::Relief => "preparing the relief; lit as if flat",
+        }
+    }
 }
 
 /// What the thread has found since it was last asked.
@@ -38,6 +65,8 @@ pub struct Latest {
     pub snapshot: Option<Arc<Snapshot>>,
     /// Newer than that of the snapshot, perhaps.
     pub progress: Option<(u64, Progress)>,
+    /// With its epoch; none while a bake is solved.
+    pub stage: Option<(u64, Option<Stage>)>,
     /// `[triangle]` of the input; of a new bake.
     pub sources: Option<Vec<u32>>,
     pub items: Option<ItemPicture>,
@@ -85,6 +114,7 @@ impl Baker {
             kept,
             given,
             solving: None,
+            looked_at: None,
         };
         Self {
             orders: Some(orders),
@@ -122,6 +152,9 @@ const SLICES: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(2
 /// A snapshot costs no more than this share of the bake's time, one over it, unless that makes it wait too long.
 const SHARE: u32 = 8;
 
+/// How long a scene is lit as if its relief were flat before that is prepared.
+const FLAT: Duration = Duration::from_secs(2);
+
 /// Between two frames that show nothing new but how far the bake is.
 const TELLING: Duration = Duration::from_millis(100);
 
@@ -135,6 +168,8 @@ struct Work {
     /// The bake that was asked for last.
     given: (Arc<Scene>, Settings),
     solving: Option<Solving>,
+    /// Of a bake from a file: its sources, which nobody solves.
+    looked_at: Option<Solver>,
 }
 
 /// A bake under way or done.
@@ -146,13 +181,24 @@ struct Solving {
     epoch: u64,
     start: Instant,
     slice: Duration,
+    budget: Duration,
     done: bool,
+    /// Without the scene's relief, which is prepared when this has some light.
+    flat: bool,
+    /// Share of unshot light from which on there is more to be seen than before this was begun.
+    shown_from: f64,
+}
+
+impl Solving {
+    fn is_busy(&self) -> bool {
+        self.flat || !self.done
+    }
 }
 
 impl Work {
     fn run(mut self, orders: &Receiver<Order>) {
         loop {
-            let busy = self.solving.as_ref().is_some_and(|s| !s.done);
+            let busy = self.solving.as_ref().is_some_and(Solving::is_busy);
             // An order that comes from here on sets it again.
             self.shared.interrupt.store(false, Ordering::SeqCst);
             let next = match busy {
@@ -180,36 +226,103 @@ impl Work {
                 epoch,
             } => {
                 // Frees its memory before the new one asks for more.
-                self.solving = None;
+                (self.solving, self.looked_at) = (None, None);
                 self.given = (Arc::clone(&scene), (*settings).clone());
                 (self.kept, self.kept_is_whole) = (None, false);
                 self.bake(scene, &settings, epoch)
             }
             Order::Relight { scene, epoch } => self.relight(scene, epoch),
-            Order::Items { source } => match &self.solving {
-                None => Ok(()),
-                Some(solving) => {
-                    let picture = solving.solver.item_picture(source)?;
-                    self.shared.latest().items = Some(picture);
-                    (self.wake)();
-                    Ok(())
-                }
-            },
+            Order::Sources => self.sources().map(|_| ()),
+            Order::Items { source } => {
+                let picture = self.sources()?.item_picture(source)?;
+                self.shared.latest().items = Some(picture);
+                (self.wake)();
+                Ok(())
+            }
         }
     }
 
+    /// A solver with the sources of what is shown: the one under way; of a bake from a file one that is never run, of elements without
+    /// relief, whose preparation would take long.
+    fn sources(&mut self) -> Result<&Solver> {
+        if let Some(solving) = &self.solving {
+            return Ok(&solving.solver);
+        }
+        let solver = match self.looked_at.take() {
+            Some(solver) => solver,
+            None => {
+                let device = self.choice.open_baking()?;
+                let (scene, settings) = &self.given;
+                let settings = Settings {
+                    visibility_memory: Some(0),
+                    ..flat(settings)
+                };
+                let elements = Elements::new(scene);
+                let solver = Solver::new(&device, elements, &scene.point_lights, &settings)?;
+                self.shared.latest().sources = Some(solver.source_of_triangles());
+                (self.wake)();
+                solver
+            }
+        };
+        Ok(self.looked_at.insert(solver))
+    }
+
+    fn tell(&self, epoch: u64, stage: Option<Stage>) {
+        self.shared.latest().stage = Some((epoch, stage));
+        (self.wake)();
+    }
+
     fn bake(&mut self, scene: Arc<Scene>, settings: &Settings, epoch: u64) -> Result<()> {
+        self.tell(epoch, Some(Stage::Device));
         let device = self.choice.open_baking()?;
-        let elements = bake::elements(&device, &scene, settings)?;
+        self.tell(epoch, Some(Stage::Scene));
         let lights = &scene.point_lights;
+        let raised = settings.relief.transport != Transport::Lambert;
+        if raised && scene.materials.iter().any(Material::has_relief) {
+            // What takes longest comes after the first light.
+            let elements = Elements::new(&scene);
+            let solver = Solver::new(&device, elements.clone(), lights, &flat(settings))?;
+            self.start(scene, solver, elements, epoch);
+            if let Some(solving) = &mut self.solving {
+                solving.flat = true;
+            }
+            self.tell(epoch, Some(Stage::Flat));
+            return Ok(());
+        }
+        let elements = bake::elements(&device, &scene, settings)?;
         let solver = Solver::new(&device, elements.clone(), lights, settings)?;
         self.start(scene, solver, elements, epoch);
         Ok(())
     }
 
+    /// Begins the bake by direction of what has been lit as if it were flat.
+    fn raise(&mut self) -> Result<()> {
+        let Some(flat) = self.solving.take() else {
+            return Ok(());
+        };
+        let unshot = flat.solver.report().unshot_share;
+        let Solving { scene, epoch, .. } = flat;
+        self.tell(epoch, Some(Stage::Relief));
+        let device = self.choice.open_baking()?;
+        let settings = self.given.1.clone();
+        let elements = bake::elements(&device, &scene, &settings)?;
+        let lights = &scene.point_lights;
+        let solver = Solver::new(&device, elements.clone(), lights, &settings)?;
+        self.start(scene, solver, elements, epoch);
+        if let Some(solving) = &mut self.solving {
+            solving.shown_from = unshot;
+        }
+        Ok(())
+    }
+
     fn start(&mut self, scene: Arc<Scene>, solver: Solver, elements: Elements, epoch: u64) {
         self.shared.latest().sources = Some(solver.source_of_triangles());
+        self.tell(epoch, None);
+        self.looked_at = None;
         self.solving = Some(Solving {
+            budget: self.given.1.budget.unwrap_or(Duration::MAX),
+            flat: false,
+            shown_from: f64::INFINITY,
             scene,
             solver,
             elements,
@@ -223,7 +336,8 @@ impl Work {
     /// By what is kept; where nothing is, or another source emits than did, from nothing.
     fn relight(&mut self, scene: Arc<Scene>, epoch: u64) -> Result<()> {
         let settings = self.given.1.clone();
-        let before = self.solving.take();
+        // What has been lit as if it were flat has kept nothing of use.
+        let before = self.solving.take().filter(|before| !before.flat);
         let device = self.choice.open_baking()?;
         if let Some(before) = &before
             && !self.kept_is_whole
@@ -257,39 +371,54 @@ impl Work {
         let Some(solving) = &mut self.solving else {
             return Ok(());
         };
+        if solving.flat && (solving.done || solving.start.elapsed() >= FLAT) {
+            return self.raise();
+        }
         let begin = Instant::now();
         let (slice, start, epoch) = (solving.slice, solving.start, solving.epoch);
+        let budget = solving.budget;
         let shared = &self.shared;
-        let mut last = Progress::default();
+        let mut last = Update::default();
         let mut told = begin;
-        solving.solver.run(|update| {
-            last = Progress {
-                shots: update.shots,
-                sources: update.sources,
-                unshot_share: update.unshot_share,
-                error_bound: update.error_bound,
+        solving.solver.turn(|update| {
+            last = Update {
                 elapsed: start.elapsed(),
-                left: update.left,
-                done: false,
+                ..*update
             };
-            shared.latest().progress = Some((epoch, last));
+            let done = false;
+            shared.latest().progress = Some((epoch, Progress { update: last, done }));
             if told.elapsed() >= TELLING {
                 told = Instant::now();
                 (self.wake)();
             }
-            begin.elapsed() < slice && !shared.interrupt.load(Ordering::SeqCst)
+            begin.elapsed() < slice.min(budget.saturating_sub(start.elapsed()))
+                && !shared.interrupt.load(Ordering::SeqCst)
         })?;
+        // The budget is that of the bake, not of a slice.
+        let stop = solving.solver.report().stop;
+        solving.done = is_done(stop) || start.elapsed() >= budget;
+        if solving.done && stop != StopReason::Residual {
+            // Elements with a relief have the directions of what has come.
+            solving.solver.run(|_| false)?;
+        }
         let report = solving.solver.report();
-        solving.done = is_done(report.stop);
         let progress = Progress {
-            shots: report.shots,
-            sources: report.sources as u32,
-            unshot_share: report.unshot_share,
-            error_bound: report.error_bound,
-            elapsed: start.elapsed(),
-            done: solving.done,
-            ..last
+            update: Update {
+                shots: report.shots,
+                sources: report.sources as u32,
+                unshot_share: report.unshot_share,
+                error_bound: report.error_bound,
+                elapsed: start.elapsed(),
+                ..last
+            },
+            done: solving.done && !solving.flat,
         };
+        if !solving.done && report.unshot_share > solving.shown_from {
+            solving.slice = SLICES[0];
+            shared.latest().progress = Some((epoch, progress));
+            (self.wake)();
+            return Ok(());
+        }
         let solved = Instant::now();
         let (scene, solver) = (&solving.scene, &solving.solver);
         let snapshot = Snapshot::of_solver(epoch, scene, solver, progress)?;
@@ -308,6 +437,13 @@ impl Work {
     }
 }
 
+/// The same without relief.
+fn flat(settings: &Settings) -> Settings {
+    let mut settings = settings.clone();
+    settings.relief.transport = Transport::Lambert;
+    settings
+}
+
 /// Of orders to light or to bake that wait, the last: a light that is dragged leaves many behind.
 fn latest(first: Order, orders: &Receiver<Order>) -> Order {
     let mut wanted = first;
@@ -319,7 +455,11 @@ fn latest(first: Order, orders: &Receiver<Order>) -> Order {
                 settings,
                 epoch,
             },
-            (wanted, Order::Items { .. }) if !matches!(wanted, Order::Items { .. }) => wanted,
+            // Its sources will be told.
+            (
+                wanted @ (Order::Bake { .. } | Order::Relight { .. }),
+                Order::Items { .. } | Order::Sources,
+            ) => wanted,
             (_, next) => next,
         };
     }

@@ -1,12 +1,18 @@
-//! Detailed pictures of views that stay, drawn as `render` draws them, on a thread and a Vulkan device of their own.
+//! Detailed pictures of views, drawn as `render` draws them, on a thread and a Vulkan device of their own.
+//!
+//! Of a view that stays: a coarse one first, then the whole. While the view moves: coarse ones of where it is when the last is done, and
+//! whole ones where they are quick enough. Each comes with the distance of what it shows, so that the window can lay it over the surfaces
+//! seen from elsewhere.
 
+use std::collections::VecDeque;
+use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use egui::Color32;
 
-use super::snapshot::Snapshot;
+use super::snapshot::{Snapshot, even_moments};
 use super::{DeviceChoice, Wake};
 use crate::error::Result;
 use crate::render::{Direct, Light, Lighting, ReliefShading, Renderer, SAMPLES, Show, View};
@@ -32,12 +38,22 @@ pub struct Wanted {
     pub exposure: f32,
 }
 
+impl Drawn {
+    /// Whether it has all the pixels that were wanted.
+    pub fn is_whole(&self) -> bool {
+        self.size == self.of.size
+    }
+}
+
 impl Wanted {
     /// Whether a picture of `other` shows this one's view in this one's way, by whatever stage of the same bake.
     pub fn looks_like(&self, other: &Self) -> bool {
+        self.size == other.size && self.camera == other.camera && self.colours_like(other)
+    }
+
+    /// Whether a picture of `other` shows surfaces as this one's does, seen from wherever.
+    pub fn colours_like(&self, other: &Self) -> bool {
         self.snapshot.epoch == other.snapshot.epoch
-            && self.size == other.size
-            && self.camera == other.camera
             && self.shows_like(other)
             && self.exposure.to_bits() == other.exposure.to_bits()
     }
@@ -62,6 +78,8 @@ pub struct Drawn {
     pub size: (u32, u32),
     /// sRGB, `[row][column]`.
     pub codes: Vec<Color32>,
+    /// How far along the view each pixel's middle is, internal units; 0 where nothing is.
+    pub distances: Vec<f32>,
     pub seconds: f64,
 }
 
@@ -80,12 +98,15 @@ struct Shared {
 #[derive(Default)]
 struct State {
     wanted: Option<Wanted>,
-    /// Counts what was asked for: a picture under way is given up when something else is.
+    /// Whether the view that is wanted moves.
+    moving: bool,
+    /// Counts what was asked for: a picture under way is given up when something else is. While the view moves, it is finished.
     asked: u64,
-    /// A picture for a file goes before the view's.
-    to_save: Option<(Wanted, std::path::PathBuf)>,
+    /// Pictures for files go before the view's.
+    to_save: VecDeque<(Wanted, PathBuf)>,
     drawn: Option<Drawn>,
-    saved: Vec<Result<std::path::PathBuf>>,
+    /// With their exposures.
+    saved: Vec<(PathBuf, Result<f32>)>,
     error: Option<crate::error::Error>,
     closing: bool,
 }
@@ -120,19 +141,21 @@ impl Detailer {
         }
     }
 
-    /// Asks for a picture in place of the one that was asked for before; none: for no more.
-    pub fn want(&self, wanted: Option<Wanted>) {
+    /// Asks for a picture in place of the one that was asked for before, of a view that moves or stays; none: for no more.
+    pub fn want(&self, wanted: Option<Wanted>, moving: bool) {
         {
             let mut state = self.shared.state();
+            let goes_on = moving && state.moving && wanted.is_some();
+            state.asked += u64::from(!goes_on);
+            state.moving = moving;
             state.wanted = wanted;
-            state.asked += 1;
         }
         self.shared.changed.notify_all();
     }
 
     /// Asks for a picture in a file.
-    pub fn save(&self, wanted: Wanted, path: std::path::PathBuf) {
-        self.shared.state().to_save = Some((wanted, path));
+    pub fn save(&self, wanted: Wanted, path: PathBuf) {
+        self.shared.state().to_save.push_back((wanted, path));
         self.shared.changed.notify_all();
     }
 
@@ -142,7 +165,7 @@ impl Detailer {
     }
 
     /// Files that have been written, or not, since this was asked.
-    pub fn saved(&self) -> Vec<Result<std::path::PathBuf>> {
+    pub fn saved(&self) -> Vec<(PathBuf, Result<f32>)> {
         std::mem::take(&mut self.shared.state().saved)
     }
 
@@ -166,6 +189,8 @@ impl Drop for Detailer {
 const COARSE: u32 = 4;
 /// Pixels a side of what is drawn between two looks at what is wanted.
 const TILE: u32 = 96;
+/// Whole pictures that take no longer are drawn while the view moves.
+const QUICK: Duration = Duration::from_millis(300);
 
 struct Work<'a> {
     shared: &'a Shared,
@@ -176,7 +201,7 @@ struct Work<'a> {
 /// What a renderer draws next.
 enum Next {
     Draw(Wanted),
-    Save(Wanted, std::path::PathBuf),
+    Save(Wanted, PathBuf),
 }
 
 impl Next {
@@ -203,7 +228,7 @@ impl Work<'_> {
             if state.closing {
                 return None;
             }
-            if let Some((wanted, path)) = state.to_save.take() {
+            if let Some((wanted, path)) = state.to_save.pop_front() {
                 return Some(Next::Save(wanted, path));
             }
             if let Some(wanted) = state.wanted.take() {
@@ -219,7 +244,7 @@ impl Work<'_> {
 
     fn is_overtaken(&self, asked: u64) -> bool {
         let state = self.shared.state();
-        state.closing || state.asked != asked || state.to_save.is_some()
+        state.closing || state.asked != asked || !state.to_save.is_empty()
     }
 
     /// Draws pictures for as long as one renderer can; returns what it cannot draw.
@@ -244,7 +269,8 @@ impl Work<'_> {
             ..snapshot.lighting(&irradiance)
         };
         let view = view(&wanted, 1);
-        let mut renderer = Renderer::new(&self.device, &snapshot.scene, lighting, &view, SAMPLES)?;
+        let (device, scene) = (&self.device, &snapshot.scene);
+        let mut renderer = Renderer::with_depths(device, scene, lighting, &view, SAMPLES, true)?;
         let mut next = first;
         loop {
             match &next {
@@ -254,8 +280,8 @@ impl Work<'_> {
                     let written = renderer
                         .picture()?
                         .write(path, Some(wanted.exposure))
-                        .map(|()| path.clone());
-                    self.shared.state().saved.push(written);
+                        .map(|()| wanted.exposure);
+                    self.shared.state().saved.push((path.clone(), written));
                     (self.wake)();
                 }
             }
@@ -268,11 +294,19 @@ impl Work<'_> {
 
     fn draw(&self, renderer: &mut Renderer<'_>, wanted: &Wanted) -> Result<()> {
         let start = Instant::now();
-        let asked = self.shared.state().asked;
+        let (asked, moving) = {
+            let state = self.shared.state();
+            (state.asked, state.moving)
+        };
         for coarse in [COARSE, 1] {
+            // Where the view goes on meanwhile, a whole picture that takes long shows what is not seen any more.
+            if moving && coarse == 1 && start.elapsed() * COARSE * COARSE > QUICK {
+                return Ok(());
+            }
             let view = view(wanted, coarse);
             renderer.look(&view)?;
-            let Some(picture) = renderer.picture_while(TILE, || !self.is_overtaken(asked))? else {
+            let drawn = renderer.picture_while(TILE, || !self.is_overtaken(asked))?;
+            let Some((picture, distances)) = drawn else {
                 return Ok(());
             };
             let codes = picture.srgb_codes(Some(wanted.exposure));
@@ -281,6 +315,7 @@ impl Work<'_> {
                 of: wanted.clone(),
                 size: (view.width, view.height),
                 codes: codes.map(|c| Color32::from_rgb(c[0], c[1], c[2])).collect(),
+                distances,
                 seconds: start.elapsed().as_secs_f64(),
             });
             (self.wake)();
@@ -294,15 +329,9 @@ fn under(relief: &DirectionalLight, ambient: Vec3) -> Option<DirectionalLight> {
     if ambient == Vec3::ZERO {
         return None;
     }
-    // ∫ L ω dω over a slot, its directions taken as one; L = E/π.
-    let angle = 2.0 * std::f32::consts::PI / relief.directions.len() as f32;
-    let sky: Vec<[Vec3; 3]> = relief
-        .directions
-        .iter()
-        .map(|d| {
-            let moment = d.as_vec3() * (angle / std::f32::consts::PI);
-            ambient.to_array().map(|c| moment * c)
-        })
+    let sky: Vec<[Vec3; 3]> = even_moments(&relief.directions)
+        .into_iter()
+        .map(|moment| ambient.to_array().map(|c| moment * c))
         .collect();
     let moments = relief.incident_moment.iter().zip(sky.iter().cycle());
     Some(DirectionalLight {

@@ -155,12 +155,14 @@ impl Viewer {
             Some(Drag::Look) => self.eye.look(across, down),
             Some(Drag::Click) | None => {}
         }
-        // Looking for the element takes a while in large scenes.
+        self.hover();
+    }
+
+    /// Finds the element under the pointer where something asks for it: that takes a while in large scenes.
+    fn hover(&mut self) {
         let wanted = self.switches.slots && self.input.drag.is_none() && !self.is_over_panel();
-        self.input.hovered = match wanted {
-            true => self.element_at((x, y)),
-            false => None,
-        };
+        let pointer = self.input.pointer.filter(|_| wanted);
+        self.input.hovered = pointer.and_then(|at| self.element_at(at));
     }
 
     fn element_at(&self, (x, y): (f32, f32)) -> Option<u32> {
@@ -203,9 +205,6 @@ impl Viewer {
     fn click(&mut self) {
         let found = self.input.pointer.and_then(|at| self.element_at(at));
         self.input.chosen = found.filter(|_| found != self.input.chosen);
-        if let (Some(e), true) = (self.input.chosen, self.switches.items) {
-            self.ask_items(e);
-        }
     }
 
     fn key(&mut self, key: Key, pressed: bool) {
@@ -240,17 +239,15 @@ impl Viewer {
             Key::X => switches.detail ^= true,
             Key::O => switches.elements ^= true,
             Key::P => switches.sources ^= true,
-            Key::H => switches.slots ^= true,
+            Key::H => {
+                switches.slots ^= true;
+                self.hover();
+            }
             Key::B => switches.bound ^= true,
             Key::Tab => switches.panel ^= true,
             Key::Comma => switches.exposure = stops(switches.exposure, -STOP),
             Key::Period => switches.exposure = stops(switches.exposure, STOP),
-            Key::I => {
-                switches.items ^= true;
-                if let (true, Some(e)) = (switches.items, self.input.chosen) {
-                    self.ask_items(e);
-                }
-            }
+            Key::I => switches.items ^= true,
             Key::K => {
                 let counts = DIRECTIONS.map(|count| ("", count));
                 self.directions = next(&counts, self.directions);

@@ -10,7 +10,7 @@ use crate::solution::DirectionalLight;
 use crate::solver::ItemPicture;
 
 /// Pixels a side of the picture of a hemisphere.
-const SIDE: usize = 96;
+pub const SIDE: usize = 96;
 
 /// Light that falls on one element by direction, seen from above: the disc's middle is the normal, its rim the horizon, u goes
 /// right and v up. Of each slot the mean radiance; none of an element without relief.

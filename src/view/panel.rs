@@ -3,6 +3,7 @@
 use egui::{Color32, ComboBox, DragValue, RichText, Slider, Ui};
 use glam::DVec3;
 
+use super::baker::Stage;
 use super::lamps::Lamp;
 use super::snapshot::Progress;
 use super::switches::{DIRECTIONS, DIRECTS, EXPOSURES, PARTS, SHADINGS, Switches};
@@ -15,6 +16,8 @@ pub struct Told<'a> {
     pub device: &'a str,
     pub cameras: &'a [String],
     pub progress: Progress,
+    /// What a bake waits for before it goes on.
+    pub stage: Option<Stage>,
     pub baking: bool,
     /// Seconds.
     pub frame: Option<f64>,
@@ -100,20 +103,21 @@ fn status(ui: &mut Ui, told: &Told<'_>) {
         .detail
         .map_or(String::new(), |s| format!(", detail {s:.1} s"));
     ui.label(format!("frame {frame}{detail}"));
-    let progress = &told.progress;
+    if let Some(stage) = told.stage {
+        ui.label(stage.line());
+    }
+    let progress = &told.progress.update;
     if progress.sources == 0 {
-        ui.label(if told.baking {
-            "preparing the bake"
-        } else {
-            "from a file"
-        });
+        if !told.baking {
+            ui.label("from a file");
+        }
         return;
     }
     let bound = progress
         .error_bound
         .map_or("none".to_owned(), |b| format!("{:.2} %", 100.0 * b));
     let time = progress.elapsed.as_secs_f64();
-    ui.label(match (progress.done, progress.left) {
+    ui.label(match (told.progress.done, progress.left) {
         (true, _) => format!("baked in {time:.1} s"),
         (false, Some(left)) => format!(
             "baking, {time:.0} s, about {:.0} s left",

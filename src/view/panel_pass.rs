@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use egui::epaint::{ImageData, ImageDelta, Primitive, Vertex};
 use egui::{ClippedPrimitive, Color32, ColorImage, TextureId, TexturesDelta};
+use glam::Vec2;
 
 use crate::error::Result;
 use crate::passes::shaders;
@@ -18,6 +19,8 @@ pub struct PanelPass {
     pipeline: GraphicsPipeline,
     sampler: Sampler,
     textures: HashMap<TextureId, Texture>,
+    /// Of the picture's image that is the picture.
+    picture_share: Vec2,
     vertices: Buffer,
     indices: Buffer,
     device: Arc<Device>,
@@ -85,6 +88,7 @@ impl PanelPass {
             pipeline,
             sampler: Sampler::held(device, "panel")?,
             textures: HashMap::new(),
+            picture_share: Vec2::ONE,
             vertices: stream("panel vertices")?,
             indices: stream("panel indices")?,
             device: Arc::clone(device),
@@ -124,11 +128,12 @@ impl PanelPass {
         Ok(())
     }
 
-    /// Takes the picture that [`Self::record_picture`] draws; it must live until the next one is taken.
+    /// Takes the picture that [`Self::record_picture`] draws, from the left top of an image; it must live until the next one is taken.
     ///
     /// # Errors
     /// A device without the memory.
-    pub fn set_picture(&mut self, image: &Image) -> Result<()> {
+    pub fn set_picture(&mut self, image: &Image, share: Vec2) -> Result<()> {
+        self.picture_share = share;
         let bind = [Bind::Image(image, &self.sampler)];
         let texture = Texture {
             set: self.pipeline.bind("detailed picture", &bind)?,
@@ -150,9 +155,10 @@ impl PanelPass {
         scale: f32,
     ) -> Result<Prepared> {
         let size = [width as f32 / scale, height as f32 / scale];
+        let share = self.picture_share;
         let corner = |x: f32, y: f32| Vertex {
             pos: egui::pos2(x * size[0], y * size[1]),
-            uv: egui::pos2(x, y),
+            uv: egui::pos2(x * share.x, y * share.y),
             color: Color32::WHITE,
         };
         let mut vertices = vec![

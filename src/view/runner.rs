@@ -85,6 +85,7 @@ impl Runner {
                 Step::Bake => viewer.is_baked(),
                 Step::Relit => viewer.edited.is_none(),
                 Step::Detail => viewer.is_detailed(),
+                Step::Overlays => viewer.has_overlays(),
                 Step::Wait(seconds) => self.since.elapsed().as_secs_f64() >= *seconds,
                 Step::Set(words) => {
                     set(viewer, words)?;
@@ -101,7 +102,7 @@ impl Runner {
                     if first {
                         viewer.save(Some(path.clone()));
                     }
-                    viewer.saving == 0
+                    viewer.saving.is_empty()
                 }
                 Step::LoseSurface => {
                     viewer.screen.lose();

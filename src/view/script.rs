@@ -22,6 +22,8 @@ pub enum Step {
     Relit,
     /// Waits until the detailed picture of the view is shown.
     Detail,
+    /// Waits until the sources and the item buffer that are to be shown have come.
+    Overlays,
     /// Seconds.
     Wait(f64),
     /// Sets a switch, or a property of a light.
@@ -111,6 +113,7 @@ fn parse(words: &[&str]) -> Option<Vec<Step>> {
         ["bake"] => Some(vec![Step::Bake]),
         ["relit"] => Some(vec![Step::Relit]),
         ["detail"] => Some(vec![Step::Detail]),
+        ["overlays"] => Some(vec![Step::Overlays]),
         ["wait", seconds] => Some(vec![Step::Wait(f64::from(number(seconds)?.max(0.0)))]),
         ["set", ref what @ ..] if what.len() > 1 => Some(vec![Step::Set(
             what.iter().map(|w| (*w).to_owned()).collect(),

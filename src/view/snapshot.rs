@@ -1,26 +1,20 @@
 //! A solution as the window shows it: finished, or as far as it has come.
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use glam::{DVec3, Vec3};
 
 use crate::error::Result;
 use crate::render::{Lighting, corner_irradiance, tone};
-use crate::scene::Scene;
+use crate::scene::{Scene, Triangle};
 use crate::solution::{Bake, DirectionalLight, Solution};
-use crate::solver::{Ambient, Solver, StopReason};
+use crate::solver::{Ambient, Solver, StopReason, Update};
 
 /// How far a bake has come.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Progress {
-    pub shots: u32,
-    pub sources: u32,
-    pub unshot_share: f64,
-    /// None where nothing bounds what is left.
-    pub error_bound: Option<f64>,
-    pub elapsed: Duration,
-    pub left: Option<Duration>,
+    /// Of the whole bake, not of the slice of it that was solved last.
+    pub update: Update,
     pub done: bool,
 }
 
@@ -85,9 +79,14 @@ impl Snapshot {
         let Solution {
             irradiance,
             irradiance_direct,
-            relief,
+            mut relief,
             ..
         } = Solution::new(scene, &solver.elements, &solver.light()?, report);
+        if let (Some(relief), true) = (&mut relief, solver.lacks_directions()) {
+            let elements = &solver.elements;
+            let reflectance = elements.to_input_order(&elements.reflectance);
+            spread(relief, &irradiance, &irradiance_direct, &reflectance);
+        }
         let light = (irradiance, irradiance_direct);
         Ok(Self::new(epoch, scene, light, relief, ambient, progress))
     }
@@ -102,11 +101,17 @@ impl Snapshot {
         Self::new(0, scene, light, bake.relief, Ambient::default(), progress)
     }
 
-    /// Nothing lit yet but what emits.
-    pub fn dark(scene: &Arc<Scene>) -> Self {
-        let none = vec![Vec3::ZERO; scene.triangles.len()];
-        let light = (none.clone(), none);
+    /// What is shown before any light is known: shapes and colours, as on a drawing table, brighter from one side than from another.
+    pub fn unlit(scene: &Arc<Scene>) -> Self {
+        let side = DVec3::new(0.5, 0.8, 0.35).normalize();
+        let shade = |triangle: &Triangle| {
+            let [a, b, c] = scene.corners(triangle);
+            let normal = (b - a).cross(c - a).normalize_or_zero();
+            Vec3::splat((1.0 + 0.6 * normal.dot(side)) as f32)
+        };
+        let even: Vec<_> = scene.triangles.iter().map(shade).collect();
         let progress = Progress::default();
+        let light = (even.clone(), even);
         Self::new(0, scene, light, None, Ambient::default(), progress)
     }
 
@@ -118,6 +123,38 @@ impl Snapshot {
             ..Lighting::from(irradiance)
         }
     }
+}
+
+/// Spreads the light of each element with a relief evenly over its directions, as long as these are not known; values
+/// `[triangle]` of the input.
+fn spread(
+    relief: &mut DirectionalLight,
+    irradiance: &[Vec3],
+    direct: &[Vec3],
+    reflectance: &[Vec3],
+) {
+    let sky = even_moments(&relief.directions);
+    let moments = |light: &[Vec3]| -> Vec<[Vec3; 3]> {
+        let of = |&e: &u32| {
+            sky.iter()
+                .map(move |m| light[e as usize].to_array().map(|c| *m * c))
+        };
+        relief.elements.iter().flat_map(of).collect()
+    };
+    (relief.incident_moment, relief.incident_moment_direct) =
+        (moments(irradiance), moments(direct));
+    let sent = |&e: &u32| {
+        let e = e as usize;
+        std::iter::repeat_n(reflectance[e] * irradiance[e], sky.len())
+    };
+    relief.exitant = relief.elements.iter().flat_map(sent).collect();
+}
+
+/// ∫ L ω dω over each slot of a sky whose irradiance is 1, the directions of a slot taken as one; L = 1/π.
+pub fn even_moments(directions: &[DVec3]) -> Vec<Vec3> {
+    let angle = std::f64::consts::TAU / directions.len() as f64;
+    let moment = |d: &DVec3| (*d * (angle / std::f64::consts::PI)).as_vec3();
+    directions.iter().map(moment).collect()
 }
 
 /// Why a bake that has stopped will not go on by itself.

@@ -493,7 +493,7 @@ fn whole(image: &Image) -> vk::BufferImageCopy {
     vk::BufferImageCopy::default()
         .image_subresource(
             vk::ImageSubresourceLayers::default()
-                .aspect_mask(vk::ImageAspectFlags::COLOR)
+                .aspect_mask(image.aspect)
                 .layer_count(1),
         )
         .image_extent(vk::Extent3D {

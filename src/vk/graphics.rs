@@ -41,7 +41,7 @@ impl Attachment {
     }
 }
 
-/// A render pass of one subpass: one colour attachment (cleared, stored) and a depth attachment (cleared, not stored).
+/// A render pass of one subpass: one colour attachment (cleared, stored) and a depth attachment (cleared, stored if asked for).
 pub struct RenderPass {
     pub(super) raw: vk::RenderPass,
     device: Arc<Device>,
@@ -51,6 +51,26 @@ pub(super) const DEPTH_FORMAT: vk::Format = vk::Format::D32_SFLOAT;
 
 impl RenderPass {
     pub fn new(device: &Arc<Device>, name: &str, colour: Attachment) -> Result<Self> {
+        Self::with_depth(device, name, colour, false)
+    }
+
+    /// With `copied`, the depths are kept to be copied from.
+    pub fn with_depth(
+        device: &Arc<Device>,
+        name: &str,
+        colour: Attachment,
+        copied: bool,
+    ) -> Result<Self> {
+        let (depth_store, depth_layout) = match copied {
+            true => (
+                vk::AttachmentStoreOp::STORE,
+                vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
+            ),
+            false => (
+                vk::AttachmentStoreOp::DONT_CARE,
+                vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL,
+            ),
+        };
         let (layout, stage, access) = match colour.then {
             AfterPass::Shaders => (
                 vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
@@ -77,11 +97,11 @@ impl RenderPass {
                 .format(DEPTH_FORMAT)
                 .samples(vk::SampleCountFlags::TYPE_1)
                 .load_op(vk::AttachmentLoadOp::CLEAR)
-                .store_op(vk::AttachmentStoreOp::DONT_CARE)
+                .store_op(depth_store)
                 .stencil_load_op(vk::AttachmentLoadOp::DONT_CARE)
                 .stencil_store_op(vk::AttachmentStoreOp::DONT_CARE)
                 .initial_layout(vk::ImageLayout::UNDEFINED)
-                .final_layout(vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL),
+                .final_layout(depth_layout),
         ];
         let colours = [vk::AttachmentReference::default()
             .attachment(0)
@@ -112,8 +132,11 @@ impl RenderPass {
             vk::SubpassDependency::default()
                 .src_subpass(0)
                 .dst_subpass(vk::SUBPASS_EXTERNAL)
-                .src_stage_mask(vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT)
-                .src_access_mask(vk::AccessFlags::COLOR_ATTACHMENT_WRITE)
+                .src_stage_mask(targets)
+                .src_access_mask(
+                    vk::AccessFlags::COLOR_ATTACHMENT_WRITE
+                        | vk::AccessFlags::DEPTH_STENCIL_ATTACHMENT_WRITE,
+                )
                 .dst_stage_mask(stage)
                 .dst_access_mask(access),
         ];

@@ -15,6 +15,8 @@ pub enum ImageUse {
     ColourTarget,
     /// Drawn into only.
     DepthTarget,
+    /// Drawn into, then copied from.
+    CopiedDepth,
     /// Filled by a copy, read by shaders.
     Texture,
 }
@@ -25,6 +27,7 @@ pub struct Image {
     pub(super) width: u32,
     pub(super) height: u32,
     pub(super) mip_levels: u32,
+    pub(super) aspect: vk::ImageAspectFlags,
     allocation: Option<Allocation>,
     device: Arc<Device>,
 }
@@ -84,6 +87,10 @@ impl Image {
                 vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
                 vk::ImageAspectFlags::DEPTH,
             ),
+            ImageUse::CopiedDepth => (
+                vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC,
+                vk::ImageAspectFlags::DEPTH,
+            ),
             ImageUse::Texture => (
                 vk::ImageUsageFlags::SAMPLED
                     | vk::ImageUsageFlags::TRANSFER_DST
@@ -113,6 +120,7 @@ impl Image {
             width,
             height,
             mip_levels,
+            aspect,
             allocation: None,
             device: Arc::clone(device),
         };

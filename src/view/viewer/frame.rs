@@ -7,7 +7,7 @@ use super::Viewer;
 use crate::error::Result;
 use crate::render::{Light, write_png};
 use crate::view::detailer::{PAUSE, Wanted};
-use crate::view::surface_pass;
+use crate::view::surface_pass::{self, Laid};
 use crate::vk::Shown;
 
 impl Viewer {
@@ -19,6 +19,9 @@ impl Viewer {
         let begin = Instant::now();
         let unanswered = self.unanswered.take();
         self.dirty = false;
+        if !self.switches.slots {
+            self.input.hovered = None;
+        }
         self.update()?;
         let seconds = begin.duration_since(self.last_frame).as_secs_f64();
         self.last_frame = begin;
@@ -36,23 +39,45 @@ impl Viewer {
             Light::Direct => [0.0, 1.0, 1.0],
             Light::Indirect => [1.0, -1.0, 0.0],
         };
+        let laid = match (self.shown_detail().is_some(), self.kept_detail()) {
+            (true, _) => Laid::Exactly,
+            (false, kept) if kept != [false; 2] => {
+                self.surfaces.lay(kept);
+                Laid::FromElsewhere
+            }
+            _ => Laid::No,
+        };
         let shown = surface_pass::Shown {
             exposure: self.exposure().exp2(),
             ambient: self.ambient(),
             parts: [all, direct, emission],
             elements: self.switches.elements,
             sources: self.switches.sources,
-            picture: self.shown_detail().is_some(),
+            picture: laid,
             chosen: self.input.chosen.or(self.input.hovered),
         };
         let capture = self.capture.is_some();
         let (surfaces, panel_pass) = (&self.surfaces, &self.panel_pass);
+        // A software driver compiles a shader when something is drawn by it first: not while a person waits.
+        let first = (!self.timing.has_begun()).then_some(surface_pass::Shown {
+            picture: Laid::FromElsewhere,
+            ..shown
+        });
         let (answer, captured) = self.screen.show(capture, |cmd| {
-            if shown.picture {
+            if let Some(unseen) = &first {
+                cmd.scissor(0, 0, 1, 1);
+                surfaces.record(cmd, &rows, unseen);
+                cmd.scissor(0, 0, size.0, size.1);
+            }
+            if shown.picture == Laid::Exactly {
                 panel_pass.record_picture(cmd, &prepared);
             }
             // The picture has all but what lies over the surfaces.
-            if !shown.picture || shown.elements || shown.sources || shown.chosen.is_some() {
+            if shown.picture != Laid::Exactly
+                || shown.elements
+                || shown.sources
+                || shown.chosen.is_some()
+            {
                 surfaces.record(cmd, &rows, &shown);
             }
             panel_pass.record(cmd, &prepared);
@@ -81,21 +106,26 @@ impl Viewer {
         Ok(true)
     }
 
-    /// Asks for a detailed picture once the view has stayed for a while, and for none while it changes.
+    /// Asks for coarse pictures of a view that changes, and for a whole one once it has stayed for a while.
     fn want_detail(&mut self, size: (u32, u32)) {
         let now = self.wanted_now(size);
+        let drawn = self.switches.detail && self.is_lit();
         match &self.seen {
             Some((before, _)) if before.looks_like(&now) => {}
             _ => {
                 self.seen = Some((now.clone(), Instant::now()));
-                if self.wanted.take().is_some() {
-                    self.detailer.want(None);
+                let before = self.wanted.take();
+                if drawn {
+                    self.detailer.want(Some(now), true);
+                } else if before.is_some() {
+                    self.detailer.want(None, false);
                 }
+                return;
             }
         }
         let since = self.seen.as_ref().map(|(_, since)| since.elapsed());
         let stays = since.is_some_and(|since| since >= PAUSE);
-        if !(self.switches.detail && stays && self.is_lit()) {
+        if !(drawn && stays) {
             return;
         }
         // While a bake goes on, a picture is finished before a brighter one is begun.
@@ -110,7 +140,7 @@ impl Viewer {
         };
         if ask {
             self.wanted = Some(now.clone());
-            self.detailer.want(Some(now));
+            self.detailer.want(Some(now), false);
         }
     }
 }

@@ -2,10 +2,52 @@
 
 use std::time::{Duration, Instant};
 
+use egui::TextureHandle;
+
 use super::Viewer;
 use crate::error::Result;
+use crate::view::input::Input;
 use crate::view::overlay;
 use crate::view::panel::{self, Asked, Changed, Told};
+
+/// A picture over the view, drawn anew when what it shows changes.
+#[derive(Default)]
+pub(super) struct KeptTexture {
+    /// The element or the source, and the light and the exposure by which it is shown.
+    shows: Option<(u32, (u64, u32))>,
+    /// None where there is nothing to be seen.
+    texture: Option<TextureHandle>,
+}
+
+impl KeptTexture {
+    fn of(
+        &mut self,
+        context: &egui::Context,
+        name: &str,
+        shows: (u32, (u64, u32)),
+        draw: impl FnOnce() -> Option<egui::ColorImage>,
+    ) -> Option<&TextureHandle> {
+        if self.shows != Some(shows) {
+            self.shows = Some(shows);
+            let load = |image| context.load_texture(name, image, egui::TextureOptions::LINEAR);
+            self.texture = draw().map(load);
+        }
+        self.texture.as_ref()
+    }
+}
+
+fn lay(painter: &egui::Painter, texture: Option<&TextureHandle>, corner: egui::Pos2, side: f32) {
+    if let Some(texture) = texture {
+        let place = egui::Rect::from_min_size(corner, egui::Vec2::splat(side));
+        let uv = egui::Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
+        painter.image(texture.id(), place, uv, egui::Color32::WHITE);
+    }
+}
+
+/// The element that was clicked, or the one under the cursor.
+fn marked(input: &Input) -> Option<u32> {
+    input.chosen.or(input.hovered)
+}
 
 impl Viewer {
     /// Lays out the panel and what lies over the view; takes what was changed there.
@@ -22,7 +64,6 @@ impl Viewer {
             .or_default()
             .native_pixels_per_point = Some(self.scale);
         let context = self.egui.clone();
-        let switches = self.switches;
         let mut asked = Vec::new();
         let output = context.run(raw, |context| {
             self.marks(context, (width, height));
@@ -30,9 +71,6 @@ impl Viewer {
                 asked = self.controls(context);
             }
         });
-        if switches.items && !self.switches.items {
-            self.items = None;
-        }
         for asked in asked {
             match asked {
                 Asked::Camera(i) => self.see_camera(i),
@@ -56,7 +94,7 @@ impl Viewer {
     fn controls(&mut self, context: &egui::Context) -> Vec<Asked> {
         let cameras: Vec<_> = self.scene.cameras.iter().map(|c| c.name.clone()).collect();
         let baking = self.is_baking();
-        let marked = self.input.chosen.or(self.input.hovered);
+        let marked = marked(&self.input);
         let device = self.screen.device().name().to_owned();
         let told = Told {
             scene: &self.scene.name,
@@ -64,6 +102,7 @@ impl Viewer {
             device: &device,
             cameras: &cameras,
             progress: self.progress,
+            stage: self.stage.filter(|_| baking),
             baking,
             frame: self.timing.last(baking),
             detail: self.shown_detail().map(|drawn| drawn.seconds),
@@ -95,7 +134,7 @@ impl Viewer {
     }
 
     /// What lies over the view: marks of lights, light by direction, an item buffer.
-    fn marks(&self, context: &egui::Context, size: (u32, u32)) {
+    fn marks(&mut self, context: &egui::Context, size: (u32, u32)) {
         let layer = egui::LayerId::new(egui::Order::Background, egui::Id::new("marks"));
         let painter = context.layer_painter(layer);
         let marked_lamps = self.lamps.iter().enumerate();
@@ -106,30 +145,32 @@ impl Viewer {
             }
         }
         let exposure = self.exposure().exp2();
-        let picture = |name: &str, image: egui::ColorImage, place: egui::Rect| {
-            let texture = context.load_texture(name, image, egui::TextureOptions::LINEAR);
-            let uv = egui::Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
-            painter.image(texture.id(), place, uv, egui::Color32::WHITE);
-            // Drawn in this frame: the texture lives until the next one.
-            context.data_mut(|data| data.insert_temp(egui::Id::new(name), texture));
-        };
         let screen = context.content_rect();
-        let marked = self.input.chosen.or(self.input.hovered);
-        if self.switches.slots
-            && let (Some(relief), Some(e)) = (&self.snapshot.relief, marked)
-            && let Some(image) = overlay::hemisphere(relief, e, exposure)
-        {
-            let at = self.input.pointer.unwrap_or_default();
-            let corner = egui::pos2(at.0 / self.scale + 16.0, at.1 / self.scale + 16.0);
-            let place = egui::Rect::from_min_size(corner, egui::vec2(96.0, 96.0));
-            picture("hemisphere", image, place);
+        let light = (self.lights, exposure.to_bits());
+        let slots = marked(&self.input).filter(|_| self.switches.slots);
+        match (slots, &self.snapshot.relief) {
+            (Some(e), Some(relief)) => {
+                let draw = || overlay::hemisphere(relief, e, exposure);
+                let texture = self
+                    .slots_picture
+                    .of(context, "hemisphere", (e, light), draw);
+                let at = self.input.pointer.unwrap_or_default();
+                let corner = egui::pos2(at.0 / self.scale + 16.0, at.1 / self.scale + 16.0);
+                lay(&painter, texture, corner, overlay::SIDE as f32);
+            }
+            _ => self.slots_picture = KeptTexture::default(),
         }
-        if let Some(items) = self.items.as_ref().filter(|_| self.switches.items) {
-            let image = overlay::items(items, &self.snapshot.irradiance, exposure);
-            let side = 0.35 * screen.width().min(screen.height());
-            let corner = screen.right_bottom() - egui::vec2(side + 8.0, side + 8.0);
-            let place = egui::Rect::from_min_size(corner, egui::vec2(side, side));
-            picture("items", image, place);
+        let wanted = self.switches.items && self.input.chosen.is_some();
+        match self.items.as_ref().filter(|_| wanted) {
+            Some(items) => {
+                let draw = || Some(overlay::items(items, &self.snapshot.irradiance, exposure));
+                let key = (items.source, light);
+                let texture = self.items_picture.of(context, "items", key, draw);
+                let side = 0.35 * screen.width().min(screen.height());
+                let corner = screen.right_bottom() - egui::vec2(side + 8.0, side + 8.0);
+                lay(&painter, texture, corner, side);
+            }
+            None => self.items_picture = KeptTexture::default(),
         }
     }
 }

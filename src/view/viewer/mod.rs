@@ -10,7 +10,7 @@ use std::time::Instant;
 use glam::Vec3;
 use winit::window::Window;
 
-use super::baker::{Baker, Order};
+use super::baker::{Baker, Order, Stage};
 use super::camera::Eye;
 use super::detailer::{Detailer, Drawn, PAUSE, Wanted};
 use super::event::Event;
@@ -26,7 +26,8 @@ use super::{Options, Wake};
 use crate::error::{Error, Result};
 use crate::render::Light;
 use crate::scene::Scene;
-use crate::solver::{ItemPicture, Settings};
+use crate::solver::{ItemPicture, Settings, Update};
+use layout::KeptTexture;
 
 pub struct Viewer {
     // The threads first: they stop before what they show is gone.
@@ -58,13 +59,26 @@ pub struct Viewer {
     progress: Progress,
     bounds: Vec<[f64; 2]>,
     sources: Vec<u32>,
+    /// Counts the sources that have come, and what was asked for of which.
+    source_lists: u64,
+    asked: Option<(u64, Option<u32>)>,
     items: Option<ItemPicture>,
+    slots_picture: KeptTexture,
+    items_picture: KeptTexture,
+    stage: Option<Stage>,
+    /// Stops by which what is shown is exposed, without the person's own.
+    metered: f32,
+    /// Counts the lights that were shown.
+    lights: u64,
+    /// The last detailed picture, and what the last whole one is of.
     detail: Option<Drawn>,
+    whole: Option<Wanted>,
     wanted: Option<Wanted>,
     /// What the view was when it last changed.
     seen: Option<(Wanted, Instant)>,
     messages: Vec<String>,
-    pub(super) saving: usize,
+    /// Pictures on their way into files.
+    pub(super) saving: Vec<PathBuf>,
 
     pub(super) egui: egui::Context,
     pub(super) input: Input,
@@ -84,6 +98,8 @@ pub struct Viewer {
 
 /// Most messages that the panel keeps.
 const MOST_MESSAGES: usize = 4;
+/// Stops by which the exposure of a bake under way may be off.
+const MOST_CHANGE: f32 = 0.2;
 /// Directory of pictures that are saved by a key: the working one.
 const PICTURE: &str = "mesolux";
 
@@ -113,7 +129,7 @@ impl Viewer {
         let from_file = bake.is_some();
         let snapshot = Arc::new(match bake {
             Some(bake) => Snapshot::of_bake(&scene, bake),
-            None => Snapshot::dark(&scene),
+            None => Snapshot::unlit(&scene),
         });
         if !from_file {
             baker.order(Order::Bake {
@@ -134,7 +150,11 @@ impl Viewer {
             stale: false,
             scale: 1.0,
             eye: Eye::new(&scene, &camera),
-            next_camera: 0,
+            next_camera: {
+                // The first key press goes on from the camera that is shown.
+                let shown = scene.cameras.iter().position(|c| *c == camera);
+                shown.map_or(0, |i| (i + 1) % scene.cameras.len())
+            },
             switches: Switches::default(),
             lamps: lamps(&base),
             lamp: 0,
@@ -144,16 +164,24 @@ impl Viewer {
             scene,
             settings,
             progress: snapshot.progress,
-            snapshot,
             epoch: 0,
             bounds: Vec::new(),
             sources: Vec::new(),
+            source_lists: 0,
+            asked: None,
             items: None,
+            slots_picture: KeptTexture::default(),
+            items_picture: KeptTexture::default(),
+            stage: None,
+            metered: snapshot.exposure,
+            lights: 0,
+            snapshot,
             detail: None,
+            whole: None,
             wanted: None,
             seen: None,
             messages: Vec::new(),
-            saving: 0,
+            saving: Vec::new(),
             egui,
             input: Input::default(),
             repaint: None,
@@ -183,14 +211,27 @@ impl Viewer {
 
     /// Whether there is any light to be shown.
     fn is_lit(&self) -> bool {
-        self.snapshot.progress.done || self.snapshot.progress.shots > 0
+        self.snapshot.progress.done || self.snapshot.progress.update.shots > 0
     }
 
     /// Whether the detailed picture of the view is shown, with all its pixels and the last light.
     pub fn is_detailed(&self) -> bool {
+        // What was switched since the last frame counts.
+        let now = self.wanted_now(self.size);
         self.shown_detail().is_some_and(|drawn| {
-            drawn.size == drawn.of.size && Arc::ptr_eq(&drawn.of.snapshot, &self.snapshot)
+            drawn.is_whole()
+                && drawn.of.looks_like(&now)
+                && Arc::ptr_eq(&drawn.of.snapshot, &self.snapshot)
         })
+    }
+
+    /// Whether the sources and the item buffer are there, where they are to be shown.
+    pub fn has_overlays(&self) -> bool {
+        let Switches { sources, items, .. } = self.switches;
+        let items = items && self.input.chosen.is_some();
+        !self.dirty
+            && (!(sources || items) || !self.sources.is_empty())
+            && (!items || self.items.is_some())
     }
 
     /// When a frame is to be drawn though nothing happens; none: only when something does.
@@ -248,6 +289,7 @@ impl Viewer {
         {
             before.height_scale = material.height_scale * self.relief_scale as f32;
         }
+        self.surfaces.set_about(&self.scene);
         self.start_epoch();
         self.baker.order(Order::Bake {
             scene: Arc::clone(&self.scene),
@@ -273,15 +315,33 @@ impl Viewer {
         self.progress = Progress::default();
         self.bounds.clear();
         self.items = None;
+        self.asked = None;
+        self.stage = None;
         self.dirty = true;
     }
 
-    /// Asks what the source of a triangle sees.
-    pub(super) fn ask_items(&mut self, triangle: u32) {
-        if let Some(&source) = self.sources.get(triangle as usize)
-            && source != crate::constants::NONE
-        {
-            self.baker.order(Order::Items { source });
+    /// Asks for the sources where they are to be shown and nobody has cut them, and for what the source of the marked element sees.
+    fn ask_sources(&mut self) {
+        let Switches { sources, items, .. } = self.switches;
+        let chosen = self.input.chosen.filter(|_| items);
+        if !sources && chosen.is_none() {
+            return;
+        }
+        let source = chosen.and_then(|e| self.sources.get(e as usize).copied());
+        let wanted = (self.source_lists, source);
+        if self.asked == Some(wanted) || (source.is_none() && !self.sources.is_empty()) {
+            return;
+        }
+        self.asked = Some(wanted);
+        match source {
+            // The bake that is under way tells them.
+            None if self.is_baking() => {}
+            None => self.baker.order(Order::Sources),
+            Some(crate::constants::NONE) => {
+                self.items = None;
+                self.say("the element neither emits nor reflects: no source".into());
+            }
+            Some(source) => self.baker.order(Order::Items { source }),
         }
     }
 
@@ -289,11 +349,11 @@ impl Viewer {
     pub(super) fn save(&mut self, path: Option<PathBuf>) {
         let path = path.unwrap_or_else(|| {
             let numbered = (1..).map(|i| PathBuf::from(format!("{PICTURE}-{i:04}.png")));
-            let mut free = numbered.filter(|path| !path.exists());
+            let mut free = numbered.filter(|path| !path.exists() && !self.saving.contains(path));
             free.next().unwrap_or_default()
         });
         let wanted = self.wanted_now(self.size);
-        self.saving += 1;
+        self.saving.push(path.clone());
         self.detailer.save(wanted, path);
     }
 
@@ -320,7 +380,7 @@ impl Viewer {
 
     /// Stops.
     fn exposure(&self) -> f32 {
-        self.snapshot.exposure + self.switches.exposure
+        self.metered + self.switches.exposure
     }
 
     /// The detailed picture if it is of what the window shows.
@@ -328,6 +388,19 @@ impl Viewer {
         let drawn = self.detail.as_ref()?;
         let (now, _) = self.seen.as_ref()?;
         (self.switches.detail && drawn.of.looks_like(now)).then_some(drawn)
+    }
+
+    /// Whether the last whole picture and a coarse one after it show surfaces as the window does now.
+    fn kept_detail(&self) -> [bool; 2] {
+        let Some((now, _)) = self.seen.as_ref().filter(|_| self.switches.detail) else {
+            return [false; 2];
+        };
+        let whole = self.whole.as_ref().is_some_and(|of| of.colours_like(now));
+        let coarse = self.detail.as_ref().filter(|drawn| !drawn.is_whole());
+        [
+            whole,
+            coarse.is_some_and(|drawn| drawn.of.colours_like(now)),
+        ]
     }
 
     /// Takes what the other threads have found.
@@ -339,15 +412,21 @@ impl Viewer {
             self.fail(error)?;
         }
         if let Some(sources) = latest.sources {
-            self.surfaces.set_sources(&sources);
+            self.surfaces.set_sources(&self.scene, sources.clone());
             self.sources = sources;
+            self.source_lists += 1;
         }
         if let Some((epoch, progress)) = latest.progress
             && epoch == self.epoch
         {
             self.progress = progress;
-            if let Some(bound) = progress.error_bound {
-                self.bounds.push([progress.elapsed.as_secs_f64(), bound]);
+            let Update {
+                error_bound,
+                elapsed,
+                ..
+            } = progress.update;
+            if let Some(bound) = error_bound {
+                self.bounds.push([elapsed.as_secs_f64(), bound]);
             }
         }
         if let Some(items) = latest.items {
@@ -356,17 +435,41 @@ impl Viewer {
         if let Some(snapshot) = latest.snapshot {
             self.surfaces
                 .set_light(&snapshot.corners, &snapshot.corners_direct);
+            // Stages of one bake are exposed alike, or what was drawn of one would not fit the next.
+            let change = (snapshot.exposure - self.metered).abs();
+            let same = snapshot.epoch == self.snapshot.epoch && self.is_lit();
+            if snapshot.progress.done || !same || change > MOST_CHANGE {
+                self.metered = snapshot.exposure;
+            }
             self.snapshot = snapshot;
+            self.lights += 1;
         }
+        if let Some((epoch, stage)) = latest.stage
+            && epoch == self.epoch
+        {
+            self.stage = stage;
+        }
+        self.ask_sources();
         if let Some(drawn) = self.detailer.take() {
-            let picture = self.surfaces.set_picture(drawn.size, &drawn.codes)?;
-            self.panel_pass.set_picture(picture)?;
-            self.detail = Some(drawn);
+            // A coarse picture of brighter light does not take the place of a whole one.
+            let whole = (self.detail.as_ref()).filter(|d| d.is_whole() && !drawn.is_whole());
+            if !whole.is_some_and(|whole| whole.of.looks_like(&drawn.of)) {
+                let rows = Eye::new(&self.scene, &drawn.of.camera).rows(&self.scene, drawn.size);
+                let (picture, share) = self.surfaces.set_picture(&drawn, &rows)?;
+                self.panel_pass.set_picture(picture, share)?;
+                if drawn.is_whole() {
+                    self.whole = Some(drawn.of.clone());
+                }
+                self.detail = Some(drawn);
+            }
         }
-        for saved in self.detailer.saved() {
-            self.saving -= 1;
+        for (path, saved) in self.detailer.saved() {
+            self.saving.retain(|under_way| *under_way != path);
             match saved {
-                Ok(path) => self.say(format!("saved {}", path.display())),
+                Ok(exposure) => {
+                    tracing::info!("saved {}, exposure {exposure}", path.display());
+                    self.say(format!("saved {}", path.display()));
+                }
                 Err(error) => self.fail(error)?,
             }
         }
