@@ -75,30 +75,3 @@ fn perpendicular_rectangles_that_touch() {
         assert!(error.abs() <= 2e-3, "C-14 {h} {w}: {receiver} for {exact}");
     }
 }
-
-/// Small flaps below large sheets, which hide them from the light: the sheet in a flap's pixel is near enough to be its own surface, but
-/// stands in the way.
-#[test]
-fn folds_narrower_than_a_pixel_are_dark() {
-    let mut build = Build::new();
-    let black = build.material(0.0, 0.0);
-    let (x, z) = (DVec3::X, DVec3::Z);
-    let slope = DVec3::new(3.0_f64.sqrt() / 2.0, 0.5, 0.0);
-    let mut below = Vec::new();
-    for i in 0..8 {
-        let hinge = (0.12 * f64::from(i) - 0.45) * x - DVec3::Y;
-        below.extend(build.quad(hinge - 0.005 * z, 0.01 * z, 0.01 * x, (1, 1), black));
-        // All pixels about the flap lie in one of its two triangles.
-        let corner = hinge - 0.23 * z - 0.1 * slope;
-        build.quad(corner, 0.3 * z, 0.2 * slope, (1, 1), black);
-    }
-    build.point_light(DVec3::ZERO, 1.0);
-    let solved = build.solve(&Settings {
-        hemicube: 64,
-        emitter_hemicube: Some(64),
-        merging: false,
-        ..Settings::default()
-    });
-    let lit = below.iter().filter(|&&e| solved.direct[e].x > 0.0).count();
-    assert_eq!(lit, 0, "of {} flaps", below.len());
-}

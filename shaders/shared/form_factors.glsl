@@ -11,8 +11,8 @@ layout(constant_id = 0) const uint KIND = RECEIVE_OUTLINE;
 
 // Words of vec4: a corner; w: 1 where a loop of the contour starts (each loop ends with its first corner again).
 layout(scalar, binding = 7) readonly buffer Contours { uint contour_words[]; };
-// The same as words of struct Triangle.
-layout(scalar, binding = 8) readonly buffer TriangleWords { uint triangle_words[]; };
+// Words of struct Triangle.
+layout(scalar, binding = 8) readonly buffer Triangles { uint triangle_words[]; };
 // Of curved sources: centroid and sum of area times normal, two words unused.
 layout(scalar, binding = 9) readonly buffer Parts { uint part_words[]; };
 // 1 where any element of a block of GROUP sees the source, [slot][block]. Whoever reads it sets it to 0 again.
@@ -32,6 +32,11 @@ Triangle load_triangle(uint index) {
         word[i] = LOAD4(triangle_words, index * TRIANGLE_WORDS + 4 * i);
     }
     return Triangle(word[0].xyz, word[0].w, word[1].xyz, word[1].w, word[2].xyz, word[2].w, word[3].xyz, word[3].w);
+}
+
+vec3 own_corner(uint element, uint corner) {
+    uint at = element * TRIANGLE_WORDS + 4 * corner;
+    return uintBitsToFloat(uvec3(triangle_words[at], triangle_words[at + 1], triangle_words[at + 2]));
 }
 
 // Form factor (see FLUX) of the source's outline, of whose edges none is seen under more than a right angle and none lies below the
@@ -162,9 +167,9 @@ FLUX mean_form_factor(uint element, vec4 ball, vec3 n, Source s) {
     bool near = gap <= NEAR * ball.w;
     bool touching = gap <= ball.w;
     bool any_near = subgroupAny(near);
-    vec3 a = triangles[element].a;
-    vec3 ab = triangles[element].b - a;
-    vec3 ac = triangles[element].c - a;
+    vec3 a = own_corner(element, 0);
+    vec3 ab = own_corner(element, 1) - a;
+    vec3 ac = own_corner(element, 2) - a;
     FLUX sum = FLUX(0.0);
     for (uint i = 0; i < (any_near ? 11 : 1); i++) {
         bool mine = i == 0 ? !near : i < 4 ? near && !touching : near && touching;

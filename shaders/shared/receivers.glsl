@@ -21,7 +21,6 @@ layout(scalar, binding = 4) buffer Counts { ReceiverList lists[]; };
 // The elements, counted from the first of the dispatch, [slot][kind][element].
 layout(scalar, binding = 5) buffer Listed { uint listed[]; };
 layout(binding = 6) uniform usampler2D items;
-layout(scalar, binding = 8) readonly buffer Triangles { Triangle triangles[]; };
 
 layout(push_constant, scalar) uniform Parameters {
     uint first_element;
@@ -47,14 +46,6 @@ const float FLAT_POINT_DISTANCE = 32.0;
 const float POINT_DISTANCE = 16.0;
 // An element no further than so many of its radii from a source takes several samples.
 const float NEAR = 4.0;
-
-// Whether an element with normal n holds p, which lies in its plane.
-bool holds(uint element, vec3 n, vec3 p) {
-    vec3 a = triangles[element].a - p;
-    vec3 b = triangles[element].b - p;
-    vec3 c = triangles[element].c - p;
-    return dot(cross(a, b), n) >= 0.0 && dot(cross(b, c), n) >= 0.0 && dot(cross(c, a), n) >= 0.0;
-}
 
 // Whether p, on an element with normal n, is seen from the source's eye.
 bool visible(vec3 p, vec3 n, uint element, uint slot, Source s) {
@@ -89,9 +80,7 @@ bool visible(vec3 p, vec3 n, uint element, uint slot, Source s) {
         return true;
     }
     float sine = length(cross(n, plane.xyz));
-    bool same = apart <= REACH * footprint && depth <= apart * sine + HEIGHT_EPSILON;
-    // Then it may still stand in the way: in a fold narrower than a pixel.
-    return same && !holds(item, plane.xyz, s.eye + d * (eye_height / (eye_height - height)));
+    return apart <= REACH * footprint && depth <= apart * sine + HEIGHT_EPSILON;
 }
 
 Source load_source(uint index) {

@@ -60,7 +60,7 @@ struct Parameters {
 
 /// Place of the item buffer among the bindings, and how many there are for sorting and in all.
 const ITEMS: usize = 6;
-const SORT: usize = 9;
+const SORT: usize = 8;
 const PLAIN: usize = 12;
 
 fn pipeline(
@@ -130,8 +130,7 @@ impl FormFactors {
                 .map(Bind::Buffer)
                 .to_vec();
                 binds.push(Bind::Image(&batch.items, &batch.sampler));
-                let own = [behind, &scene.triangles].map(Bind::Buffer);
-                let sort = [&binds[..], &own].concat();
+                let sort = [&binds[..], &[Bind::Buffer(behind)]].concat();
                 let sort = self.sort.bind("sort receivers", &sort)?;
                 let rest = [
                     &scene.contours,

@@ -113,14 +113,7 @@ fn visible(
     if (seen - source.eye).dot(d) > d.length() * (d.length() + REACH * footprint) {
         return true;
     }
-    let sine = normal.cross(plane).length();
-    if apart > REACH * footprint || depth > apart * sine + HEIGHT_EPSILON {
-        return false;
-    }
-    let crossing = source.eye + d * (eye_height / (eye_height - height));
-    let corners = elements.triangle(item as usize).map(|v| v - crossing);
-    let within = |i: usize| corners[i].cross(corners[(i + 1) % 3]).dot(plane) >= 0.0;
-    !(0..3).all(within)
+    apart <= REACH * footprint && depth <= apart * normal.cross(plane).length() + HEIGHT_EPSILON
 }
 
 /// Sample points of a triangle (two barycentric coordinates, weight): the centroid; degree 2; Radon's degree 5.
