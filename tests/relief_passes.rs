@@ -11,6 +11,7 @@ use mesolux::reference;
 use mesolux::reference::pixels_relief::{Light, Received};
 use mesolux::reference::send_relief::send_relief;
 use mesolux::solver::{Estimator, Settings, Solver};
+use mesolux::sources::Grouping;
 
 const BATCH: u32 = 6;
 const FACE: u32 = 32;
@@ -66,6 +67,12 @@ fn solver_by(estimator: Estimator, transport: Transport, k: u32, shots: Option<u
         shots,
         // Every shot is drawn, so that a batch is BATCH of them.
         visibility_memory: Some(0),
+        // Sources that few batches see twice.
+        grouping: Grouping {
+            max_area: 1.0 / 512.0,
+            max_area_near: 1.0 / 512.0,
+            ..Grouping::default()
+        },
         relief: Options {
             transport,
             directions: Directions::new(k).expect("a number of the paper"),
