@@ -41,9 +41,9 @@ impl CachedBake {
             visibility_memory,
             relief,
         } = settings;
-        let emitter_face = settings.emitter_face();
+        let emitter_shadows = settings.emitter_shadows();
         let key = format!(
-            "bake cache 2, layout {VERSION}\n{maker}\n{scene_hash}\n{estimator:?} {hemicube} {emitter_face} {residual:?} {shots:?} {seed} \
+            "bake cache 3, layout {VERSION}\n{maker}\n{scene_hash}\n{estimator:?} {hemicube} {emitter_shadows:?} {residual:?} {shots:?} {seed} \
              {grouping:?} {culling:?} {merging} {batch} {visibility_memory:?} {:?} {:?}",
             relief.transport, relief.directions
         );

@@ -54,6 +54,8 @@ shared! {
     LIGHT_TURNS = 16;
     /// Sets of such points, one a pixel of each 4 × 4: 64 fixed points would show as bands in penumbrae.
     LIGHT_SETS = 16;
+    /// One more than a leaf has triangles, at most, in the tree of what casts shadows.
+    LEAF_TRIANGLES = 16;
     /// A sample of so many texels shows the mean of the relief.
     WIDEST_SAMPLE = 2;
     /// How relief is drawn: displaced; only lit, at its mean height; so too, and shifted by its height.

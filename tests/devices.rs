@@ -88,6 +88,7 @@ fn counts(report: &Report) -> String {
     let drawn = (
         report.hemicubes,
         report.emitter_hemicubes,
+        report.emitters_by_rays,
         report.triangles_drawn,
     );
     let kept = (report.kept_sources, report.replayed);

@@ -140,6 +140,13 @@ fn relighting_equals_a_bake_of_the_same_groups_and_draws_point_lights_alone() {
 /// The lamps' finer hemicubes are kept, and those of new lights are as fine.
 #[test]
 fn relighting_keeps_finer_form_factors() {
+    relights(Some(4 * settings().hemicube));
+    assert_silent();
+}
+
+/// So are form factors whose visibility rays found.
+#[test]
+fn relighting_keeps_what_rays_found() {
     relights(None);
     assert_silent();
 }
@@ -149,7 +156,9 @@ fn relights(emitter_hemicube: Option<u32>) {
         emitter_hemicube,
         ..settings()
     };
-    let finer = emitter_hemicube.is_none();
+    let by_rays = emitter_hemicube.is_none();
+    let finer = emitter_hemicube != Some(settings.hemicube);
+    let count = |report: &Report| (report.emitter_hemicubes, report.emitters_by_rays);
     let device = device();
     let first = scene(true).0.scene;
     let relit = relit_scene().0.scene;
@@ -160,7 +169,8 @@ fn relights(emitter_hemicube: Option<u32>) {
     };
     let dark = {
         let solver = solve(&first, None);
-        assert_eq!(solver.report().emitter_hemicubes > 2, finer);
+        let (drawn, found) = count(solver.report());
+        assert_eq!((drawn > 2, found > 2), (finer && !by_rays, by_rays));
         let kept = solver
             .visibility(&first)
             .expect("it comes back")
@@ -170,13 +180,15 @@ fn relights(emitter_hemicube: Option<u32>) {
     };
     let kept = Visibility::load(&path).expect("it is read");
     let solver = solve(&relit, Some(&kept));
-    assert_eq!(
-        solver.report().hemicubes,
-        2,
-        "the two halves of the point light"
-    );
-    let drawn_finely = solver.report().emitter_hemicubes;
-    assert_eq!(drawn_finely, if finer { 2 } else { 0 });
+    // The two halves of the point light.
+    let drawn = solver.report().hemicubes;
+    assert_eq!(drawn, if by_rays { 0 } else { 2 });
+    let of_emitters = match (finer, by_rays) {
+        (false, _) => (0, 0),
+        (true, false) => (2, 0),
+        (true, true) => (0, 2),
+    };
+    assert_eq!(count(solver.report()), of_emitters);
     let light = solver.light().expect("the light comes back");
     assert!(largest_difference(&light.irradiance, &dark.irradiance) > 0.1);
 

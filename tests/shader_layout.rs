@@ -116,7 +116,8 @@ fn rust_and_glsl_agree() {
         tangent texel bitangent normal first_cluster cluster_count slots);
     check!(true, ParallelLight: towards fluence_a fluence_b fluence_c);
     check!(true, LightPoint: position kind normal area strength);
-    check!(true, ShadowNode: low skip high first count);
+    check!(true, ShadowNode: low skip high leaf);
+    check!(true, ShadowOccluder: a component b closed c height normal unused);
     check!(true, ShadowTriangle: a b c relief);
     check!(true, ShadowRay: from clear to);
     check!(true, LitTriangle: a b c normal_a normal_b normal_c plane above open);

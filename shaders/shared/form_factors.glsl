@@ -1,6 +1,15 @@
 // Form factors of the elements that sort_receivers.comp has listed for one slot and kind. VECTOR_FLUX: the elements receive by
-// direction, and get the vector whose dot product with the normal is the form factor.
+// direction, and get the vector whose dot product with the normal is the form factor. SHADOW_RAYS: what is seen is asked of rays
+// instead of the item buffer.
 
+#ifdef SHADOW_RAYS
+#define RAYS 1
+#ifdef VECTOR_FLUX
+#define SHADOW_OCCLUDERS 13
+#else
+#define SHADOW_OCCLUDERS 12
+#endif
+#endif
 #include "shared/receivers.glsl"
 #include "shared/lambert.glsl"
 #include "shared/kept.glsl"
@@ -157,6 +166,16 @@ const vec3 POINTS[11] = vec3[](
     vec3(0.101286507, 0.797426985, 0.125939181)
 );
 
+bool visible(vec3 p, vec3 n, uint element, Source s, bool asks) {
+#ifdef SHADOW_RAYS
+    bool open[1] = bool[1](asks);
+    look(s, vec4[1](vec4(p, 0.0)), vec3[1](n), open);
+    return open[0];
+#else
+    return visible(p, n, element, first_slot, s, asks);
+#endif
+}
+
 // Mean over the element of form factor times visibility.
 FLUX mean_form_factor(uint element, vec4 ball, vec3 n, Source s) {
     if (KIND != RECEIVE_NEAR) {
@@ -175,7 +194,7 @@ FLUX mean_form_factor(uint element, vec4 ball, vec3 n, Source s) {
         bool mine = i == 0 ? !near : i < 4 ? near && !touching : near && touching;
         vec3 point = POINTS[i];
         vec3 p = i == 0 ? ball.xyz : a + point.x * ab + point.y * ac;
-        mine = mine && shows_front(s, p) && visible(p, n, element, list_slot, s);
+        mine = visible(p, n, element, s, mine && shows_front(s, p));
         FLUX f = form_factor(p, n, element, s);
         sum += mine ? point.z * f : FLUX(0.0);
     }
@@ -183,12 +202,12 @@ FLUX mean_form_factor(uint element, vec4 ball, vec3 n, Source s) {
 }
 
 void main() {
-    uint list = list_slot * RECEIVE_KINDS + KIND;
+    uint list = first_slot * RECEIVE_KINDS + KIND;
     // The lanes past the end do as the last one does.
     uint at = min(gl_GlobalInvocationID.x, lists[list].count - 1);
     uint i = listed[list * element_count + at];
     uint e = first_element + i;
-    Source s = load_source(slots[list_slot].source);
+    Source s = load_source(slots[first_slot].source);
     FLUX f = mean_form_factor(e, balls[e], planes[e].xyz, s);
 #ifdef VECTOR_FLUX
     MesoElement meso = meso_elements[i];
@@ -200,8 +219,8 @@ void main() {
     f = as_kept(f);
     bool lit = f > 0.0;
 #endif
-    fresh[list_slot * element_count + i] = f;
+    fresh[first_slot * element_count + i] = f;
     if (lit) {
-        occupied[list_slot * block_count + first_block + i / GROUP] = 1;
+        occupied[first_slot * block_count + first_block + i / GROUP] = 1;
     }
 }

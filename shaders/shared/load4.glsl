@@ -12,4 +12,25 @@ vec4 share4(uint word) {
                 subgroupBroadcast(value, 3));
 }
 
+uvec4 lanes_0_to_3(uint word) {
+    return uvec4(subgroupBroadcast(word, 0), subgroupBroadcast(word, 1), subgroupBroadcast(word, 2), subgroupBroadcast(word, 3));
+}
+
+uvec4 lanes_4_to_7(uint word) {
+    return uvec4(subgroupBroadcast(word, 4), subgroupBroadcast(word, 5), subgroupBroadcast(word, 6), subgroupBroadcast(word, 7));
+}
+
+// Eight words as bits, in one load where a subgroup has as many lanes.
+#define LOAD8(words, first, low, high)                                            \
+    {                                                                             \
+        bool one = gl_SubgroupSize >= 8;                                          \
+        uint word = words[(first) + (gl_SubgroupInvocationID & (one ? 7 : 3))];   \
+        low = lanes_0_to_3(word);                                                 \
+        if (one) {                                                                \
+            high = lanes_4_to_7(word);                                            \
+        } else {                                                                  \
+            high = lanes_0_to_3(words[(first) + 4 + (gl_SubgroupInvocationID & 3)]); \
+        }                                                                         \
+    }
+
 const uint SOURCE_WORDS = 32;

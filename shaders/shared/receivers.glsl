@@ -20,17 +20,19 @@ layout(scalar, binding = 3) readonly buffer Balls { vec4 balls[]; };
 layout(scalar, binding = 4) buffer Counts { ReceiverList lists[]; };
 // The elements, counted from the first of the dispatch, [slot][kind][element].
 layout(scalar, binding = 5) buffer Listed { uint listed[]; };
+#ifndef SHADOW_OCCLUDERS
 layout(binding = 6) uniform usampler2D items;
+#endif
 
 layout(push_constant, scalar) uniform Parameters {
     uint first_element;
     uint element_count;
     uint face_size;
-    uint slot_count;     // of the fresh ones
+    uint first_slot;     // of the fresh ones
+    uint end_slot;
     // Of form_factors.comp alone:
     uint first_block;
     uint block_count;    // of all elements
-    uint list_slot;
 };
 
 // Rounding of a plane's height at a point: a few steps of f32 at coordinates up to 1.
@@ -47,15 +49,18 @@ const float POINT_DISTANCE = 16.0;
 // An element no further than so many of its radii from a source takes several samples.
 const float NEAR = 4.0;
 
-// Whether p, on an element with normal n, is seen from the source's eye.
-bool visible(vec3 p, vec3 n, uint element, uint slot, Source s) {
+#ifdef SHADOW_OCCLUDERS
+#include "shared/shadow_packets.glsl"
+#else
+// Whether p, on an element with normal n, is seen from the source's eye, for the lanes that ask.
+bool visible(vec3 p, vec3 n, uint element, uint slot, Source s, bool asks) {
     vec3 d = p - s.eye;
     vec3 local = vec3(dot(d, s.tangent), dot(d, s.bitangent), dot(d, s.normal));
     vec2 texel = hemicube_texel(local, face_size);
     ivec2 pixel = hemicube_pixel(texel, face_size);
     uint item = texelFetch(items, ivec2(slot * face_size, 0) + pixel, 0).r;
-    if (item == NONE || item == element) {
-        return true;
+    if (!asks || item == NONE || item == element) {
+        return asks;
     }
     vec4 plane = planes[item];
     float eye_height = dot(plane.xyz, s.eye) - plane.w;
@@ -82,6 +87,7 @@ bool visible(vec3 p, vec3 n, uint element, uint slot, Source s) {
     float sine = length(cross(n, plane.xyz));
     return apart <= REACH * footprint && depth <= apart * sine + HEIGHT_EPSILON;
 }
+#endif
 
 Source load_source(uint index) {
     vec4 word[SOURCE_WORDS / 4];

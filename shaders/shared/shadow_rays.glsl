@@ -46,7 +46,8 @@ bool blocked(vec3 from, vec3 to, float clear) {
             at = node.skip;
             continue;
         }
-        for (uint i = node.first; i < node.first + node.count; i++) {
+        uint first = node.leaf / LEAF_TRIANGLES;
+        for (uint i = first; i < first + node.leaf % LEAF_TRIANGLES; i++) {
             ShadowTriangle triangle = shadow_triangles[i];
             float share = meets(triangle, from, way);
             if (share > (triangle.relief == 1 ? clear : 0.0) && share < 1.0) {

@@ -235,8 +235,7 @@ struct ShadowNode {
     vec3 low;           // from the eye, internal units
     uint skip;          // the node that follows all that is in this one
     vec3 high;
-    uint first;         // of its triangles
-    uint count;         // of a leaf's triangles, 0 in others
+    uint leaf;          // LEAF_TRIANGLES times its first triangle, plus how many a leaf has; others have none
 };
 
 // What casts a shadow.
@@ -245,6 +244,18 @@ struct ShadowTriangle {
     vec3 b;
     vec3 c;
     uint relief;        // 1: it stands for a relief about it
+};
+
+// What hides places from a source, and where it does.
+struct ShadowOccluder {
+    vec3 a;
+    uint component;     // the connected part that it is of
+    vec3 b;
+    uint closed;        // 1: that part is closed, with all normals outward
+    vec3 c;
+    float height;       // normal · x on its plane
+    vec3 normal;
+    uint unused;
 };
 
 // A straight way.

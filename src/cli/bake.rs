@@ -15,7 +15,7 @@ use mesolux::meso::{self, Transport};
 use mesolux::quality::Quality;
 use mesolux::scene::Scene;
 use mesolux::solution::{Origin, Solution};
-use mesolux::solver::{Estimator, Report, Settings, Solver, Update, Visibility};
+use mesolux::solver::{EmitterShadows, Estimator, Report, Settings, Solver, Update, Visibility};
 use mesolux::sources::Grouping;
 use mesolux::vk::Device;
 
@@ -64,8 +64,8 @@ pub struct SolveOptions {
     /// Pixels a side of a hemicube face [default: that of --quality, 128 for normal]
     #[arg(long, value_name = "N")]
     hemicube: Option<u32>,
-    /// The same for sources that emit strongly, whose shadows are the sharpest; they are few, so that finer ones cost little.
-    /// The same as --hemicube draws them as all others [default: four times --hemicube, at most 1024]
+    /// The same for sources that emit strongly, whose shadows are the sharpest, in place of shadow rays; as --hemicube draws them as
+    /// all others [default: none, but with --estimator pixel four times --hemicube, at most 1024]
     #[arg(long, value_name = "N")]
     emitter_hemicube: Option<u32>,
     /// Stop when the error bound, as a share of the emitted power, is no more than this [default: that of --quality, 0.001 for
@@ -162,7 +162,10 @@ impl SolveOptions {
         let settings = self.settings()?;
         Ok(Self {
             hemicube: Some(settings.hemicube),
-            emitter_hemicube: Some(settings.emitter_face()),
+            emitter_hemicube: match settings.emitter_shadows() {
+                EmitterShadows::Rays => None,
+                EmitterShadows::Hemicubes(face) => Some(face),
+            },
             residual: Some(settings.residual),
             source_elements: Some(settings.grouping.max_elements),
             source_area: Some(settings.grouping.max_area),

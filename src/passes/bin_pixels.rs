@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::buffers::{Batch, SceneBuffers, State, upload};
+use super::batch::Batch;
+use super::buffers::{SceneBuffers, State, upload};
 use super::{groups, shaders};
 use crate::error::{Error, Result};
 use crate::hemicube::{fixed_point_tables, pixel_count};
@@ -79,7 +80,8 @@ impl BinPixels {
         state: &State,
         batch: &Batch,
     ) -> Result<Buffers> {
-        let tables = fixed_point_tables(batch.face_size);
+        let hemicubes = batch.hemicubes();
+        let tables = fixed_point_tables(hemicubes.face_size);
         let deltas = upload(device, "delta form factors", &tables, BufferUse::Storage)?;
         let bytes = 8 * u64::from(batch.slot_count) * u64::from(scene.element_count);
         let form_factors = Buffer::new(device, "form factors", bytes, BufferUse::Storage)?;
@@ -95,7 +97,7 @@ impl BinPixels {
                 Bind::Buffer(&deltas),
                 Bind::Buffer(&form_factors),
                 Bind::Buffer(&scene.planes),
-                Bind::Image(&batch.items, &batch.sampler),
+                Bind::Image(&hemicubes.items, &hemicubes.sampler),
             ],
         )?;
         let apply = self.apply.bind(
@@ -121,7 +123,8 @@ impl BinPixels {
     }
 
     pub fn record(&self, cmd: &Commands, buffers: &Buffers, scene: &SceneBuffers, batch: &Batch) {
-        let pixels = pixel_count(batch.face_size) as u32;
+        let hemicubes = batch.hemicubes();
+        let pixels = pixel_count(hemicubes.face_size) as u32;
         let parameters = |second| Parameters {
             element_count: scene.element_count,
             second,
@@ -129,7 +132,7 @@ impl BinPixels {
         cmd.dispatch(
             &self.bin,
             &buffers.bin,
-            &parameters(batch.face_size),
+            &parameters(hemicubes.face_size),
             [groups(pixels), batch.slot_count, 1],
         );
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);

@@ -5,22 +5,15 @@ use std::sync::Arc;
 use bytemuck::Pod;
 use glam::Vec3;
 
-use super::types::{
-    Component, Draw, KeptRow, Meshlet, Progress, ReceiverList, Slot, Source, Triangle, View,
-    contour_corners,
-};
+use super::types::{Component, KeptRow, Meshlet, Progress, Source, Triangle, contour_corners};
 use crate::charts::Connections;
-use crate::constants::{FACES, NONE};
+use crate::constants::NONE;
 use crate::elements::Elements;
 use crate::error::Result;
-use crate::hemicube::pixel_count;
 use crate::meshlets;
 use crate::occluders::Occluders;
 use crate::sources::Sources;
-use crate::vk::{
-    Buffer, BufferUse, Commands, Device, Format, Framebuffer, Image, ImageUse, RenderPass, Sampler,
-    Stage,
-};
+use crate::vk::{Buffer, BufferUse, Commands, Device, Stage};
 
 /// The scene in internal units: read by the passes, never written.
 pub struct SceneBuffers {
@@ -221,132 +214,6 @@ impl State {
     /// Says where the form factors of the first sources lie.
     pub fn keep_rows(&self, device: &Arc<Device>, rows: &[KeptRow]) -> Result<()> {
         write(device, &self.kept_rows, rows)
-    }
-}
-
-/// A batch of sources with their hemicubes.
-pub struct Batch {
-    /// Sources that are drawn.
-    pub slot_count: u32,
-    /// Slots behind theirs, for sources whose form factors were kept.
-    pub replay_slots: u32,
-    /// Pixels a side of a face.
-    pub face_size: u32,
-    pub slots: Buffer,
-    /// [`ReceiverList`]s: dispatches over the elements without and with relief, where slots are drawn in this batch, …
-    pub drawn_commands: Buffer,
-    /// … and where some emit.
-    pub emitting_commands: Buffer,
-    /// One over the elements with relief, where form factors of a drawn slot found no room to be kept.
-    pub loose_command: Buffer,
-    pub views: Buffer,
-    pub draws: Buffer,
-    pub counts: Buffer,
-    /// `[slot][face][occluder]`: room for every triangle in every face.
-    pub drawn_corners: Buffer,
-    pub drawn_items: Buffer,
-    /// Columns of N × 3 N texels side by side, one a slot.
-    pub items: Image,
-    pub framebuffer: Framebuffer,
-    pub sampler: Sampler,
-    _depth: Image,
-}
-
-/// Bytes of the lists of drawn triangles, for one occluder in one face of one slot.
-const DRAWN_BYTES: u64 = 16;
-
-impl Batch {
-    /// Of both kinds.
-    pub fn all_slots(&self) -> u32 {
-        self.slot_count + self.replay_slots
-    }
-
-    /// How many slots a batch may have: what fits the device's largest buffer, its widest image and an eighth of its
-    /// memory, and no more than `wanted`.
-    pub fn fitting_slots(
-        device: &Device,
-        scene: &SceneBuffers,
-        face_size: u32,
-        wanted: u32,
-    ) -> u32 {
-        let limits = device.limits();
-        let region = u64::from(FACES) * u64::from(scene.occluder_count);
-        let by_buffer = limits.max_storage_buffer_range / (12 * region).max(1);
-        let by_memory =
-            limits.heap_bytes / 8 / (DRAWN_BYTES * region + 8 * pixel_count(face_size) as u64);
-        let by_width = u64::from(limits.max_image_side / face_size);
-        u64::from(wanted)
-            .min(by_buffer)
-            .min(by_memory)
-            .min(by_width)
-            .max(1) as u32
-    }
-
-    /// `(slot_count, replay_slots)` as in the fields.
-    pub fn new(
-        device: &Arc<Device>,
-        pass: &RenderPass,
-        scene: &SceneBuffers,
-        face_size: u32,
-        (slot_count, replay_slots): (u32, u32),
-    ) -> Result<Self> {
-        let regions = u64::from(slot_count * FACES);
-        let drawn = regions * u64::from(scene.occluder_count);
-        let buffer = |name, bytes, usage| Buffer::new(device, name, bytes, usage);
-        let commands = |name| {
-            let bytes = 2 * size_of::<ReceiverList>() as u64;
-            buffer(name, bytes, BufferUse::Geometry)
-        };
-        let size = (slot_count * face_size, 3 * face_size);
-        let items = Image::new(
-            device,
-            "item buffer",
-            size,
-            Format::R32_UINT,
-            ImageUse::ColourTarget,
-        )?;
-        let depth = Image::new(
-            device,
-            "item depth",
-            size,
-            Format::D32_SFLOAT,
-            ImageUse::DepthTarget,
-        )?;
-        let empty = vec![
-            Slot {
-                emitted: Vec3::ZERO,
-                source: NONE,
-                reflected: Vec3::ZERO,
-                scale: 1.0,
-            };
-            (slot_count + replay_slots) as usize
-        ];
-        Ok(Self {
-            slot_count,
-            replay_slots,
-            face_size,
-            slots: upload(device, "slots", &empty, BufferUse::Storage)?,
-            drawn_commands: commands("drawn commands")?,
-            emitting_commands: commands("emitting commands")?,
-            loose_command: commands("loose command")?,
-            views: buffer(
-                "views",
-                regions * size_of::<View>() as u64,
-                BufferUse::Storage,
-            )?,
-            draws: buffer(
-                "draws",
-                regions * size_of::<Draw>() as u64,
-                BufferUse::Geometry,
-            )?,
-            counts: buffer("cull counts", regions * 8, BufferUse::Storage)?,
-            drawn_corners: buffer("drawn corners", 12 * drawn, BufferUse::Geometry)?,
-            drawn_items: buffer("drawn items", 4 * drawn, BufferUse::Storage)?,
-            framebuffer: Framebuffer::new(device, "item buffer", pass, &items, &depth)?,
-            sampler: Sampler::new(device, "item buffer", false)?,
-            items,
-            _depth: depth,
-        })
     }
 }
 

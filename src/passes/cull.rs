@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::buffers::{Batch, SceneBuffers};
+use super::batch::Batch;
+use super::buffers::SceneBuffers;
 use super::shaders;
 use crate::constants::FACES;
 use crate::error::Result;
@@ -56,6 +57,7 @@ impl Cull {
     }
 
     pub fn bind(&self, scene: &SceneBuffers, batch: &Batch) -> Result<DescriptorSet> {
+        let hemicubes = batch.hemicubes();
         self.pipeline.bind(
             "cull",
             &[
@@ -66,11 +68,11 @@ impl Cull {
                 &scene.occluder_corners,
                 &scene.vertices,
                 &scene.planes,
-                &batch.drawn_corners,
-                &batch.drawn_items,
-                &batch.draws,
-                &batch.views,
-                &batch.counts,
+                &hemicubes.drawn_corners,
+                &hemicubes.drawn_items,
+                &hemicubes.draws,
+                &hemicubes.views,
+                &hemicubes.counts,
                 &scene.occluder_items,
             ]
             .map(Bind::Buffer),
@@ -78,10 +80,11 @@ impl Cull {
     }
 
     pub fn record(&self, cmd: &Commands, set: &DescriptorSet, scene: &SceneBuffers, batch: &Batch) {
+        let hemicubes = batch.hemicubes();
         let parameters = Parameters {
             meshlet_count: scene.meshlet_count,
             occluder_count: scene.occluder_count,
-            face_size: batch.face_size,
+            face_size: hemicubes.face_size,
         };
         cmd.dispatch(
             &self.pipeline,

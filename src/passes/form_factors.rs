@@ -1,12 +1,13 @@
 //! The `receiver` estimator: the form factor from every element to every source of a batch. Elements that see a source are
 //! listed by how it is found, then found. Shaders: `sort_receivers.comp`, `form_factors.comp`, and where a scene has relief
-//! `form_factors_relief.comp`; twin: [`crate::reference::form_factors`].
+//! `form_factors_relief.comp`; `_rays.comp` of each where shadow rays are asked what is seen; twin: [`crate::reference::form_factors`].
 
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::buffers::{Batch, SceneBuffers, write};
+use super::batch::{Batch, Sight};
+use super::buffers::{SceneBuffers, write};
 use super::factor_buffers::{FactorBuffers, ReceiverLists};
 use super::types::ReceiverList;
 use super::{groups, shaders};
@@ -15,11 +16,19 @@ use crate::error::Result;
 use crate::vk::{Bind, Binding, Buffer, Commands, ComputePipeline, DescriptorSet, Device, Stage};
 
 pub struct FormFactors {
+    seen_by: SeenBy,
     sort: ComputePipeline,
     /// One a kind.
     plain: Vec<ComputePipeline>,
     /// For elements with relief, in scenes that have some.
     meso: Vec<ComputePipeline>,
+}
+
+/// What is asked whether an element sees a source.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SeenBy {
+    ItemBuffer,
+    ShadowRays,
 }
 
 /// How elements are counted that a source lies behind.
@@ -52,13 +61,13 @@ struct Parameters {
     first_element: u32,
     element_count: u32,
     face_size: u32,
-    slot_count: u32,
+    first_slot: u32,
+    end_slot: u32,
     first_block: u32,
     block_count: u32,
-    slot: u32,
 }
 
-/// Place of the item buffer among the bindings, and how many there are for sorting and in all.
+/// Place of the item buffer, or of the tree's nodes, among the bindings, and how many there are for sorting and in all.
 const ITEMS: usize = 6;
 const SORT: usize = 8;
 const PLAIN: usize = 12;
@@ -67,10 +76,14 @@ fn pipeline(
     device: &Arc<Device>,
     (name, spirv): (&str, &[u32]),
     bindings: usize,
-    constants: &[u32],
+    (seen_by, constants): (SeenBy, &[u32]),
 ) -> Result<ComputePipeline> {
     let mut kinds = vec![Binding::Storage; bindings];
-    kinds[ITEMS] = Binding::Sampled;
+    match seen_by {
+        SeenBy::ItemBuffer => kinds[ITEMS] = Binding::Sampled,
+        // What the nodes hold comes last.
+        SeenBy::ShadowRays => kinds.push(Binding::Storage),
+    }
     ComputePipeline::new(
         device,
         name,
@@ -83,17 +96,36 @@ fn pipeline(
 }
 
 impl FormFactors {
-    pub fn new(device: &Arc<Device>, with_relief: bool, behind: Behind) -> Result<Self> {
+    pub fn new(
+        device: &Arc<Device>,
+        with_relief: bool,
+        behind: Behind,
+        seen_by: SeenBy,
+    ) -> Result<Self> {
         let kinds = |shader, bindings| -> Result<Vec<_>> {
             (0..RECEIVE_KINDS)
-                .map(|kind| pipeline(device, shader, bindings, &[kind]))
+                .map(|kind| pipeline(device, shader, bindings, (seen_by, &[kind])))
                 .collect()
         };
-        let sort = ("sort receivers", shaders::SORT_RECEIVERS_COMP);
-        let plain = ("form factors", shaders::FORM_FACTORS_COMP);
-        let meso = ("form factors to relief", shaders::FORM_FACTORS_RELIEF_COMP);
+        let [sort, plain, meso] = match seen_by {
+            SeenBy::ItemBuffer => [
+                shaders::SORT_RECEIVERS_COMP,
+                shaders::FORM_FACTORS_COMP,
+                shaders::FORM_FACTORS_RELIEF_COMP,
+            ],
+            SeenBy::ShadowRays => [
+                shaders::SORT_RECEIVERS_RAYS_COMP,
+                shaders::FORM_FACTORS_RAYS_COMP,
+                shaders::FORM_FACTORS_RELIEF_RAYS_COMP,
+            ],
+        };
+        let by_slot = [(behind == Behind::BySlot).into()];
+        let sort = ("sort receivers", sort);
+        let plain = ("form factors", plain);
+        let meso = ("form factors to relief", meso);
         Ok(Self {
-            sort: pipeline(device, sort, SORT, &[(behind == Behind::BySlot).into()])?,
+            seen_by,
+            sort: pipeline(device, sort, SORT, (seen_by, &by_slot))?,
             plain: kinds(plain, PLAIN)?,
             meso: if with_relief {
                 kinds(meso, PLAIN + 1)?
@@ -117,6 +149,13 @@ impl FormFactors {
         factors: &FactorBuffers,
         meso: Option<&Buffer>,
     ) -> Result<Sets> {
+        let (seen, last) = match &batch.sight {
+            Sight::Hemicubes(h) => (Bind::Image(&h.items, &h.sampler), None),
+            Sight::Rays(tree) => (
+                Bind::Buffer(&tree.nodes),
+                Some(Bind::Buffer(&tree.occluders)),
+            ),
+        };
         let bind =
             |pipelines: &[ComputePipeline], lists: &ReceiverLists, fresh, more: Option<&Buffer>| {
                 let mut binds: Vec<_> = [
@@ -129,8 +168,9 @@ impl FormFactors {
                 ]
                 .map(Bind::Buffer)
                 .to_vec();
-                binds.push(Bind::Image(&batch.items, &batch.sampler));
-                let sort = [&binds[..], &[Bind::Buffer(behind)]].concat();
+                binds.push(seen);
+                let mut sort = [&binds[..], &[Bind::Buffer(behind)]].concat();
+                sort.extend(last);
                 let sort = self.sort.bind("sort receivers", &sort)?;
                 let rest = [
                     &scene.contours,
@@ -141,6 +181,7 @@ impl FormFactors {
                 ];
                 binds.extend(rest.map(Bind::Buffer));
                 binds.extend(more.map(Bind::Buffer));
+                binds.extend(last);
                 let kinds = pipelines.iter().map(|p| p.bind("form factors", &binds));
                 Ok::<_, crate::error::Error>((sort, kinds.collect::<Result<Vec<_>>>()?))
             };
@@ -186,27 +227,38 @@ impl FormFactors {
             cmd.fill(fresh, 0);
         }
         cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
-        let parameters = |range: &Range, slot| Parameters {
+        let face_size = match &batch.sight {
+            Sight::Hemicubes(hemicubes) => hemicubes.face_size,
+            Sight::Rays(_) => 0,
+        };
+        let parameters = |range: &Range, slots: std::ops::Range<u32>| Parameters {
             first_element: range.first_element,
             element_count: range.element_count,
-            face_size: batch.face_size,
-            slot_count: batch.slot_count,
+            face_size,
+            first_slot: slots.start,
+            end_slot: slots.end,
             first_block: range.first_block,
             block_count: factors.blocks(),
-            slot,
         };
-        for (i, (range, ..)) in ranges().enumerate() {
-            // A batch of replays alone sorts nothing.
-            let at = (size_of::<ReceiverList>() * i) as u64;
-            let push = parameters(range, 0);
-            cmd.dispatch_indirect(&self.sort, &range.sort, &push, (&batch.drawn_commands, at));
+        let at_once = match self.seen_by {
+            SeenBy::ItemBuffer => batch.slot_count,
+            SeenBy::ShadowRays => 1,
+        };
+        for first in (0..batch.slot_count).step_by(at_once as usize) {
+            for (i, (range, ..)) in ranges().enumerate() {
+                // A batch of replays alone sorts nothing.
+                let at = (size_of::<ReceiverList>() * i) as u64;
+                let push = parameters(range, first..first + at_once);
+                cmd.dispatch_indirect(&self.sort, &range.sort, &push, (&batch.drawn_commands, at));
+            }
+            // What lies behind is counted by the next ones too.
+            cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         }
-        cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         // Every element is in one list of a slot at most.
         for (range, pipelines, lists, _) in ranges() {
             for slot in 0..batch.slot_count {
                 for (kind, (pipeline, set)) in pipelines.iter().zip(&range.kinds).enumerate() {
-                    let push = parameters(range, slot);
+                    let push = parameters(range, slot..slot + 1);
                     let list = u64::from(slot * RECEIVE_KINDS) + kind as u64;
                     let at = size_of::<ReceiverList>() as u64 * list;
                     cmd.dispatch_indirect(pipeline, set, &push, (&lists.counts, at));

@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::buffers::{Batch, SceneBuffers, State, write};
+use super::batch::Batch;
+use super::buffers::{SceneBuffers, State, write};
 use super::factor_buffers::FactorBuffers;
 use super::relief_buffers::ReliefBuffers;
 use super::types::ReceiverList;

@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::buffers::{Batch, SceneBuffers};
+use super::batch::Batch;
+use super::buffers::SceneBuffers;
 use super::shaders;
 use super::types::Draw;
 use crate::constants::{FACES, NONE};
@@ -61,21 +62,26 @@ impl ItemBuffer {
     }
 
     pub fn bind(&self, batch: &Batch) -> Result<DescriptorSet> {
+        let hemicubes = batch.hemicubes();
         self.pipeline.bind(
             "item buffer",
-            &[Bind::Buffer(&batch.views), Bind::Buffer(&batch.drawn_items)],
+            &[
+                Bind::Buffer(&hemicubes.views),
+                Bind::Buffer(&hemicubes.drawn_items),
+            ],
         )
     }
 
     pub fn record(&self, cmd: &Commands, set: &DescriptorSet, scene: &SceneBuffers, batch: &Batch) {
-        cmd.begin_render_pass(&self.pass, &batch.framebuffer, [NONE; 4]);
+        let hemicubes = batch.hemicubes();
+        cmd.begin_render_pass(&self.pass, &hemicubes.framebuffer, [NONE; 4]);
         cmd.bind_graphics(&self.pipeline, set, &scene.vertices);
-        cmd.bind_indices(&batch.drawn_corners);
+        cmd.bind_indices(&hemicubes.drawn_corners);
         for slot in 0..batch.slot_count {
             for face in 0..FACES {
-                let [x, y, width, height] = face_rectangle(face, batch.face_size);
+                let [x, y, width, height] = face_rectangle(face, hemicubes.face_size);
                 let region = slot * FACES + face;
-                cmd.viewport(slot * batch.face_size + x, y, width, height);
+                cmd.viewport(slot * hemicubes.face_size + x, y, width, height);
                 cmd.push_graphics(
                     &self.pipeline,
                     &Parameters {
@@ -86,7 +92,7 @@ impl ItemBuffer {
                     },
                 );
                 cmd.draw_indexed_indirect(
-                    &batch.draws,
+                    &hemicubes.draws,
                     u64::from(region) * size_of::<Draw>() as u64,
                 );
             }

@@ -1,6 +1,7 @@
 //! GPU passes: one a file, named as its shader and as its CPU twin in [`crate::reference`]. Passes know `vk` and mathematics,
 //! never each other; only the solver orders them.
 
+pub mod batch;
 pub mod bin_pixels;
 pub mod buffers;
 pub mod cull;
@@ -12,6 +13,7 @@ pub mod keep;
 pub mod measure;
 pub mod measure_relief;
 pub mod normalise;
+pub mod occluder_tree;
 pub mod pixels_relief;
 pub mod recall;
 pub mod relief;

@@ -3,7 +3,8 @@
 
 use std::sync::Arc;
 
-use super::buffers::{Batch, SceneBuffers};
+use super::batch::Batch;
+use super::buffers::SceneBuffers;
 use super::factor_buffers::FactorBuffers;
 use super::shaders;
 use crate::error::Result;

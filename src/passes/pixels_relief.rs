@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::buffers::{Batch, SceneBuffers, State, upload};
+use super::batch::Batch;
+use super::buffers::{SceneBuffers, State, upload};
 use super::relief_buffers::ReliefBuffers;
 use super::{groups, shaders};
 use crate::error::Result;
@@ -74,7 +75,8 @@ impl PixelsRelief {
         batch: &Batch,
         relief: &ReliefBuffers,
     ) -> Result<Buffers> {
-        let table = pixel_form_factors(batch.face_size);
+        let hemicubes = batch.hemicubes();
+        let table = pixel_form_factors(hemicubes.face_size);
         let deltas = upload(device, "pixel form factors", &table, BufferUse::Storage)?;
         let mut binds: Vec<Bind<'_>> = [
             &batch.slots,
@@ -92,7 +94,7 @@ impl PixelsRelief {
         ]
         .map(Bind::Buffer)
         .to_vec();
-        binds.push(Bind::Image(&batch.items, &batch.sampler));
+        binds.push(Bind::Image(&hemicubes.items, &hemicubes.sampler));
         let from = self.from.bind("pixels from relief", &binds)?;
         binds.extend(
             [
@@ -118,8 +120,9 @@ impl PixelsRelief {
 
     /// Slot after slot, some rows at a time; elements without relief and those with one are different elements.
     pub fn record(&self, cmd: &Commands, buffers: &Buffers, relief: &ReliefBuffers, batch: &Batch) {
-        let rows = 3 * batch.face_size;
-        let band = (MOST_PIXELS / batch.face_size).max(1);
+        let hemicubes = batch.hemicubes();
+        let rows = 3 * hemicubes.face_size;
+        let band = (MOST_PIXELS / hemicubes.face_size).max(1);
         for slot in 0..batch.slot_count {
             for first_row in (0..rows).step_by(band as usize) {
                 for (pipeline, set, first_element, element_count) in [
@@ -135,7 +138,7 @@ impl PixelsRelief {
                         first_element,
                         element_count,
                         slot,
-                        face_size: batch.face_size,
+                        face_size: hemicubes.face_size,
                         first_source: relief.first_source,
                         source_count: relief.source_count,
                         cells: relief.cells(),

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::buffers::{Batch, SceneBuffers, State};
+use super::batch::Batch;
+use super::buffers::{SceneBuffers, State};
 use super::shaders;
 use crate::error::Result;
 use crate::vk::{Bind, Commands, ComputePipeline, DescriptorSet, Device};

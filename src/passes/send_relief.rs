@@ -3,7 +3,8 @@
 
 use std::sync::Arc;
 
-use super::buffers::{Batch, SceneBuffers};
+use super::batch::Batch;
+use super::buffers::SceneBuffers;
 use super::relief_buffers::ReliefBuffers;
 use super::shaders;
 use crate::error::Result;

@@ -13,7 +13,7 @@ use obvhs::{Boundable, BvhBuildParams};
 use super::buffers::{download, upload};
 use super::types::{LightPoint, ShadowNode, ShadowRay, ShadowTriangle};
 use super::{groups, shaders};
-use crate::constants::KIND_SURFACE;
+use crate::constants::{KIND_SURFACE, LEAF_TRIANGLES};
 use crate::error::Result;
 use crate::vk::{Bind, Buffer, BufferUse, Commands, ComputePipeline, Device};
 
@@ -21,45 +21,85 @@ use crate::vk::{Bind, Buffer, BufferUse, Commands, ComputePipeline, Device};
 /// most twice that length are right to 2⁻²¹ of it.
 const BOX_MARGIN: f32 = 1.0 / (1 << 20) as f32;
 
-/// Triangles in boxes, in the order of `shared/shadow_rays.glsl`.
-#[derive(Debug, Default)]
-pub struct ShadowTree {
-    pub nodes: Vec<ShadowNode>,
-    pub triangles: Vec<ShadowTriangle>,
+/// A triangle that casts a shadow.
+pub trait Casts: Copy {
+    fn corners(&self) -> [Vec3; 3];
 }
 
-struct Bounds<'a>(&'a ShadowTriangle, f32);
+impl Casts for ShadowTriangle {
+    fn corners(&self) -> [Vec3; 3] {
+        [self.a, self.b, self.c]
+    }
+}
 
-impl Boundable for Bounds<'_> {
+/// Triangles in boxes, in the order of `shared/shadow_rays.glsl`.
+#[derive(Debug)]
+pub struct ShadowTree<T = ShadowTriangle> {
+    nodes: Vec<ShadowNode>,
+    pub triangles: Vec<T>,
+}
+
+impl<T> Default for ShadowTree<T> {
+    /// Of no triangle.
+    fn default() -> Self {
+        Self {
+            nodes: Vec::new(),
+            triangles: Vec::new(),
+        }
+    }
+}
+
+struct Bounds([Vec3; 3], f32);
+
+impl Boundable for Bounds {
     fn aabb(&self) -> Aabb {
-        let Self(t, margin) = self;
-        let mut bounds = Aabb::from_points(&[t.a, t.b, t.c].map(Into::into));
+        let Self(corners, margin) = self;
+        let mut bounds = Aabb::from_points(&corners.map(Into::into));
         bounds.min -= *margin;
         bounds.max += *margin;
         bounds
     }
 }
 
-impl ShadowTree {
+/// The tree of no triangle, for shaders.
+const EMPTY: [ShadowNode; 1] = [ShadowNode {
+    low: Vec3::ZERO,
+    skip: 0,
+    high: Vec3::ZERO,
+    leaf: 0,
+}];
+
+impl<T: Casts> ShadowTree<T> {
     /// Triangles with a corner that is no finite number are left out.
-    pub fn new(mut triangles: Vec<ShadowTriangle>) -> Self {
-        triangles.retain(|t| [t.a, t.b, t.c].iter().all(|v| v.is_finite()));
+    pub fn new(mut triangles: Vec<T>) -> Self {
+        triangles.retain(|t| t.corners().iter().all(|v| v.is_finite()));
         if triangles.is_empty() {
             return Self::default();
         }
         let largest = triangles
             .iter()
-            .flat_map(|t| [t.a, t.b, t.c])
+            .flat_map(Casts::corners)
             .map(|v| v.abs().max_element())
             .fold(0.0, f32::max);
         let margin = BOX_MARGIN * largest;
-        let bounds: Vec<_> = triangles.iter().map(|t| Bounds(t, margin)).collect();
+        let bounds: Vec<_> = triangles
+            .iter()
+            .map(|t| Bounds(t.corners(), margin))
+            .collect();
         let params = BvhBuildParams::medium_build();
         let bvh = build_bvh2(&bounds, params, &mut Duration::default());
         Self::flat(&bvh, &triangles)
     }
 
-    fn flat(bvh: &Bvh2, triangles: &[ShadowTriangle]) -> Self {
+    /// At least one.
+    pub fn nodes(&self) -> &[ShadowNode] {
+        match &self.nodes[..] {
+            [] => &EMPTY,
+            nodes => nodes,
+        }
+    }
+
+    fn flat(bvh: &Bvh2, triangles: &[T]) -> Self {
         let mut tree = Self::default();
         // Nodes still to come, and nodes whose last descendant has just come.
         enum Step {
@@ -72,21 +112,30 @@ impl ShadowTree {
                 Step::Leave(node) => tree.nodes[node].skip = tree.nodes.len() as u32,
                 Step::Enter(node) => {
                     let node = &bvh.nodes[node as usize];
-                    let place = tree.nodes.len();
-                    tree.nodes.push(ShadowNode {
-                        low: node.aabb.min.into(),
-                        skip: 0,
-                        high: node.aabb.max.into(),
-                        first: tree.triangles.len() as u32,
-                        count: node.prim_count,
-                    });
-                    steps.push(Step::Leave(place));
+                    let mut push = |leaf| {
+                        let place = tree.nodes.len();
+                        tree.nodes.push(ShadowNode {
+                            low: node.aabb.min.into(),
+                            skip: place as u32 + 1,
+                            high: node.aabb.max.into(),
+                            leaf,
+                        });
+                        place
+                    };
                     let first = node.first_index;
                     if node.is_leaf() {
                         let own = first as usize..(first + node.prim_count) as usize;
-                        let own = bvh.primitive_indices[own].iter();
-                        tree.triangles.extend(own.map(|&t| triangles[t as usize]));
+                        if node.prim_count >= LEAF_TRIANGLES {
+                            steps.push(Step::Leave(push(0)));
+                        }
+                        for few in bvh.primitive_indices[own].chunks(LEAF_TRIANGLES as usize - 1) {
+                            let first = tree.triangles.len() as u32;
+                            push(first * LEAF_TRIANGLES + few.len() as u32);
+                            let few = few.iter().map(|&t| triangles[t as usize]);
+                            tree.triangles.extend(few);
+                        }
                     } else {
+                        steps.push(Step::Leave(push(0)));
                         steps.extend([Step::Enter(first + 1), Step::Enter(first)]);
                     }
                 }
@@ -112,23 +161,10 @@ impl LightBuffers {
     /// A device without the memory.
     pub fn new(device: &Arc<Device>, points: &[LightPoint], tree: &ShadowTree) -> Result<Self> {
         let emitters = points.iter().filter(|p| p.kind == KIND_SURFACE).count();
-        // Without triangles, one empty node.
-        let none = [ShadowNode {
-            low: Vec3::ZERO,
-            skip: 0,
-            high: Vec3::ZERO,
-            first: 0,
-            count: 0,
-        }];
-        let nodes = if tree.nodes.is_empty() {
-            &none
-        } else {
-            &tree.nodes[..]
-        };
         let storage = BufferUse::Storage;
         Ok(Self {
             points: upload(device, "light points", points, storage)?,
-            nodes: upload(device, "shadow nodes", nodes, storage)?,
+            nodes: upload(device, "shadow nodes", tree.nodes(), storage)?,
             triangles: upload(device, "shadow triangles", &tree.triangles, storage)?,
             counts: [points.len() as u32, emitters as u32],
         })

@@ -4,7 +4,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 
-use crate::constants::KIND_SURFACE;
+use crate::constants::{KIND_SURFACE, LEAF_TRIANGLES};
 use crate::meshlets;
 use crate::meso::HeightPyramid;
 use crate::sources;
@@ -365,9 +365,16 @@ pub struct ShadowNode {
     /// The node that follows all that is in this one.
     pub skip: u32,
     pub high: Vec3,
-    pub first: u32,
-    /// Triangles of a leaf, 0 in others.
-    pub count: u32,
+    /// [`LEAF_TRIANGLES`] times its first triangle, plus how many a leaf has; others have none.
+    pub leaf: u32,
+}
+
+impl ShadowNode {
+    /// Of a leaf.
+    pub fn triangles(&self) -> std::ops::Range<usize> {
+        let first = self.leaf / LEAF_TRIANGLES;
+        first as usize..(first + self.leaf % LEAF_TRIANGLES) as usize
+    }
 }
 
 /// What casts a shadow.
@@ -379,6 +386,23 @@ pub struct ShadowTriangle {
     pub c: Vec3,
     /// 1: it stands for a relief about it.
     pub relief: u32,
+}
+
+/// What hides places from a source, and where it does.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct ShadowOccluder {
+    pub a: Vec3,
+    /// The connected part that it is of.
+    pub component: u32,
+    pub b: Vec3,
+    /// 1: that part is closed, with all normals outward.
+    pub closed: u32,
+    pub c: Vec3,
+    /// normal · x on its plane.
+    pub height: f32,
+    pub normal: Vec3,
+    pub unused: u32,
 }
 
 /// A straight way from `from` to `to`.

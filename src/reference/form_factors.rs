@@ -13,8 +13,13 @@ const HEIGHT_EPSILON: f64 = 1e-6;
 /// Pixels' footprints that two points of one surface may lie apart, as in the shader.
 const REACH: f64 = 1.5;
 
-/// Mean over an element of form factor times visibility: irradiance from a unit of the source's radiosity.
-pub fn gather(elements: &Elements, source: &Source, items: &[u32], n: u32, element: usize) -> f64 {
+/// Mean over an element of form factor times visibility, which `seen` tells of a place: irradiance from a unit of the source's radiosity.
+pub fn gather(
+    elements: &Elements,
+    source: &Source,
+    element: usize,
+    seen: impl Fn(DVec3) -> bool,
+) -> f64 {
     let triangle = elements.triangle(element);
     let centroid = elements.centroid[element];
     let size = elements.radius(element);
@@ -31,11 +36,7 @@ pub fn gather(elements: &Elements, source: &Source, items: &[u32], n: u32, eleme
         .map(|&[u, v, weight]| {
             let p = triangle[0] + u * (triangle[1] - triangle[0]) + v * (triangle[2] - triangle[0]);
             let f = form_factor(elements, source, p, element);
-            if f > 0.0 && visible(elements, source, items, n, p, element) {
-                weight * f
-            } else {
-                0.0
-            }
+            if f > 0.0 && seen(p) { weight * f } else { 0.0 }
         })
         .sum()
 }
@@ -76,11 +77,11 @@ fn form_factor(elements: &Elements, source: &Source, p: DVec3, element: usize) -
         .sum()
 }
 
-fn visible(
+/// Whether the source's item buffer, of n pixels a side, says that it sees a place on an element.
+pub fn visible(
     elements: &Elements,
     source: &Source,
-    items: &[u32],
-    n: u32,
+    (items, n): (&[u32], u32),
     p: DVec3,
     element: usize,
 ) -> bool {

@@ -8,6 +8,7 @@ pub mod item_buffer;
 pub mod kept;
 pub mod measure;
 pub mod normalise;
+pub mod occluder_rays;
 pub mod pixels_relief;
 pub mod relief_rays;
 pub mod relief_visibility;

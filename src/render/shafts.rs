@@ -137,7 +137,7 @@ impl Shafts {
         }
         let hull: Vec<DVec3> = starts.iter().chain(&lamp.ends).copied().collect();
         let sides = self.sides(t, lamp, &hull);
-        let nodes = &self.tree.nodes;
+        let nodes = self.tree.nodes();
         let mut at = 0;
         while let Some(node) = nodes.get(at) {
             let (low, high) = (node.low.as_dvec3(), node.high.as_dvec3());
@@ -149,8 +149,7 @@ impl Shafts {
                 at = node.skip as usize;
                 continue;
             }
-            let own = node.first as usize..(node.first + node.count) as usize;
-            if self.tree.triangles[own]
+            if self.tree.triangles[node.triangles()]
                 .iter()
                 .any(|t| self.stands_in(t, &sides, &hull))
             {

@@ -8,7 +8,8 @@ use super::several::{Several, Team};
 use crate::constants::FACES;
 use crate::error::Result;
 use crate::hemicube::pixel_count;
-use crate::passes::buffers::{Batch, SceneBuffers, State, download};
+use crate::passes::batch::{Batch, Hemicubes, Sight};
+use crate::passes::buffers::{SceneBuffers, State, download};
 use crate::passes::cull::Cull;
 use crate::passes::factor_buffers::FactorBuffers;
 use crate::passes::item_buffer::ItemBuffer;
@@ -97,8 +98,8 @@ pub(super) struct Passes {
 pub(super) struct Sets {
     measure: DescriptorSet,
     select: DescriptorSet,
-    cull: DescriptorSet,
-    item_buffer: DescriptorSet,
+    /// Of a batch that draws: culling and the item buffer.
+    drawing: Option<(DescriptorSet, DescriptorSet)>,
     estimate: estimate::Bound,
     relief: Option<ReliefSets>,
 }
@@ -152,10 +153,14 @@ impl BatchLoop {
                 cmd.timestamp(stamps, 0);
                 passes.choose(cmd, &sets, on, &batch, (&parameters, sending));
                 cmd.timestamp(stamps, 1);
-                passes.cull.record(cmd, &sets.cull, scene, &batch);
-                cmd.barrier(&[Stage::Compute], &[Stage::Draw]);
+                if let Some((cull, _)) = &sets.drawing {
+                    passes.cull.record(cmd, cull, scene, &batch);
+                    cmd.barrier(&[Stage::Compute], &[Stage::Draw]);
+                }
                 cmd.timestamp(stamps, 2);
-                (passes.item_buffer).record(cmd, &sets.item_buffer, scene, &batch);
+                if let Some((_, item_buffer)) = &sets.drawing {
+                    (passes.item_buffer).record(cmd, item_buffer, scene, &batch);
+                }
                 cmd.timestamp(stamps, 3);
                 let found = || cmd.timestamp(stamps, 4);
                 (passes.estimate).record(cmd, &sets.estimate, &batch, on, sending, found);
@@ -222,8 +227,12 @@ impl BatchLoop {
         })
     }
 
-    pub(super) fn face_size(&self) -> u32 {
-        self.batch.face_size
+    /// Pixels a side of the faces that it draws, if it draws any.
+    pub(super) fn face_size(&self) -> Option<u32> {
+        match &self.batch.sight {
+            Sight::Hemicubes(hemicubes) => Some(hemicubes.face_size),
+            Sight::Rays(_) => None,
+        }
     }
 
     /// Runs batches, one always ahead of what is read, until `look` says no; then waits for the one ahead, whose results
@@ -332,7 +341,8 @@ impl BatchLoop {
     }
 
     pub(super) fn item_buffers(&self, device: &Arc<Device>) -> Result<(Vec<u32>, Vec<u32>)> {
-        let texels = pixel_count(self.batch.face_size) * self.batch.slot_count as usize;
+        let hemicubes = self.batch.hemicubes();
+        let texels = pixel_count(hemicubes.face_size) * self.batch.slot_count as usize;
         let readback = Buffer::new(
             device,
             "item readback",
@@ -340,7 +350,7 @@ impl BatchLoop {
             BufferUse::Readback,
         )?;
         Commands::run(device, "item readback", |cmd| {
-            cmd.copy_shader_image_to_buffer(&self.batch.items, &readback);
+            cmd.copy_shader_image_to_buffer(&hemicubes.items, &readback);
             cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
             Ok(())
         })?;
@@ -385,8 +395,13 @@ impl Passes {
         Ok(Sets {
             measure: self.measure.bind(on.scene, on.state)?,
             select: self.select.bind(on.scene, on.state, batch)?,
-            cull: self.cull.bind(on.scene, batch)?,
-            item_buffer: self.item_buffer.bind(batch)?,
+            drawing: match batch.sight {
+                Sight::Hemicubes(_) => Some((
+                    self.cull.bind(on.scene, batch)?,
+                    self.item_buffer.bind(batch)?,
+                )),
+                Sight::Rays(_) => None,
+            },
             estimate: self.estimate.bind(device, batch, on)?,
             relief,
         })
@@ -462,7 +477,10 @@ struct ReadbackLayout {
 
 impl ReadbackLayout {
     fn new(batch: &Batch) -> Self {
-        let regions = (batch.slot_count * FACES) as usize;
+        let regions = match batch.sight {
+            Sight::Hemicubes(_) => (batch.slot_count * FACES) as usize,
+            Sight::Rays(_) => 0,
+        };
         let counts = size_of::<Progress>() as u64;
         let draws = counts + (regions * size_of::<[u32; 2]>()) as u64;
         Self {
@@ -476,8 +494,10 @@ impl ReadbackLayout {
     fn record(&self, cmd: &Commands, state: &State, batch: &Batch, to: &Buffer) {
         cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
         cmd.copy(&state.progress, 0, to, 0, self.counts);
-        cmd.copy(&batch.counts, 0, to, self.counts, self.draws - self.counts);
-        cmd.copy(&batch.draws, 0, to, self.draws, self.bytes - self.draws);
+        if let Sight::Hemicubes(Hemicubes { counts, draws, .. }) = &batch.sight {
+            cmd.copy(counts, 0, to, self.counts, self.draws - self.counts);
+            cmd.copy(draws, 0, to, self.draws, self.bytes - self.draws);
+        }
         cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
     }
 }

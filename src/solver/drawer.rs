@@ -8,10 +8,11 @@ use super::Settings;
 use super::batch::Stages;
 use crate::constants::{FACES, NONE};
 use crate::error::Result;
-use crate::passes::buffers::{Batch, SceneBuffers, filled, upload, write};
+use crate::passes::batch::{Batch, Hemicubes, Sight};
+use crate::passes::buffers::{SceneBuffers, filled, upload, write};
 use crate::passes::cull::Cull;
 use crate::passes::factor_buffers::FactorBuffers;
-use crate::passes::form_factors::{self, Behind, FormFactors};
+use crate::passes::form_factors::{self, Behind, FormFactors, SeenBy};
 use crate::passes::item_buffer::ItemBuffer;
 use crate::passes::normalise::Normalise;
 use crate::passes::types::{Draw, MesoElement, ReceiverList, Slot};
@@ -111,8 +112,9 @@ impl Drawer {
         let wanted = SLOTS
             .min(settings.batch)
             .clamp(1, scene.source_count.max(1));
-        let slots = Batch::fitting_slots(device, scene, face, wanted);
-        let batch = Batch::new(device, &item_buffer.pass, scene, face, (slots, 0))?;
+        let slots = Hemicubes::fitting_slots(device, scene, face, wanted);
+        let hemicubes = Hemicubes::new(device, &item_buffer.pass, scene, face, slots)?;
+        let batch = Batch::new(device, (slots, 0), Sight::Hemicubes(hemicubes))?;
         let factors = FactorBuffers::new(device, scene, meso.len() as u32, slots, (0, None))?;
         let meso = match meso {
             [] => None,
@@ -120,7 +122,8 @@ impl Drawer {
         };
         let behind = filled(device, "behind", 4 * u64::from(slots), 0)?;
         let cull = Cull::new(device, settings.culling)?;
-        let form_factors = FormFactors::new(device, meso.is_some(), Behind::BySlot)?;
+        let form_factors =
+            FormFactors::new(device, meso.is_some(), Behind::BySlot, SeenBy::ItemBuffer)?;
         let normalise = (scene.enclosed.then(|| Normalise::new(device))).transpose()?;
         let sets = (
             cull.bind(scene, &batch)?,
@@ -263,8 +266,8 @@ impl Layout {
             (&factors.fresh_meso, self.meso, self.occupied),
             (&factors.occupied, self.occupied, self.chosen),
             (&batch.slots, self.chosen, self.counts),
-            (&batch.counts, self.counts, self.draws),
-            (&batch.draws, self.draws, self.behind),
+            (&batch.hemicubes().counts, self.counts, self.draws),
+            (&batch.hemicubes().draws, self.draws, self.behind),
             (behind, self.behind, self.bytes),
         ] {
             cmd.copy(from, 0, to, at, end - at);

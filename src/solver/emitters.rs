@@ -1,35 +1,36 @@
-//! Finer hemicubes for strong emitters. They are few, carry most of the light and cast the sharp shadows: a loop of its own
-//! shoots their emission before the others, and keeps their form factors for what they reflect later.
+//! Strong emitters are few, carry most of the light and cast the sharp shadows: a loop of its own shoots their emission before the
+//! others, with rays or finer hemicubes for what they see, and keeps their form factors for what they reflect later.
 
 use std::sync::Arc;
 
 use super::batch::{BatchLoop, OnDevice, Passes, Rule};
-use super::{Settings, Visibility};
+use super::devices::Parts;
+use super::{EmitterShadows, Settings, Visibility};
 use crate::constants::NONE;
 use crate::error::Result;
-use crate::passes::buffers::Batch;
+use crate::passes::batch::{Batch, Hemicubes, Sight};
+use crate::passes::occluder_tree::{OccluderTree, shadow_occluders};
 use crate::sources::Source;
 use crate::vk::Device;
 
-/// The weakest emitters that are drawn finely, as a share of [`crate::sources::Grouping::max_power`]. Groups that are cut for
+/// The weakest emitters that are taken for strong, as a share of [`crate::sources::Grouping::max_power`]. Groups that are cut for
 /// their power are stronger. It bounds their number, 512 by default, also where everything glows; each of many weak lamps has
 /// errors of its own, which even out.
 const LEAST: f64 = 0.25;
 
-/// Sources of a batch, at most: their faces are large.
+/// Sources of a batch that draws, at most: their faces are large.
 const SLOTS: u32 = 4;
 
-/// The loop, if there is anything for it to draw.
+/// The loop, if there is anything for it to find. `slots`: those of the other loop, whose form factors lie in the same buffers.
 pub(super) fn new(
     device: &Arc<Device>,
     settings: &Settings,
     passes: &Arc<Passes>,
     on: &OnDevice<'_>,
-    (sources, kept): (&[Source], Option<&Visibility>),
+    (parts, slots): (&Parts<'_>, u32),
+    kept: Option<&Visibility>,
 ) -> Result<Option<BatchLoop>> {
-    let face = settings
-        .emitter_face()
-        .min(device.limits().max_image_side / 6 * 2);
+    let sources = &parts.sources.list;
     let power: f64 = sources.iter().map(Source::emitted_power).sum();
     let least = LEAST * settings.grouping.max_power * power;
     let is_kept = |i: usize, source: &Source| {
@@ -37,13 +38,26 @@ pub(super) fn new(
         source.area > 0.0 && row.is_some_and(|row| row.chunk != NONE)
     };
     let strong = |(i, s): (usize, &Source)| s.emitted_power() >= least && !is_kept(i, s);
-    if face <= settings.hemicube || power == 0.0 || !sources.iter().enumerate().any(strong) {
+    if power == 0.0 || !sources.iter().enumerate().any(strong) {
         return Ok(None);
     }
-    // No more than the other loop has, whose form factors lie in the same buffers.
-    let wanted = settings.batch.min(on.scene.source_count).clamp(1, SLOTS);
-    let slots = Batch::fitting_slots(device, on.scene, face, wanted);
-    let batch = Batch::new(device, &passes.item_buffer.pass, on.scene, face, (slots, 0))?;
+    let (slots, sight) = match settings.emitter_shadows() {
+        EmitterShadows::Rays => {
+            let occluders = shadow_occluders(parts.elements, parts.connections, parts.occluders);
+            (slots, Sight::Rays(OccluderTree::new(device, occluders)?))
+        }
+        EmitterShadows::Hemicubes(face) => {
+            let face = face.min(device.limits().max_image_side / 6 * 2);
+            if face <= settings.hemicube {
+                return Ok(None);
+            }
+            let slots = Hemicubes::fitting_slots(device, on.scene, face, slots.min(SLOTS));
+            let pass = &passes.item_buffer.pass;
+            let hemicubes = Hemicubes::new(device, pass, on.scene, face, slots)?;
+            (slots, Sight::Hemicubes(hemicubes))
+        }
+    };
+    let batch = Batch::new(device, (slots, 0), sight)?;
     let rule = Rule {
         shots: settings.shots,
         stop_power: 0.0,

@@ -6,9 +6,9 @@ use std::sync::Arc;
 use super::Estimator;
 use super::batch::OnDevice;
 use crate::error::Result;
+use crate::passes::batch::{Batch, Sight};
 use crate::passes::bin_pixels::{self, BinPixels};
-use crate::passes::buffers::Batch;
-use crate::passes::form_factors::{self, Behind, FormFactors};
+use crate::passes::form_factors::{self, Behind, FormFactors, SeenBy};
 use crate::passes::gather::{self, Gather, GatherRelief};
 use crate::passes::keep::{self, Keep};
 use crate::passes::measure_relief::MeasureRelief;
@@ -52,6 +52,8 @@ pub(super) enum GatherBy {
 #[allow(clippy::large_enum_variant)] // one or two of them live as long as the solver
 pub(super) enum Bound {
     Receivers {
+        /// Of a batch that asks shadow rays.
+        by_rays: Option<FormFactors>,
         form_factors: form_factors::Sets,
         normalise: Option<DescriptorSet>,
         keep: Option<keep::Sets>,
@@ -66,6 +68,10 @@ pub(super) enum GatherSets {
     Relief(gather::ReliefSets),
 }
 
+fn form_factors(device: &Arc<Device>, on: &OnDevice<'_>, seen_by: SeenBy) -> Result<FormFactors> {
+    FormFactors::new(device, on.relief.is_some(), Behind::ByElement, seen_by)
+}
+
 impl Estimate {
     pub fn new(device: &Arc<Device>, estimator: Estimator, on: &OnDevice<'_>) -> Result<Self> {
         let Some(factors) = on.factors.filter(|_| estimator == Estimator::Receiver) else {
@@ -77,7 +83,7 @@ impl Estimate {
         let normalise = on.scene.enclosed.then(|| Normalise::new(device));
         let keep = factors.keeps().then(|| Keep::new(device));
         Ok(Self::Receivers {
-            form_factors: FormFactors::new(device, on.relief.is_some(), Behind::ByElement)?,
+            form_factors: form_factors(device, on, SeenBy::ItemBuffer)?,
             normalise: normalise.transpose()?,
             keep: keep.transpose()?,
             gather: match on.relief {
@@ -99,31 +105,38 @@ impl Estimate {
                 },
                 Some(factors),
                 relief,
-            ) => Bound::Receivers {
-                form_factors: form_factors.bind(
-                    device,
-                    (scene, &state.behind),
-                    batch,
-                    factors,
-                    relief.map(|relief| &relief.elements),
-                )?,
-                normalise: (normalise.as_ref())
-                    .map(|n| n.bind(scene, batch, factors))
-                    .transpose()?,
-                keep: (keep.as_ref())
-                    .map(|k| k.bind(state, batch, factors))
-                    .transpose()?,
-                gather: match (gather, relief) {
-                    (GatherBy::Plain(gather), _) => {
-                        GatherSets::Plain(gather.bind(device, state, batch, factors)?)
-                    }
-                    (GatherBy::Relief(gather), Some(relief)) => {
-                        let lit = (scene, state);
-                        GatherSets::Relief(gather.bind(device, lit, batch, factors, relief)?)
-                    }
-                    (GatherBy::Relief(_), None) => unreachable!("made for a scene with relief"),
-                },
-            },
+            ) => {
+                let by_rays = match batch.sight {
+                    Sight::Hemicubes(_) => None,
+                    Sight::Rays(_) => Some(self::form_factors(device, on, SeenBy::ShadowRays)?),
+                };
+                Bound::Receivers {
+                    form_factors: by_rays.as_ref().unwrap_or(form_factors).bind(
+                        device,
+                        (scene, &state.behind),
+                        batch,
+                        factors,
+                        relief.map(|relief| &relief.elements),
+                    )?,
+                    by_rays,
+                    normalise: (normalise.as_ref())
+                        .map(|n| n.bind(scene, batch, factors))
+                        .transpose()?,
+                    keep: (keep.as_ref())
+                        .map(|k| k.bind(state, batch, factors))
+                        .transpose()?,
+                    gather: match (gather, relief) {
+                        (GatherBy::Plain(gather), _) => {
+                            GatherSets::Plain(gather.bind(device, state, batch, factors)?)
+                        }
+                        (GatherBy::Relief(gather), Some(relief)) => {
+                            let lit = (scene, state);
+                            GatherSets::Relief(gather.bind(device, lit, batch, factors, relief)?)
+                        }
+                        (GatherBy::Relief(_), None) => unreachable!("made for a scene with relief"),
+                    },
+                }
+            }
             (Self::Pixels(pass), ..) => Bound::Pixels(pass.bind(device, scene, state, batch)?),
             (Self::PixelsRelief(pass), _, Some(relief)) => {
                 Bound::PixelsRelief(pass.bind(device, scene, state, batch, relief)?)
@@ -150,6 +163,7 @@ impl Estimate {
                     ..
                 },
                 Bound::Receivers {
+                    by_rays,
                     form_factors: sets,
                     normalise: normalise_set,
                     ..
@@ -157,6 +171,7 @@ impl Estimate {
                 Some(factors),
                 _,
             ) => {
+                let form_factors = by_rays.as_ref().unwrap_or(form_factors);
                 cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
                 form_factors.record(cmd, sets, batch, factors);
                 cmd.barrier(&[Stage::Compute], &[Stage::Compute]);

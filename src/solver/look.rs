@@ -6,7 +6,8 @@ use super::Solver;
 use crate::constants::{KIND_POINT, NONE};
 use crate::error::Result;
 use crate::hemicube::pixel_count;
-use crate::passes::buffers::{Batch, write};
+use crate::passes::batch::{Batch, Hemicubes, Sight};
+use crate::passes::buffers::write;
 use crate::passes::cull::Cull;
 use crate::passes::item_buffer::ItemBuffer;
 use crate::passes::types::Slot;
@@ -49,7 +50,8 @@ impl Solver {
         let (device, scene) = (&self.device, &self.scene);
         let face = self.settings.hemicube;
         let item_buffer = ItemBuffer::new(device)?;
-        let batch = Batch::new(device, &item_buffer.pass, scene, face, (1, 0))?;
+        let hemicubes = Hemicubes::new(device, &item_buffer.pass, scene, face, 1)?;
+        let batch = Batch::new(device, (1, 0), Sight::Hemicubes(hemicubes))?;
         let slot = Slot {
             emitted: Vec3::ONE,
             source,
@@ -66,7 +68,7 @@ impl Solver {
             cull.record(cmd, &sets.0, scene, &batch);
             cmd.barrier(&[Stage::Compute], &[Stage::Draw]);
             item_buffer.record(cmd, &sets.1, scene, &batch);
-            cmd.copy_shader_image_to_buffer(&batch.items, &readback);
+            cmd.copy_shader_image_to_buffer(&batch.hemicubes().items, &readback);
             cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
             Ok(())
         })?;

@@ -30,7 +30,8 @@ use crate::constants::REPLAYS;
 use crate::elements::Elements;
 use crate::error::Result;
 use crate::occluders::Occluders;
-use crate::passes::buffers::{Batch, SceneBuffers, State, download};
+use crate::passes::batch::{Batch, Hemicubes, Sight};
+use crate::passes::buffers::{SceneBuffers, State, download};
 use crate::passes::factor_buffers::FactorBuffers;
 use crate::passes::item_buffer::ItemBuffer;
 use crate::passes::relief_buffers::ReliefBuffers;
@@ -46,7 +47,9 @@ pub use look::ItemPicture;
 pub use relief_light::ReliefLight;
 pub use report::{Report, Seconds, Skipped, StopReason};
 pub use self_test::{choose_device, ids_come_back_right, open_device};
-pub use settings::{EMITTER_SCALE, Estimator, HEMICUBE_RANGE, Settings, VISIBILITY_MEMORY};
+pub use settings::{
+    EMITTER_SCALE, EmitterShadows, Estimator, HEMICUBE_RANGE, Settings, VISIBILITY_MEMORY,
+};
 pub use visibility::Visibility;
 
 /// How far a solution has come.
@@ -162,7 +165,7 @@ impl Solver {
         let state = State::new(device, &scene)?;
         let item_buffer = ItemBuffer::new(device)?;
         let wanted = settings.batch.clamp(1, scene.source_count.max(1));
-        let slots = Batch::fitting_slots(device, &scene, settings.hemicube, wanted);
+        let slots = Hemicubes::fitting_slots(device, &scene, settings.hemicube, wanted);
         let memory = settings
             .visibility_memory
             .unwrap_or_else(|| VISIBILITY_MEMORY.min(device.limits().heap_bytes / 3));
@@ -171,7 +174,8 @@ impl Solver {
             _ => 0,
         };
         let (face, slots) = (settings.hemicube, (slots, replays));
-        let batch = Batch::new(device, &item_buffer.pass, &scene, face, slots)?;
+        let hemicubes = Hemicubes::new(device, &item_buffer.pass, &scene, face, slots.0)?;
+        let batch = Batch::new(device, slots, Sight::Hemicubes(hemicubes))?;
         let relief = elements
             .relief
             .as_ref()
@@ -211,8 +215,7 @@ impl Solver {
             factors: factors.as_ref(),
         };
         let passes = Arc::new(Passes::new(device, settings, item_buffer, &on)?);
-        let to_draw = (&sources.list[..], kept);
-        let emitters = emitters::new(device, settings, &passes, &on, to_draw)?;
+        let emitters = emitters::new(device, settings, &passes, &on, (&parts, slots.0), kept)?;
         let rule = Rule {
             shots: settings.shots,
             stop_power: stop_power as f32,
@@ -221,7 +224,9 @@ impl Solver {
         let team = parts.team(settings, (device, &scene), others)?;
         let batches = BatchLoop::new(device, &passes, batch, &on, rule, team)?;
         let mut report = Report::new(devices, settings, &elements, &sources, slots.0);
-        report.emitter_hemicube = emitters.as_ref().map_or(face, BatchLoop::face_size);
+        let finer = emitters.as_ref().and_then(BatchLoop::face_size);
+        report.emitter_hemicube = finer.unwrap_or(face);
+        report.by_rays = emitters.is_some() && finer.is_none();
         report.set_meshlets(scene.meshlet_count);
         report.skipped.triangles_merged = (elements.len() - occluders.len()) as u64;
         Ok(Self {
@@ -264,10 +269,7 @@ impl Solver {
         let stop = Cell::new(None);
         let report = &mut self.report;
         let mut look = |batch: &BatchResult, of_emitters: bool| {
-            report.add(batch);
-            if of_emitters {
-                report.emitter_hemicubes += u64::from(batch.progress.selected);
-            }
+            report.add(batch, of_emitters);
             let Progress {
                 unshot_emitted,
                 unshot_reflected,

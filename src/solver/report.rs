@@ -67,7 +67,7 @@ pub struct Report {
     pub other_devices: Vec<String>,
     pub estimator: &'static str,
     pub hemicube: u32,
-    /// Of strong emitters; `hemicube` where none is drawn more finely.
+    /// Of strong emitters; `hemicube` where no hemicube is finer.
     pub emitter_hemicube: u32,
     pub elements: u64,
     pub sources: u64,
@@ -75,6 +75,8 @@ pub struct Report {
     pub hemicubes: u64,
     /// Of them, those of strong emitters.
     pub emitter_hemicubes: u64,
+    /// Strong emitters for which shadow rays found what they see, in place of a hemicube.
+    pub emitters_by_rays: u64,
     pub triangles_drawn: u64,
     /// Sources whose form factors are kept: they were drawn once.
     pub kept_sources: u64,
@@ -89,6 +91,8 @@ pub struct Report {
     pub skipped: Skipped,
     /// Elements that receive and send by direction, and into how many; null where none does.
     pub relief: Option<ReliefReport>,
+    #[serde(skip)]
+    pub(super) by_rays: bool,
     #[serde(skip)]
     meshlets: u64,
     #[serde(skip)]
@@ -139,6 +143,7 @@ impl Report {
             batch,
             hemicubes: 0,
             emitter_hemicubes: 0,
+            emitters_by_rays: 0,
             triangles_drawn: 0,
             kept_sources: 0,
             replayed: 0,
@@ -152,6 +157,7 @@ impl Report {
                 ..Skipped::default()
             },
             relief: elements.relief.as_ref().map(ReliefReport::new),
+            by_rays: false,
             meshlets: 0,
             culls: settings.culling != Culling::Off,
         }
@@ -161,9 +167,15 @@ impl Report {
         self.meshlets = u64::from(meshlets);
     }
 
-    pub(super) fn add(&mut self, batch: &BatchResult) {
+    pub(super) fn add(&mut self, batch: &BatchResult, of_emitters: bool) {
+        let selected = u64::from(batch.progress.selected);
         let faces = batch.progress.selected as usize * crate::constants::FACES as usize;
-        self.hemicubes += u64::from(batch.progress.selected);
+        if of_emitters && self.by_rays {
+            self.emitters_by_rays += selected;
+        } else {
+            self.hemicubes += selected;
+            self.emitter_hemicubes += u64::from(of_emitters) * selected;
+        }
         self.seconds.select += batch.stages.select;
         self.seconds.cull += batch.stages.cull;
         self.seconds.item_buffer += batch.stages.item_buffer;

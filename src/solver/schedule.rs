@@ -5,10 +5,10 @@
 
 use std::collections::HashMap;
 
-/// Work in drawings of a hemicube with its form factors: choosing the sources of a batch, a shot, and a strong emitter's finer hemicube.
+/// Work in drawings of a hemicube with its form factors: choosing the sources of a batch, a shot, and what a strong emitter sees.
 /// Measured on lavapipe; where they are off, devices wait for one another, and nothing else changes.
-const SELECT: f64 = 0.7;
-const SHOT: f64 = 0.02;
+const SELECT: f64 = 1.0;
+const SHOT: f64 = 0.035;
 const FINE: f64 = 3.0;
 /// What is asked for at once waits until a device has drawn what it is at.
 const LATE: f64 = 3.0;

@@ -8,7 +8,8 @@ use super::Settings;
 use crate::elements::Elements;
 use crate::error::{Error, Result};
 use crate::occluders::Occluders;
-use crate::passes::buffers::{Batch, SceneBuffers, State};
+use crate::passes::batch::{Batch, Hemicubes, Sight};
+use crate::passes::buffers::{SceneBuffers, State};
 use crate::passes::item_buffer::ItemBuffer;
 use crate::scene::{Material, Scene, Triangle};
 use crate::sources;
@@ -79,7 +80,8 @@ pub fn ids_come_back_right(device: &Arc<Device>) -> Result<bool> {
     let scene = SceneBuffers::new(device, &elements, &sources, &connections, &occluders)?;
     let state = State::new(device, &scene)?;
     let item_buffer = ItemBuffer::new(device)?;
-    let batch = Batch::new(device, &item_buffer.pass, &scene, SIZE, (1, 0))?;
+    let hemicubes = Hemicubes::new(device, &item_buffer.pass, &scene, SIZE, 1)?;
+    let batch = Batch::new(device, (1, 0), Sight::Hemicubes(hemicubes))?;
     let measure = crate::passes::measure::Measure::new(device)?;
     let select = crate::passes::select::Select::new(device)?;
     let cull = crate::passes::cull::Cull::new(device, settings.culling)?;
@@ -108,7 +110,7 @@ pub fn ids_come_back_right(device: &Arc<Device>) -> Result<bool> {
         cull.record(cmd, &sets.2, &scene, &batch);
         then();
         item_buffer.record(cmd, &sets.3, &scene, &batch);
-        cmd.copy_shader_image_to_buffer(&batch.items, &readback);
+        cmd.copy_shader_image_to_buffer(&batch.hemicubes().items, &readback);
         cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
         Ok(())
     })?;

@@ -17,13 +17,21 @@ pub enum Estimator {
     Pixel,
 }
 
+/// How it is found what sources see that emit strongly.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EmitterShadows {
+    /// A ray to each sample of each element.
+    Rays,
+    /// Hemicubes of so many pixels a side.
+    Hemicubes(u32),
+}
+
 #[derive(Debug, Clone)]
 pub struct Settings {
     pub estimator: Estimator,
     /// Pixels a side of a hemicube's face; even.
     pub hemicube: u32,
-    /// The same for sources that emit strongly; `hemicube` or more, even. None: [`EMITTER_SCALE`] times `hemicube`,
-    /// at most 1024.
+    /// The same for sources that emit strongly; `hemicube` or more, even. None: see [`Self::emitter_shadows`].
     pub emitter_hemicube: Option<u32>,
     /// Stops when the error bound is no more than this.
     pub residual: f64,
@@ -72,16 +80,23 @@ pub const VISIBILITY_MEMORY: u64 = 768 << 20;
 /// Smallest and largest hemicube.
 pub const HEMICUBE_RANGE: std::ops::RangeInclusive<u32> = 8..=2048;
 
-/// Side of the faces of strong emitters over that of all others, unless told otherwise, and up to which size: a hemicube of 1024
-/// takes four times as long as one of 512, and lowers the error hardly more.
+/// With the `pixel` estimator the side of the faces of strong emitters over that of all others, unless told otherwise, and up to which size: a
+/// hemicube of 1024 takes four times as long as one of 512, and lowers the error hardly more.
 pub const EMITTER_SCALE: u32 = 4;
 const FINEST: u32 = 1024;
 
 impl Settings {
-    /// Pixels a side of the hemicubes of strong emitters.
-    pub fn emitter_face(&self) -> u32 {
-        let finer = || (EMITTER_SCALE * self.hemicube).min(FINEST.max(self.hemicube));
-        self.emitter_hemicube.unwrap_or_else(finer)
+    /// How it is found what strong emitters see: unless [`Self::emitter_hemicube`] is given, by rays, or, with the `pixel` estimator,
+    /// which takes form factors from pixels, by hemicubes [`EMITTER_SCALE`] times as fine as all others, of 1024 pixels at most.
+    pub fn emitter_shadows(&self) -> EmitterShadows {
+        match (self.emitter_hemicube, self.estimator) {
+            (Some(face), _) => EmitterShadows::Hemicubes(face),
+            (None, Estimator::Receiver) => EmitterShadows::Rays,
+            (None, Estimator::Pixel) => {
+                let finer = (EMITTER_SCALE * self.hemicube).min(FINEST.max(self.hemicube));
+                EmitterShadows::Hemicubes(finer)
+            }
+        }
     }
 
     /// Refuses numbers that make no sense.

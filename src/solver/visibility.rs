@@ -51,9 +51,9 @@ fn key(scene: &Scene, settings: &Settings) -> String {
     let mut hash = Sha256::new();
     hash.update(unlit.hash());
     let flat = settings.relief.transport == Transport::Lambert;
-    let sizes = (settings.hemicube, settings.emitter_face());
+    let sizes = (settings.hemicube, settings.emitter_shadows());
     let (seed, grouping) = (settings.seed, settings.grouping);
-    hash.update(format!("3 {sizes:?} {seed} {grouping:?} {flat}"));
+    hash.update(format!("4 {sizes:?} {seed} {grouping:?} {flat}"));
     hexadecimal(hash)
 }
 

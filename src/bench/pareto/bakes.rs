@@ -14,14 +14,14 @@ use crate::error::Result;
 use crate::meso::Transport;
 use crate::quality::scaled;
 use crate::scene::Scene;
-use crate::solver::{EMITTER_SCALE, Estimator, HEMICUBE_RANGE, Settings, Solver, StopReason};
+use crate::solver::{EmitterShadows, Estimator, HEMICUBE_RANGE, Settings, Solver, StopReason};
 use crate::vk::Device;
 
 /// The settings that are tried: each hemicube with each size of sources, for both estimators.
 #[derive(Debug, Clone)]
 pub struct Grid {
     pub hemicubes: Vec<u32>,
-    /// Sides of the hemicubes of strong emitters over those.
+    /// Sides of the hemicubes of strong emitters over those; 0 for [`Settings::emitter_shadows`].
     pub emitter_scales: Vec<u32>,
     /// Sizes of sources over the default ones, see [`scaled`].
     pub scales: Vec<f64>,
@@ -92,7 +92,7 @@ impl Grid {
             tries.extend(others.map(|&directions| Try {
                 estimator: Estimator::Receiver,
                 hemicube: plain.hemicube,
-                emitter_scale: EMITTER_SCALE,
+                emitter_scale: 0,
                 scale: 1.0,
                 directions,
             }));
@@ -102,16 +102,16 @@ impl Grid {
 }
 
 impl Try {
-    fn emitter_hemicube(&self) -> u32 {
+    fn emitter_hemicube(&self) -> Option<u32> {
         let finer = self.hemicube.saturating_mul(self.emitter_scale);
-        finer.min(*HEMICUBE_RANGE.end()).max(self.hemicube)
+        (finer > 0).then(|| finer.min(*HEMICUBE_RANGE.end()))
     }
 
     fn settings(&self, grid: &Grid) -> Result<Settings> {
         let mut settings = Settings {
             estimator: self.estimator,
             hemicube: self.hemicube,
-            emitter_hemicube: Some(self.emitter_hemicube()),
+            emitter_hemicube: self.emitter_hemicube(),
             residual: grid.residual,
             grouping: scaled(self.scale),
             ..Settings::default()
@@ -147,7 +147,7 @@ impl Try {
         loop {
             let until = look.min(grid.limit.max(taken));
             let (turn, before) = (Instant::now(), taken);
-            solver.run(|_| before + turn.elapsed() < until && go_on())?;
+            solver.turn(|_| before + turn.elapsed() < until && go_on())?;
             taken += turn.elapsed();
             let report = solver.report();
             let finished = report.stop != StopReason::Interrupted;
@@ -160,7 +160,10 @@ impl Try {
                     Estimator::Pixel => Method::Pixel,
                 },
                 hemicube: Some(self.hemicube),
-                emitter_hemicube: Some(self.emitter_hemicube()),
+                emitter_hemicube: match settings.emitter_shadows() {
+                    EmitterShadows::Rays => None,
+                    EmitterShadows::Hemicubes(face) => Some(face),
+                },
                 source_scale: Some(self.scale),
                 directions: solver
                     .elements

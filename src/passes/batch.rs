@@ -1,0 +1,154 @@
+//! A batch of sources under way, and what finds out what they see.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use super::buffers::{SceneBuffers, upload};
+use super::occluder_tree::OccluderTree;
+use super::types::{Draw, ReceiverList, Slot, View};
+use crate::constants::{FACES, NONE};
+use crate::error::Result;
+use crate::hemicube::pixel_count;
+use crate::vk::{
+    Buffer, BufferUse, Device, Format, Framebuffer, Image, ImageUse, RenderPass, Sampler,
+};
+
+/// The sources of a batch.
+pub struct Batch {
+    /// Sources whose form factors are found.
+    pub slot_count: u32,
+    /// Slots behind theirs, for sources whose form factors were kept.
+    pub replay_slots: u32,
+    pub slots: Buffer,
+    /// [`ReceiverList`]s: dispatches over the elements without and with relief, where form factors are found in this batch, …
+    pub drawn_commands: Buffer,
+    /// … and where some emit.
+    pub emitting_commands: Buffer,
+    /// One over the elements with relief, where fresh form factors found no room to be kept.
+    pub loose_command: Buffer,
+    pub sight: Sight,
+}
+
+/// What finds out what sources see.
+#[allow(clippy::large_enum_variant)] // one or two of them live as long as the solver
+pub enum Sight {
+    Hemicubes(Hemicubes),
+    Rays(OccluderTree),
+}
+
+/// Item buffers, one a slot.
+pub struct Hemicubes {
+    /// Pixels a side of a face.
+    pub face_size: u32,
+    pub views: Buffer,
+    pub draws: Buffer,
+    pub counts: Buffer,
+    /// `[slot][face][occluder]`: room for every triangle in every face.
+    pub drawn_corners: Buffer,
+    pub drawn_items: Buffer,
+    /// Columns of N × 3 N texels side by side, one a slot.
+    pub items: Image,
+    pub framebuffer: Framebuffer,
+    pub sampler: Sampler,
+    _depth: Image,
+}
+
+/// Bytes of the lists of drawn triangles, for one occluder in one face of one slot.
+const DRAWN_BYTES: u64 = 16;
+
+impl Batch {
+    /// `(slot_count, replay_slots)` as in the fields.
+    pub fn new(
+        device: &Arc<Device>,
+        (slot_count, replay_slots): (u32, u32),
+        sight: Sight,
+    ) -> Result<Self> {
+        let commands = |name| {
+            let bytes = 2 * size_of::<ReceiverList>() as u64;
+            Buffer::new(device, name, bytes, BufferUse::Geometry)
+        };
+        let empty = Slot {
+            emitted: Vec3::ZERO,
+            source: NONE,
+            reflected: Vec3::ZERO,
+            scale: 1.0,
+        };
+        let empty = vec![empty; (slot_count + replay_slots) as usize];
+        Ok(Self {
+            slot_count,
+            replay_slots,
+            slots: upload(device, "slots", &empty, BufferUse::Storage)?,
+            drawn_commands: commands("drawn commands")?,
+            emitting_commands: commands("emitting commands")?,
+            loose_command: commands("loose command")?,
+            sight,
+        })
+    }
+
+    /// Of both kinds.
+    pub fn all_slots(&self) -> u32 {
+        self.slot_count + self.replay_slots
+    }
+
+    /// Of a batch that draws.
+    pub fn hemicubes(&self) -> &Hemicubes {
+        match &self.sight {
+            Sight::Hemicubes(hemicubes) => hemicubes,
+            Sight::Rays(_) => unreachable!("asked of batches that draw"),
+        }
+    }
+}
+
+impl Hemicubes {
+    /// How many slots a batch may have: what fits the device's largest buffer, its widest image and an eighth of its
+    /// memory, and no more than `wanted`.
+    pub fn fitting_slots(
+        device: &Device,
+        scene: &SceneBuffers,
+        face_size: u32,
+        wanted: u32,
+    ) -> u32 {
+        let limits = device.limits();
+        let region = u64::from(FACES) * u64::from(scene.occluder_count);
+        let by_buffer = limits.max_storage_buffer_range / (12 * region).max(1);
+        let by_memory =
+            limits.heap_bytes / 8 / (DRAWN_BYTES * region + 8 * pixel_count(face_size) as u64);
+        let by_width = u64::from(limits.max_image_side / face_size);
+        u64::from(wanted)
+            .min(by_buffer)
+            .min(by_memory)
+            .min(by_width)
+            .max(1) as u32
+    }
+
+    pub fn new(
+        device: &Arc<Device>,
+        pass: &RenderPass,
+        scene: &SceneBuffers,
+        face_size: u32,
+        slot_count: u32,
+    ) -> Result<Self> {
+        let regions = u64::from(slot_count * FACES);
+        let drawn = regions * u64::from(scene.occluder_count);
+        let buffer = |name, bytes, usage| Buffer::new(device, name, bytes, usage);
+        let size = (slot_count * face_size, 3 * face_size);
+        let image = |name, format, usage| Image::new(device, name, size, format, usage);
+        let items = image("item buffer", Format::R32_UINT, ImageUse::ColourTarget)?;
+        let depth = image("item depth", Format::D32_SFLOAT, ImageUse::DepthTarget)?;
+        let views = regions * size_of::<View>() as u64;
+        let draws = regions * size_of::<Draw>() as u64;
+        Ok(Self {
+            face_size,
+            views: buffer("views", views, BufferUse::Storage)?,
+            draws: buffer("draws", draws, BufferUse::Geometry)?,
+            counts: buffer("cull counts", regions * 8, BufferUse::Storage)?,
+            drawn_corners: buffer("drawn corners", 12 * drawn, BufferUse::Geometry)?,
+            drawn_items: buffer("drawn items", 4 * drawn, BufferUse::Storage)?,
+            framebuffer: Framebuffer::new(device, "item buffer", pass, &items, &depth)?,
+            sampler: Sampler::new(device, "item buffer", false)?,
+            items,
+            _depth: depth,
+        })
+    }
+}

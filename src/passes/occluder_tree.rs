@@ -1,0 +1,65 @@
+//! What hides places from strong emitters, as a tree of boxes that subgroups walk. Shader: `shared/shadow_packets.glsl`; twin:
+//! [`crate::reference::occluder_rays`].
+
+use std::sync::Arc;
+
+use super::buffers::upload;
+use super::shadow_rays::{Casts, ShadowTree};
+use super::types::ShadowOccluder;
+use crate::charts::Connections;
+use crate::elements::Elements;
+use crate::error::Result;
+use crate::occluders::Occluders;
+use crate::vk::{Buffer, BufferUse, Device};
+use glam::Vec3;
+
+/// The tree on the device.
+pub struct OccluderTree {
+    pub nodes: Buffer,
+    pub occluders: Buffer,
+}
+
+impl Casts for ShadowOccluder {
+    fn corners(&self) -> [Vec3; 3] {
+        [self.a, self.b, self.c]
+    }
+}
+
+/// `[occluder]`, internal units.
+pub fn shadow_occluders(
+    elements: &Elements,
+    connections: &Connections,
+    occluders: &Occluders,
+) -> Vec<ShadowOccluder> {
+    let of_occluder = |(corners, &item): (&[u32; 3], &u32)| {
+        let item = item as usize;
+        let [a, b, c] = corners.map(|v| elements.vertices[v as usize].as_vec3());
+        let component = connections.component[item];
+        let normal = elements.normal[item];
+        ShadowOccluder {
+            a,
+            component,
+            b,
+            closed: connections.closed[component as usize].into(),
+            c,
+            height: normal.dot(elements.centroid[item]) as f32,
+            normal: normal.as_vec3(),
+            unused: 0,
+        }
+    };
+    let triangles = occluders.corners.iter().zip(&occluders.items);
+    triangles.map(of_occluder).collect()
+}
+
+impl OccluderTree {
+    /// # Errors
+    /// A device without the memory.
+    pub fn new(device: &Arc<Device>, occluders: Vec<ShadowOccluder>) -> Result<Self> {
+        let tree = ShadowTree::new(occluders);
+        let storage = BufferUse::Storage;
+        Ok(Self {
+            nodes: upload(device, "occluder nodes", tree.nodes(), storage)?,
+            occluders: upload(device, "shadow occluders", &tree.triangles, storage)?,
+        })
+    }
+}

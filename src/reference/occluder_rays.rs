@@ -1,0 +1,36 @@
+//! Twin of the walk from a source's eye through the tree of what hides places from it: every occluder, in f64, without a tree.
+
+use glam::DVec3;
+
+use super::item_buffer::intersect;
+use crate::constants::KIND_SURFACE;
+use crate::passes::types::ShadowOccluder;
+use crate::sources::Source;
+
+/// Rounding of a plane's height at a point, as in the shader.
+const HEIGHT_EPSILON: f64 = 1e-6;
+
+/// How clearly a place is hidden: the greatest over all occluders of the least of how far within the ray meets it, in barycentric shares,
+/// and of how far behind it the place lies, in thousands of [`HEIGHT_EPSILON`]. Positive: hidden; the nearer to 0 the less surely.
+pub fn hidden(occluders: &[ShadowOccluder], source: &Source, p: DVec3) -> f64 {
+    let depth = |o: &ShadowOccluder| depth(o, source, p).unwrap_or(f64::NEG_INFINITY);
+    occluders
+        .iter()
+        .map(depth)
+        .fold(f64::NEG_INFINITY, f64::max)
+}
+
+fn depth(occluder: &ShadowOccluder, source: &Source, p: DVec3) -> Option<f64> {
+    let normal = occluder.normal.as_dvec3();
+    let above = |p: DVec3| normal.dot(p) - f64::from(occluder.height);
+    let eye_height = above(source.eye);
+    let on_it = source.kind == KIND_SURFACE && occluder.component == source.component;
+    let own_back = on_it && occluder.closed == 1 && eye_height < 0.0;
+    if eye_height.abs() <= HEIGHT_EPSILON || own_back {
+        return None;
+    }
+    let corners = [occluder.a, occluder.b, occluder.c].map(|v| v.as_dvec3());
+    let hit = intersect(source.eye, p - source.eye, corners)?;
+    let behind = -above(p) * eye_height.signum() / HEIGHT_EPSILON - 1.0;
+    Some(hit.inside.min(behind / 1e3))
+}
