@@ -117,7 +117,6 @@ fn rust_and_glsl_agree() {
     check!(true, ParallelLight: towards fluence_a fluence_b fluence_c);
     check!(true, LightPoint: position kind normal area strength);
     check!(true, ShadowNode: low skip high leaf);
-    check!(true, ShadowOccluder: a component b closed c height normal unused);
     check!(true, ShadowTriangle: a b c relief);
     check!(true, ShadowRay: from clear to);
     check!(true, LitTriangle: a b c normal_a normal_b normal_c plane above open);
@@ -125,8 +124,9 @@ fn rust_and_glsl_agree() {
     check!(true, HeightTile: first width height top highest);
     check!(true, HeightRay: from tile to);
     check!(true, HeightHit: t cell local height gradient steps);
-    // Triangles and sources are loaded word by word: their order is told by the forms of load_triangle and load_source.
+    // These are loaded word by word: their order is told by the forms of load_triangle and met.
     check!(false, Triangle: a area b height c unused_c normal unused);
+    check!(false, ShadowOccluder: a component b closed c height normal unused);
     // Progress and KeptState stand alone in their buffers, not in an array.
     check!(false, Progress: unshot_emitted unshot_reflected shots selected replayed);
     check!(false, KeptState: chunk used rows);

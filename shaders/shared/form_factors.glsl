@@ -182,7 +182,7 @@ FLUX mean_form_factor(uint element, vec4 ball, vec3 n, Source s) {
         // These were looked at when they were sorted.
         return form_factor(ball.xyz, n, element, s);
     }
-    float gap = length(ball.xyz - s.eye) - s.radius;
+    float gap = length(ball.xyz - s.middle) - s.radius;
     bool near = gap <= NEAR * ball.w;
     bool touching = gap <= ball.w;
     bool any_near = subgroupAny(near);

@@ -102,7 +102,7 @@ Source load_source(uint index) {
 
 // Whether every member shows p its front: the cone of normals and the ball bound their heights.
 bool shows_whole_front(Source s, vec3 p) {
-    vec3 d = p - s.eye;
+    vec3 d = p - s.middle;
     float height = dot(d, s.normal);
     float flat_part = sqrt(max(dot(d, d) - height * height, 0.0));
     return s.cone_sin == 0.0 || height * s.cone_cos - flat_part * s.cone_sin - s.radius > 0.0;
@@ -110,7 +110,7 @@ bool shows_whole_front(Source s, vec3 p) {
 
 // Whether a source can show its front at p.
 bool shows_front(Source s, vec3 p) {
-    vec3 d = p - s.eye;
+    vec3 d = p - s.middle;
     float height = dot(d, s.normal);
     if (s.kind == KIND_POINT) {
         // Each of the two sources of a point light serves its own side; the upper one has the plane between them.

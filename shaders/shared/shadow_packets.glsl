@@ -13,6 +13,8 @@ const uint OCCLUDER_WORDS = 16;
 const float LEAST_WAY = 1e-18;
 // Height above a plane from which on boxes of what lies in it are not met.
 const float CLEAR = 2.0 * HEIGHT_EPSILON;
+// How far behind a plane a place must lie to be hidden. Triangles much smaller than that are met where rounding says.
+const float HIDDEN = 4.0 * HEIGHT_EPSILON;
 
 // A triangle as it stands about the eye.
 struct Met {
@@ -56,7 +58,7 @@ bool stands_in(Met t, vec3 way) {
     float least = min(min(of_a, of_b), of_c);
     float most = max(max(of_a, of_b), of_c);
     float height = t.eye_height + dot(t.normal, way);
-    bool crossed = t.eye_height > 0.0 ? height < -HEIGHT_EPSILON : height > HEIGHT_EPSILON;
+    bool crossed = t.eye_height > 0.0 ? height < -HIDDEN : height > HIDDEN;
     return t.hides && crossed && (least >= 0.0 || most <= 0.0) && least != most;
 }
 

@@ -42,17 +42,17 @@ void append(uint slot, uint kind, bool mine, uint i) {
 // How the form factor from an element to a source is found, should it be seen; RECEIVE_KINDS where it is 0. `near`: parts of the element
 // may be seen, whether its centroid is or not. `behind`: it is 0 since the source lies behind the element.
 uint kind_of(Source s, vec4 ball, vec3 n, out bool near, out bool behind) {
-    vec3 d = ball.xyz - s.eye;
-    float distance_eye = length(d);
+    vec3 d = ball.xyz - s.middle;
+    float distance_middle = length(d);
     float across = dot(d, n);
-    near = distance_eye - s.radius <= NEAR * ball.w;
+    near = distance_middle - s.radius <= NEAR * ball.w;
     behind = across >= s.radius;
-    bool above = across <= -s.radius && distance_eye * distance_eye >= ACUTE * s.radius * s.radius;
+    bool above = across <= -s.radius && distance_middle * distance_middle >= ACUTE * s.radius * s.radius;
     bool whole = shows_whole_front(s, ball.xyz);
-    bool points = distance_eye - s.radius >= POINT_DISTANCE * s.part_radius;
+    bool points = distance_middle - s.radius >= POINT_DISTANCE * s.part_radius;
     bool curved = s.cone_sin != 0.0;
     float far_distance = (curved ? POINT_DISTANCE : FLAT_POINT_DISTANCE) * s.radius;
-    bool far = s.kind == KIND_POINT || whole && length(ball.xyz - s.middle) >= far_distance;
+    bool far = s.kind == KIND_POINT || whole && distance_middle >= far_distance;
     bool by_parts = curved && points;
     uint kind = near ? RECEIVE_NEAR : far ? RECEIVE_FAR : by_parts ? RECEIVE_PARTS
         : whole && above ? RECEIVE_OUTLINE : RECEIVE_NEAR;

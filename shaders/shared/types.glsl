@@ -11,10 +11,10 @@ const float SHOT_EVENLY = 2.0;
 
 // A group of neighbouring, nearly coplanar elements that shoots together, or half of a point light.
 struct Source {
-    vec3 eye;          // the hemicube's place: on the group's surface, or the point light
+    vec3 eye;          // what it sees from: a place on the group's surface, or the point light
     float area;
     vec3 normal;       // mean normal, the hemicube's axis
-    float radius;      // of the ball about `eye` that holds the group
+    float radius;      // of the ball about `middle` that holds the group
     vec3 tangent;
     float cone_sin;    // sine of the largest angle between `normal` and a member's; 0: all in one plane
     vec3 bitangent;

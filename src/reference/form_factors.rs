@@ -23,7 +23,7 @@ pub fn gather(
     let triangle = elements.triangle(element);
     let centroid = elements.centroid[element];
     let size = elements.radius(element);
-    let gap = centroid.distance(source.eye) - source.radius;
+    let gap = centroid.distance(source.centroid) - source.radius;
     let points: &[[f64; 3]] = if gap > 4.0 * size {
         &POINTS[..1]
     } else if gap > size {
@@ -59,7 +59,7 @@ fn form_factor(elements: &Elements, source: &Source, p: DVec3, element: usize) -
         };
     }
     if source.cone == 0.0 {
-        if (p - source.eye).dot(source.normal) <= HEIGHT_EPSILON * source.radius {
+        if (p - source.centroid).dot(source.normal) <= HEIGHT_EPSILON * source.radius {
             return 0.0;
         }
         return source

@@ -10,8 +10,11 @@ use crate::sources::Source;
 /// Rounding of a plane's height at a point, as in the shader.
 const HEIGHT_EPSILON: f64 = 1e-6;
 
+/// How far behind a plane a place must lie to be hidden, as in the shader.
+const HIDDEN: f64 = 4e-6;
+
 /// How clearly a place is hidden: the greatest over all occluders of the least of how far within the ray meets it, in barycentric shares,
-/// and of how far behind it the place lies, in thousands of [`HEIGHT_EPSILON`]. Positive: hidden; the nearer to 0 the less surely.
+/// and of how far behind it the place lies, in thousands of [`HIDDEN`]. Positive: hidden; the nearer to 0 the less surely.
 pub fn hidden(occluders: &[ShadowOccluder], source: &Source, p: DVec3) -> f64 {
     let depth = |o: &ShadowOccluder| depth(o, source, p).unwrap_or(f64::NEG_INFINITY);
     occluders
@@ -31,6 +34,6 @@ fn depth(occluder: &ShadowOccluder, source: &Source, p: DVec3) -> Option<f64> {
     }
     let corners = [occluder.a, occluder.b, occluder.c].map(|v| v.as_dvec3());
     let hit = intersect(source.eye, p - source.eye, corners)?;
-    let behind = -above(p) * eye_height.signum() / HEIGHT_EPSILON - 1.0;
+    let behind = -above(p) * eye_height.signum() / HIDDEN - 1.0;
     Some(hit.inside.min(behind / 1e3))
 }

@@ -128,7 +128,7 @@ pub(super) fn group(
         } else {
             parts(elements, range.clone())
         },
-        radius: corners().map(|v| v.distance(eye)).fold(0.0, f64::max),
+        radius: corners().map(|v| v.distance(centroid)).fold(0.0, f64::max),
         cone,
         emitted: emitted.as_vec3(),
         first_element: range.start as u32,
@@ -169,7 +169,7 @@ fn parts(elements: &Elements, range: std::ops::Range<usize>) -> Vec<Part> {
 }
 
 /// Whether a point of the plane with normal `n` lies in a triangle, its edges included.
-fn holds(triangle: [DVec3; 3], p: DVec3, n: DVec3) -> bool {
+pub(super) fn holds(triangle: [DVec3; 3], p: DVec3, n: DVec3) -> bool {
     (0..3).all(|i| {
         let (a, b) = (triangle[i], triangle[(i + 1) % 3]);
         (b - a).cross(p - a).dot(n) >= -1e-9 * (b - a).length_squared()

@@ -11,12 +11,12 @@ mod single;
 use glam::{DVec3, Vec3};
 
 use crate::charts::{Connections, charts, morton_order};
-use crate::constants::KIND_POINT;
+use crate::constants::{KIND_POINT, KIND_SURFACE};
 use crate::contour::Loop;
 use crate::elements::Elements;
 use crate::error::{Error, Result};
 use crate::scene::PointLight;
-use group::{Shape, bisect, group};
+use group::{Shape, bisect, group, holds};
 use near::near_others;
 use single::{halves, part, point};
 
@@ -49,7 +49,7 @@ impl Default for Grouping {
 #[derive(Debug, Clone)]
 pub struct Source {
     pub kind: u32,
-    /// Place of the hemicube: on the surface, or the point light.
+    /// Place that it sees from: on the surface, or the point light.
     pub eye: DVec3,
     /// Of the area.
     pub centroid: DVec3,
@@ -60,7 +60,7 @@ pub struct Source {
     pub area: f64,
     /// Area that a far place in the direction of `normal` sees.
     pub facing: f64,
-    /// Of the ball about `eye` that holds the source.
+    /// Of the ball about `centroid` that holds the source.
     pub radius: f64,
     /// Of a curved source: neighbouring members put together, each of which is a point from afar.
     pub parts: Vec<Part>,
@@ -236,6 +236,10 @@ pub fn build(
     }
     for (i, source) in sources.list.iter_mut().enumerate() {
         (source.tangent, source.bitangent) = turned_frame(source.normal, seed, i as u64);
+        let emits = source.emitted != Vec3::ZERO && source.kind == KIND_SURFACE;
+        if emits && source.cone == 0.0 {
+            source.eye = off_the_grid(elements, source, spread(seed, i as u64));
+        }
     }
     (sources, connections)
 }
@@ -250,6 +254,38 @@ fn turned_frame(normal: DVec3, seed: u64, index: u64) -> (DVec3, DVec3) {
     let angle = std::f64::consts::TAU * unit_random(seed, index);
     let (sin, cos) = angle.sin_cos();
     (t * cos + b * sin, b * cos - t * sin)
+}
+
+/// An eye half-way from that of a plane source to its place at `[u, v]`, where the unit square goes to equal areas. Emitters and receivers often
+/// lie on grids that agree; from their centroids all would see past an edge, or none.
+fn off_the_grid(elements: &Elements, source: &Source, [u, v]: [f64; 2]) -> DVec3 {
+    let members = source.first_element..source.first_element + source.element_count;
+    let triangles: Vec<[DVec3; 3]> = match (source.element_count, &source.contour[..]) {
+        // Perhaps a piece of its element.
+        (1, [corners]) if corners.len() == 3 => vec![[corners[0], corners[1], corners[2]]],
+        _ => members.map(|e| elements.triangle(e as usize)).collect(),
+    };
+    let mut left = u * triangles.iter().copied().map(triangle_area).sum::<f64>();
+    let within = triangles.iter().find(|&&triangle| {
+        left -= triangle_area(triangle);
+        left < 0.0
+    });
+    let &[a, b, c] = within.unwrap_or(&triangles[0]);
+    let share = 1.0 + (left / triangle_area([a, b, c])).clamp(-1.0, 0.0);
+    let place = a + share.sqrt() * ((1.0 - v) * (b - a) + v * (c - a));
+    let half = source.eye.midpoint(place);
+    match triangles.iter().any(|&t| holds(t, half, source.normal)) {
+        true => half,
+        false => place,
+    }
+}
+
+/// Places in the unit square, of which those of neighbouring indices lie far apart: the sequence R₂ (Roberts 2018).
+fn spread(seed: u64, index: u64) -> [f64; 2] {
+    // 1/g and 1/g² with g³ = g + 1.
+    const STEP: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_3];
+    let axis = |i: usize| (unit_random(seed, !(i as u64)) + STEP[i] * index as f64).fract();
+    [axis(0), axis(1)]
 }
 
 /// A number in 0..1 from a seed and an index (SplitMix64).

@@ -360,7 +360,7 @@ impl Work {
         match Solver::relit(&device, elements.clone(), lights, &settings, kept) {
             Ok(solver) => self.start(scene, solver, elements, epoch),
             // What was black and now emits has no source.
-            Err(Error::Scene { .. }) => return self.bake(scene, &settings, epoch),
+            Err(Error::Usage(_)) => return self.bake(scene, &settings, epoch),
             Err(error) => return Err(error),
         }
         Ok(())
