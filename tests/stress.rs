@@ -46,7 +46,6 @@ cases! {
     specks degenerate duplicates shuffled non_manifold
     touching interpenetrating
     thin_gap
-    #[ignore = "the sheet's shadow takes 3 % more light than it should"]
     open_sheet
     one_pixel
     map_shapes extreme_heights

@@ -236,9 +236,10 @@ pub fn build(
     }
     for (i, source) in sources.list.iter_mut().enumerate() {
         (source.tangent, source.bitangent) = turned_frame(source.normal, seed, i as u64);
-        let emits = source.emitted != Vec3::ZERO && source.kind == KIND_SURFACE;
-        if emits && source.cone == 0.0 {
-            source.eye = off_the_grid(elements, source, spread(seed, i as u64));
+        let emitted = source.emitted_power();
+        if emitted > 0.0 && source.kind == KIND_SURFACE && source.cone == 0.0 {
+            let bright = emitted * total_area > BRIGHT * total_power * source.area;
+            source.eye = off_the_grid(elements, source, spread(seed, i as u64), bright);
         }
     }
     (sources, connections)
@@ -256,9 +257,13 @@ fn turned_frame(normal: DVec3, seed: u64, index: u64) -> (DVec3, DVec3) {
     (t * cos + b * sin, b * cos - t * sin)
 }
 
-/// An eye half-way from that of a plane source to its place at `[u, v]`, where the unit square goes to equal areas. Emitters and receivers often
-/// lie on grids that agree; from their centroids all would see past an edge, or none.
-fn off_the_grid(elements: &Elements, source: &Source, [u, v]: [f64; 2]) -> DVec3 {
+/// Light per area, over that of the whole scene, of what is a lamp: it is cut for its power, into many sources that share each shadow's edge.
+const BRIGHT: f64 = 4.0;
+
+/// An eye at the place `[u, v]` of a plane source, where the unit square goes to equal areas, if it is bright, and half-way there from its own
+/// if not. Emitters and receivers often lie on grids that agree; from their centroids all would see past an edge, or none. A
+/// silhouette through a single source is told best by its middle.
+fn off_the_grid(elements: &Elements, source: &Source, [u, v]: [f64; 2], bright: bool) -> DVec3 {
     let members = source.first_element..source.first_element + source.element_count;
     let triangles: Vec<[DVec3; 3]> = match (source.element_count, &source.contour[..]) {
         // Perhaps a piece of its element.
@@ -274,7 +279,7 @@ fn off_the_grid(elements: &Elements, source: &Source, [u, v]: [f64; 2]) -> DVec3
     let share = 1.0 + (left / triangle_area([a, b, c])).clamp(-1.0, 0.0);
     let place = a + share.sqrt() * ((1.0 - v) * (b - a) + v * (c - a));
     let half = source.eye.midpoint(place);
-    match triangles.iter().any(|&t| holds(t, half, source.normal)) {
+    match !bright && triangles.iter().any(|&t| holds(t, half, source.normal)) {
         true => half,
         false => place,
     }

@@ -140,8 +140,10 @@ fn set(viewer: &mut Viewer, words: &[String]) -> Result<()> {
             viewer.bake();
         }
         [name, lamp, property, values @ ..] if name == "lamp" => {
+            let names: Vec<_> = viewer.lamps.iter().map(|l| l.name.clone()).collect();
             let found = viewer.lamps.iter_mut().find(|l| l.name == *lamp);
-            found.ok_or_else(wrong)?.set(property, values)?;
+            let none = || Error::Usage(format!("no light {lamp}; there are {}", names.join(", ")));
+            found.ok_or_else(none)?.set(property, values)?;
             viewer.relight();
         }
         [name, value] => viewer.switches.set(name, value)?,
