@@ -14,9 +14,10 @@ float acute_angle_over_sine(float x) {
     return g * x + 1.5707963;
 }
 
-float angle_over_sine(float x) {
+// The same for all x. The sine is told, as one over it: beside an edge it is far below what 1 − x² resolves.
+float angle_over_sine(float x, float over_sine) {
     float g = acute_angle_over_sine(abs(x));
-    return x >= 0.0 ? g : 3.14159265 * inversesqrt(max(1.0 - x * x, 1e-14)) - g;
+    return x >= 0.0 ? g : 3.14159265 * over_sine - g;
 }
 
 // What edges sum up to: the form factor, or with VECTOR_FLUX the vector whose dot product with n is the form factor.
@@ -46,8 +47,11 @@ FLUX flux_above(FLUX f, vec3 n) {
 
 // One edge a → b seen from the origin by a receiver with normal n: its angle times the unit normal of its plane.
 FLUX edge_term(vec3 a, vec3 b, vec3 n) {
-    float scale = inversesqrt(max(dot(a, a) * dot(b, b), 1e-38));
-    return flux(cross(a, b), n) * scale * angle_over_sine(clamp(dot(a, b) * scale, -1.0, 1.0));
+    vec3 across = cross(a, b);
+    float lengths = max(dot(a, a) * dot(b, b), 1e-38);
+    float scale = inversesqrt(lengths);
+    float over_sine = sqrt(lengths) * inversesqrt(max(dot(across, across), 1e-38));
+    return flux(across, n) * scale * angle_over_sine(clamp(dot(a, b) * scale, -1.0, 1.0), over_sine);
 }
 
 // The crossing of a → b with the receiver's horizon, ha and hb being their heights above it.

@@ -14,7 +14,7 @@ const HEIGHT_EPSILON: f64 = 1e-6;
 const HIDDEN: f64 = 4e-6;
 
 /// How clearly a place is hidden: the greatest over all occluders of the least of how far within the ray meets it, in barycentric shares,
-/// and of how far behind it the place lies, in thousands of [`HIDDEN`]. Positive: hidden; the nearer to 0 the less surely.
+/// and of how far behind it the place lies, in thousands of what hides it at least. Positive: hidden; the nearer to 0 the less surely.
 pub fn hidden(occluders: &[ShadowOccluder], source: &Source, p: DVec3) -> f64 {
     let depth = |o: &ShadowOccluder| depth(o, source, p).unwrap_or(f64::NEG_INFINITY);
     occluders
