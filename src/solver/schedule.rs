@@ -164,7 +164,7 @@ mod tests {
 
     #[test]
     fn devices_work_alike() {
-        for (others, shots) in [(1, 16), (1, 160), (2, 16), (3, 160)] {
+        for (others, shots) in [(1, 16), (1, 160), (2, 16), (3, 100)] {
             let drawn = drawn(others, shots);
             let first = f64::from(drawn[0]) + 100.0 * (SELECT + SHOT * f64::from(shots));
             println!(
@@ -172,7 +172,7 @@ mod tests {
             );
             let all = drawn[1..].iter().map(|&d| f64::from(d)).chain([first]);
             let mean = all.clone().sum::<f64>() / (1 + others) as f64;
-            // The first one may wait for what it chooses before the others have got ahead.
+            // Where the first one has no more to do than its share beside drawing. It may wait for what it chooses before the others have got ahead.
             assert!(all.into_iter().all(|work| (work / mean - 1.0).abs() < 0.1));
         }
     }
