@@ -10,13 +10,8 @@ use crate::constants::NONE;
 use crate::error::Result;
 use crate::passes::batch::{Batch, Hemicubes, Sight};
 use crate::passes::occluder_tree::{OccluderTree, shadow_occluders};
-use crate::sources::Source;
+use crate::sources::{Source, least_strong};
 use crate::vk::Device;
-
-/// The weakest emitters that are taken for strong, as a share of [`crate::sources::Grouping::max_power`]. Groups that are cut for
-/// their power are stronger. It bounds their number, 512 by default, also where everything glows; each of many weak lamps has
-/// errors of its own, which even out.
-const LEAST: f64 = 0.25;
 
 /// Sources of a batch that draws, at most: their faces are large.
 const SLOTS: u32 = 4;
@@ -31,14 +26,13 @@ pub(super) fn new(
     kept: Option<&Visibility>,
 ) -> Result<Option<BatchLoop>> {
     let sources = &parts.sources.list;
-    let power: f64 = sources.iter().map(Source::emitted_power).sum();
-    let least = LEAST * settings.grouping.max_power * power;
+    let least = least_strong(sources, &settings.grouping);
     let is_kept = |i: usize, source: &Source| {
         let row = kept.and_then(|kept| kept.rows.get(i));
         source.area > 0.0 && row.is_some_and(|row| row.chunk != NONE)
     };
     let strong = |(i, s): (usize, &Source)| s.emitted_power() >= least && !is_kept(i, s);
-    if power == 0.0 || !sources.iter().enumerate().any(strong) {
+    if least == 0.0 || !sources.iter().enumerate().any(strong) {
         return Ok(None);
     }
     let (slots, sight) = match settings.emitter_shadows() {

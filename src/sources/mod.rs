@@ -234,10 +234,13 @@ pub fn build(
     for light in lights {
         sources.list.extend(point(light, elements));
     }
+    // Point lights do not count: other ones must not move the eyes of what is lit anew.
+    let least = LEAST * grouping.max_power * total_power;
     for (i, source) in sources.list.iter_mut().enumerate() {
         (source.tangent, source.bitangent) = turned_frame(source.normal, seed, i as u64);
         let emitted = source.emitted_power();
-        if emitted > 0.0 && source.kind == KIND_SURFACE && source.cone == 0.0 {
+        let strong = emitted > 0.0 && emitted >= least;
+        if strong && source.kind == KIND_SURFACE && source.cone == 0.0 {
             let bright = emitted * total_area > BRIGHT * total_power * source.area;
             source.eye = off_the_grid(elements, source, spread(seed, i as u64), bright);
         }
@@ -255,6 +258,17 @@ fn turned_frame(normal: DVec3, seed: u64, index: u64) -> (DVec3, DVec3) {
     let angle = std::f64::consts::TAU * unit_random(seed, index);
     let (sin, cos) = angle.sin_cos();
     (t * cos + b * sin, b * cos - t * sin)
+}
+
+/// The weakest emitters that are taken for strong, as a share of [`Grouping::max_power`]. Groups that are cut for their power are
+/// stronger. It bounds their number, 512 by default, also where everything glows; each of many weak lamps has errors of its own, which
+/// even out.
+const LEAST: f64 = 0.25;
+
+/// Power of the weakest emitters of a scene that are taken for strong.
+pub(crate) fn least_strong(sources: &[Source], grouping: &Grouping) -> f64 {
+    let power: f64 = sources.iter().map(Source::emitted_power).sum();
+    LEAST * grouping.max_power * power
 }
 
 /// Light per area, over that of the whole scene, of what is a lamp: it is cut for its power, into many sources that share each shadow's edge.
