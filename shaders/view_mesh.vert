@@ -3,7 +3,3 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 #include "shared/view_corner.glsl"
-
-void main() {
-    corner();
-}

@@ -126,7 +126,7 @@ fn relit_scene() -> Build {
     let lamp = build.scene.materials.len() - 1;
     build.scene.materials[lamp].ke = [0.5, 4.0, 1.0];
     // So weakly that the same emitters are strong, which see from places of their own.
-    build.scene.materials[0].ke = [0.002, 0.0, 0.0];
+    build.scene.materials[0].ke = [0.1, 0.0, 0.0];
     build.scene.point_lights.clear();
     build.point_light(DVec3::new(0.8, 0.3, 0.2), 0.5);
     build

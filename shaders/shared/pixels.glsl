@@ -1,6 +1,7 @@
 // The pixel estimator where light has directions. One invocation owns an element: it looks through the part of each
-// hemicube that its triangle can cover for the pixels that hold it, row by row, so that sums have one order. A dispatch takes one slot of the batch and some rows of its hemicube: lavapipe ends every
-// loop of an invocation for good after 65,535 turns of all of them together.
+// hemicube that its triangle can cover for the pixels that hold it, row by row, so that sums have one order. A dispatch
+// takes one slot of the batch and some rows of its hemicube: lavapipe ends every loop of an invocation for good after
+// 65,535 turns of all of them together.
 
 #extension GL_EXT_control_flow_attributes : require
 

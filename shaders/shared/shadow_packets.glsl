@@ -48,9 +48,9 @@ Met met(Source s, uint triangle) {
     return Met(over_a, over_b, over_c, n, eye_height, hides);
 }
 
-// Whether the triangle stands between the eye and the end of a way. Two triangles find the same volume over the edge that they
-// share with the opposite sign, to the bit: no way leads between them. The height tells whether it is the way that meets the triangle, or the line
-// that it is a part of.
+// Whether the triangle stands between the eye and the end of a way. Two triangles find the same volume over the edge that
+// they share with the opposite sign, to the bit: no way leads between them. The height tells whether it is the way that meets
+// the triangle, or the line that it is a part of.
 bool stands_in(Met t, vec3 way) {
     precise float of_a = way.x * t.over_a.x + way.y * t.over_a.y + way.z * t.over_a.z;
     precise float of_b = way.x * t.over_b.x + way.y * t.over_b.y + way.z * t.over_b.z;

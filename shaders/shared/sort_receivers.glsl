@@ -1,7 +1,7 @@
 // Lists the elements that see each source of the batch, by how their form factor is found: as of a point, by the outline of
-// the source, by its parts as points, or, near it, with more care. Elements that it lies behind, turns its back to or is hidden from are in no
-// list, and their form factor is 0. SHADOW_RAYS: what is seen is asked of rays instead of the item buffer, one slot a dispatch, since lavapipe ends
-// all loops of an invocation after 65,535 turns.
+// the source, by its parts as points, or, near it, with more care. Elements that it lies behind, turns its back to or is
+// hidden from are in no list, and their form factor is 0. SHADOW_RAYS: what is seen is asked of rays instead of the item
+// buffer, one slot a dispatch, since lavapipe ends all loops of an invocation after 65,535 turns.
 
 #ifdef SHADOW_RAYS
 #define SHADOW_OCCLUDERS 8

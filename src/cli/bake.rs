@@ -15,7 +15,7 @@ use mesolux::meso::{self, Transport};
 use mesolux::quality::Quality;
 use mesolux::scene::Scene;
 use mesolux::solution::{Origin, Solution};
-use mesolux::solver::{EmitterShadows, Estimator, Report, Settings, Solver, Update, Visibility};
+use mesolux::solver::{Estimator, Report, Settings, Solver, Update, Visibility};
 use mesolux::sources::Grouping;
 use mesolux::vk::Device;
 
@@ -162,10 +162,7 @@ impl SolveOptions {
         let settings = self.settings()?;
         Ok(Self {
             hemicube: Some(settings.hemicube),
-            emitter_hemicube: match settings.emitter_shadows() {
-                EmitterShadows::Rays => None,
-                EmitterShadows::Hemicubes(face) => Some(face),
-            },
+            emitter_hemicube: settings.emitter_shadows().face(),
             residual: Some(settings.residual),
             source_elements: Some(settings.grouping.max_elements),
             source_area: Some(settings.grouping.max_area),

@@ -86,6 +86,18 @@ impl Batch {
         })
     }
 
+    /// One that draws, into faces of `face_size` pixels a side.
+    pub fn drawing(
+        device: &Arc<Device>,
+        pass: &RenderPass,
+        scene: &SceneBuffers,
+        face_size: u32,
+        slots: (u32, u32),
+    ) -> Result<Self> {
+        let hemicubes = Hemicubes::new(device, pass, scene, face_size, slots.0)?;
+        Self::new(device, slots, Sight::Hemicubes(hemicubes))
+    }
+
     /// Of both kinds.
     pub fn all_slots(&self) -> u32 {
         self.slot_count + self.replay_slots
@@ -122,7 +134,7 @@ impl Hemicubes {
             .max(1) as u32
     }
 
-    pub fn new(
+    fn new(
         device: &Arc<Device>,
         pass: &RenderPass,
         scene: &SceneBuffers,

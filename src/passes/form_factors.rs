@@ -16,7 +16,6 @@ use crate::error::Result;
 use crate::vk::{Bind, Binding, Buffer, Commands, ComputePipeline, DescriptorSet, Device, Stage};
 
 pub struct FormFactors {
-    seen_by: SeenBy,
     sort: ComputePipeline,
     /// One a kind.
     plain: Vec<ComputePipeline>,
@@ -124,7 +123,6 @@ impl FormFactors {
         let plain = ("form factors", plain);
         let meso = ("form factors to relief", meso);
         Ok(Self {
-            seen_by,
             sort: pipeline(device, sort, SORT, (seen_by, &by_slot))?,
             plain: kinds(plain, PLAIN)?,
             meso: if with_relief {
@@ -227,9 +225,10 @@ impl FormFactors {
             cmd.fill(fresh, 0);
         }
         cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
-        let face_size = match &batch.sight {
-            Sight::Hemicubes(hemicubes) => hemicubes.face_size,
-            Sight::Rays(_) => 0,
+        // Rays of one slot at a time.
+        let (face_size, at_once) = match &batch.sight {
+            Sight::Hemicubes(hemicubes) => (hemicubes.face_size, batch.slot_count),
+            Sight::Rays(_) => (0, 1),
         };
         let parameters = |range: &Range, slots: std::ops::Range<u32>| Parameters {
             first_element: range.first_element,
@@ -239,10 +238,6 @@ impl FormFactors {
             end_slot: slots.end,
             first_block: range.first_block,
             block_count: factors.blocks(),
-        };
-        let at_once = match self.seen_by {
-            SeenBy::ItemBuffer => batch.slot_count,
-            SeenBy::ShadowRays => 1,
         };
         for first in (0..batch.slot_count).step_by(at_once as usize) {
             for (i, (range, ..)) in ranges().enumerate() {

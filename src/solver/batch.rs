@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use super::Settings;
 use super::estimate::{self, Estimate, ReliefSets, ReliefSources, Sending};
+use super::readback::{BatchResult, ReadbackLayout, STAMPS, Stages};
 use super::several::{Several, Team};
-use crate::constants::FACES;
 use crate::error::Result;
 use crate::hemicube::pixel_count;
-use crate::passes::batch::{Batch, Hemicubes, Sight};
+use crate::passes::batch::{Batch, Sight};
 use crate::passes::buffers::{SceneBuffers, State, download};
 use crate::passes::cull::Cull;
 use crate::passes::factor_buffers::FactorBuffers;
@@ -16,42 +16,8 @@ use crate::passes::item_buffer::ItemBuffer;
 use crate::passes::measure::Measure;
 use crate::passes::relief_buffers::ReliefBuffers;
 use crate::passes::select::{Parameters, Select};
-use crate::passes::types::{Draw, Progress, Slot};
+use crate::passes::types::{Progress, Slot};
 use crate::vk::{Buffer, BufferUse, Commands, DescriptorSet, Device, Stage, Timestamps};
-
-/// Seconds of each stage of a batch, by GPU timestamps.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Stages {
-    /// Measuring unshot power and choosing sources.
-    pub select: f64,
-    pub cull: f64,
-    pub item_buffer: f64,
-    /// Form factors.
-    pub bin: f64,
-    /// Irradiance from form factors, fresh and kept, and keeping them; `receiver` alone.
-    pub gather: f64,
-}
-
-impl std::ops::AddAssign for Stages {
-    fn add_assign(&mut self, other: Self) {
-        self.select += other.select;
-        self.cull += other.cull;
-        self.item_buffer += other.item_buffer;
-        self.bin += other.bin;
-        self.gather += other.gather;
-    }
-}
-
-/// What a batch did.
-#[derive(Debug, Clone)]
-pub struct BatchResult {
-    pub progress: Progress,
-    pub stages: Stages,
-    /// `[slot][face]`: meshlets kept, triangles tested.
-    pub counts: Vec<[u32; 2]>,
-    /// `[slot][face]`.
-    pub draws: Vec<Draw>,
-}
 
 /// What the solver and the benchmarks run batch after batch.
 pub struct BatchLoop {
@@ -112,8 +78,6 @@ pub(super) struct Rule {
     pub stop_power: f32,
     pub least_emitted: f32,
 }
-
-const STAMPS: u32 = 6;
 
 impl BatchLoop {
     pub(super) fn new(
@@ -309,24 +273,9 @@ impl BatchLoop {
 
     fn finish(&mut self, i: usize) -> Result<BatchResult> {
         self.batch(i).wait()?;
+        let intervals = self.timestamps[i].intervals()?;
         let layout = ReadbackLayout::new(&self.batch);
-        let stamps = self.timestamps[i].intervals()?;
-        let [select, cull, item_buffer, bin, gather] = stamps[..] else {
-            panic!("a batch has {STAMPS} timestamps");
-        };
-        let readback = &self.readback[i];
-        Ok(BatchResult {
-            progress: readback.read::<Progress>(0, 1)[0],
-            stages: Stages {
-                select,
-                cull,
-                item_buffer,
-                bin,
-                gather,
-            },
-            counts: readback.read(layout.counts, layout.regions),
-            draws: readback.read(layout.draws, layout.regions),
-        })
+        Ok(layout.read(&self.readback[i], Stages::new(&intervals)))
     }
 
     /// What is unshot now, without shooting.
@@ -464,40 +413,5 @@ impl Passes {
         if let Some((sources, sets, relief)) = self.directed(sets, on, sending) {
             sources.measure(cmd, sets, relief);
         }
-    }
-}
-
-/// Where a batch's results lie in its readback buffer: progress, then counts, then draws.
-struct ReadbackLayout {
-    regions: usize,
-    counts: u64,
-    draws: u64,
-    bytes: u64,
-}
-
-impl ReadbackLayout {
-    fn new(batch: &Batch) -> Self {
-        let regions = match batch.sight {
-            Sight::Hemicubes(_) => (batch.slot_count * FACES) as usize,
-            Sight::Rays(_) => 0,
-        };
-        let counts = size_of::<Progress>() as u64;
-        let draws = counts + (regions * size_of::<[u32; 2]>()) as u64;
-        Self {
-            regions,
-            counts,
-            draws,
-            bytes: draws + (regions * size_of::<Draw>()) as u64,
-        }
-    }
-
-    fn record(&self, cmd: &Commands, state: &State, batch: &Batch, to: &Buffer) {
-        cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
-        cmd.copy(&state.progress, 0, to, 0, self.counts);
-        if let Sight::Hemicubes(Hemicubes { counts, draws, .. }) = &batch.sight {
-            cmd.copy(counts, 0, to, self.counts, self.draws - self.counts);
-            cmd.copy(draws, 0, to, self.draws, self.bytes - self.draws);
-        }
-        cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
     }
 }

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::Settings;
-use super::batch::Stages;
+use super::readback::Stages;
 use crate::constants::{FACES, NONE};
 use crate::error::Result;
-use crate::passes::batch::{Batch, Hemicubes, Sight};
+use crate::passes::batch::{Batch, Hemicubes};
 use crate::passes::buffers::{SceneBuffers, filled, upload, write};
 use crate::passes::cull::Cull;
 use crate::passes::factor_buffers::FactorBuffers;
@@ -113,8 +113,7 @@ impl Drawer {
             .min(settings.batch)
             .clamp(1, scene.source_count.max(1));
         let slots = Hemicubes::fitting_slots(device, scene, face, wanted);
-        let hemicubes = Hemicubes::new(device, &item_buffer.pass, scene, face, slots)?;
-        let batch = Batch::new(device, (slots, 0), Sight::Hemicubes(hemicubes))?;
+        let batch = Batch::drawing(device, &item_buffer.pass, scene, face, (slots, 0))?;
         let factors = FactorBuffers::new(device, scene, meso.len() as u32, slots, (0, None))?;
         let meso = match meso {
             [] => None,

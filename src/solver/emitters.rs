@@ -35,10 +35,11 @@ pub(super) fn new(
     if least == 0.0 || !sources.iter().enumerate().any(strong) {
         return Ok(None);
     }
-    let (slots, sight) = match settings.emitter_shadows() {
+    let batch = match settings.emitter_shadows() {
         EmitterShadows::Rays => {
             let occluders = shadow_occluders(parts.elements, parts.connections, parts.occluders);
-            (slots, Sight::Rays(OccluderTree::new(device, occluders)?))
+            let tree = OccluderTree::new(device, occluders)?;
+            Batch::new(device, (slots, 0), Sight::Rays(tree))?
         }
         EmitterShadows::Hemicubes(face) => {
             let face = face.min(device.limits().max_image_side / 6 * 2);
@@ -47,11 +48,9 @@ pub(super) fn new(
             }
             let slots = Hemicubes::fitting_slots(device, on.scene, face, slots.min(SLOTS));
             let pass = &passes.item_buffer.pass;
-            let hemicubes = Hemicubes::new(device, pass, on.scene, face, slots)?;
-            (slots, Sight::Hemicubes(hemicubes))
+            Batch::drawing(device, pass, on.scene, face, (slots, 0))?
         }
     };
-    let batch = Batch::new(device, (slots, 0), sight)?;
     let rule = Rule {
         shots: settings.shots,
         stop_power: 0.0,

@@ -4,8 +4,8 @@ use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::thread::{self, JoinHandle};
 
-use super::batch::Stages;
 use super::drawer::{Drawer, Row};
+use super::readback::Stages;
 use crate::error::{Error, Result};
 
 /// A device that draws what it is asked for, in that order, until it is dropped.

@@ -6,7 +6,7 @@ use super::Solver;
 use crate::constants::{KIND_POINT, NONE};
 use crate::error::Result;
 use crate::hemicube::pixel_count;
-use crate::passes::batch::{Batch, Hemicubes, Sight};
+use crate::passes::batch::Batch;
 use crate::passes::buffers::write;
 use crate::passes::cull::Cull;
 use crate::passes::item_buffer::ItemBuffer;
@@ -50,8 +50,7 @@ impl Solver {
         let (device, scene) = (&self.device, &self.scene);
         let face = self.settings.hemicube;
         let item_buffer = ItemBuffer::new(device)?;
-        let hemicubes = Hemicubes::new(device, &item_buffer.pass, scene, face, 1)?;
-        let batch = Batch::new(device, (1, 0), Sight::Hemicubes(hemicubes))?;
+        let batch = Batch::drawing(device, &item_buffer.pass, scene, face, (1, 0))?;
         let slot = Slot {
             emitted: Vec3::ONE,
             source,

@@ -11,6 +11,7 @@ mod emitters;
 mod estimate;
 mod helpers;
 mod look;
+mod readback;
 mod relief_light;
 mod report;
 mod schedule;
@@ -30,7 +31,7 @@ use crate::constants::REPLAYS;
 use crate::elements::Elements;
 use crate::error::Result;
 use crate::occluders::Occluders;
-use crate::passes::batch::{Batch, Hemicubes, Sight};
+use crate::passes::batch::{Batch, Hemicubes};
 use crate::passes::buffers::{SceneBuffers, State, download};
 use crate::passes::factor_buffers::FactorBuffers;
 use crate::passes::item_buffer::ItemBuffer;
@@ -44,6 +45,7 @@ pub use ambient::Ambient;
 use batch::{BatchLoop, OnDevice, Passes, Rule};
 pub use devices::{check_devices, open_devices};
 pub use look::ItemPicture;
+pub use readback::{BatchResult, Stages};
 pub use relief_light::ReliefLight;
 pub use report::{Report, Seconds, Skipped, StopReason};
 pub use self_test::{choose_device, ids_come_back_right, open_device};
@@ -174,8 +176,7 @@ impl Solver {
             _ => 0,
         };
         let (face, slots) = (settings.hemicube, (slots, replays));
-        let hemicubes = Hemicubes::new(device, &item_buffer.pass, &scene, face, slots.0)?;
-        let batch = Batch::new(device, slots, Sight::Hemicubes(hemicubes))?;
+        let batch = Batch::drawing(device, &item_buffer.pass, &scene, face, slots)?;
         let relief = elements
             .relief
             .as_ref()
@@ -226,7 +227,6 @@ impl Solver {
         let mut report = Report::new(devices, settings, &elements, &sources, slots.0);
         let finer = emitters.as_ref().and_then(BatchLoop::face_size);
         report.emitter_hemicube = finer.unwrap_or(face);
-        report.by_rays = emitters.is_some() && finer.is_none();
         report.set_meshlets(scene.meshlet_count);
         report.skipped.triangles_merged = (elements.len() - occluders.len()) as u64;
         Ok(Self {
@@ -447,8 +447,6 @@ impl Solver {
         self.batches.item_buffers(&self.device)
     }
 }
-
-pub use batch::{BatchResult, Stages};
 
 /// See [`Solver::relief_exits`]; radiosity πL, RGB, W·m⁻².
 pub struct ReliefExits {

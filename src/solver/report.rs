@@ -92,8 +92,6 @@ pub struct Report {
     /// Elements that receive and send by direction, and into how many; null where none does.
     pub relief: Option<ReliefReport>,
     #[serde(skip)]
-    pub(super) by_rays: bool,
-    #[serde(skip)]
     meshlets: u64,
     #[serde(skip)]
     culls: bool,
@@ -157,7 +155,6 @@ impl Report {
                 ..Skipped::default()
             },
             relief: elements.relief.as_ref().map(ReliefReport::new),
-            by_rays: false,
             meshlets: 0,
             culls: settings.culling != Culling::Off,
         }
@@ -170,7 +167,8 @@ impl Report {
     pub(super) fn add(&mut self, batch: &BatchResult, of_emitters: bool) {
         let selected = u64::from(batch.progress.selected);
         let faces = batch.progress.selected as usize * crate::constants::FACES as usize;
-        if of_emitters && self.by_rays {
+        let by_rays = batch.draws.is_empty();
+        if by_rays {
             self.emitters_by_rays += selected;
         } else {
             self.hemicubes += selected;

@@ -172,7 +172,8 @@ mod tests {
             );
             let all = drawn[1..].iter().map(|&d| f64::from(d)).chain([first]);
             let mean = all.clone().sum::<f64>() / (1 + others) as f64;
-            // Where the first one has no more to do than its share beside drawing. It may wait for what it chooses before the others have got ahead.
+            // Where the first one has no more to do than its share beside drawing. It may wait for what it chooses before the
+            // others have got ahead.
             assert!(all.into_iter().all(|work| (work / mean - 1.0).abs() < 0.1));
         }
     }

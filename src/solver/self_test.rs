@@ -8,7 +8,7 @@ use super::Settings;
 use crate::elements::Elements;
 use crate::error::{Error, Result};
 use crate::occluders::Occluders;
-use crate::passes::batch::{Batch, Hemicubes, Sight};
+use crate::passes::batch::Batch;
 use crate::passes::buffers::{SceneBuffers, State};
 use crate::passes::item_buffer::ItemBuffer;
 use crate::scene::{Material, Scene, Triangle};
@@ -80,8 +80,7 @@ pub fn ids_come_back_right(device: &Arc<Device>) -> Result<bool> {
     let scene = SceneBuffers::new(device, &elements, &sources, &connections, &occluders)?;
     let state = State::new(device, &scene)?;
     let item_buffer = ItemBuffer::new(device)?;
-    let hemicubes = Hemicubes::new(device, &item_buffer.pass, &scene, SIZE, 1)?;
-    let batch = Batch::new(device, (1, 0), Sight::Hemicubes(hemicubes))?;
+    let batch = Batch::drawing(device, &item_buffer.pass, &scene, SIZE, (1, 0))?;
     let measure = crate::passes::measure::Measure::new(device)?;
     let select = crate::passes::select::Select::new(device)?;
     let cull = crate::passes::cull::Cull::new(device, settings.culling)?;

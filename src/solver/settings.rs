@@ -26,6 +26,16 @@ pub enum EmitterShadows {
     Hemicubes(u32),
 }
 
+impl EmitterShadows {
+    /// Pixels a side of the hemicubes, if it is by those.
+    pub fn face(self) -> Option<u32> {
+        match self {
+            Self::Rays => None,
+            Self::Hemicubes(face) => Some(face),
+        }
+    }
+}
+
 #[derive(Debug, Clone)]
 pub struct Settings {
     pub estimator: Estimator,

@@ -4,10 +4,11 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::batch::{BatchResult, OnDevice, Passes, Sets, Stages};
+use super::batch::{OnDevice, Passes, Sets};
 use super::drawer::{Drawer, Row, RowWords};
 use super::estimate::Sending;
 use super::helpers::Helper;
+use super::readback::{BatchResult, Stages};
 use super::schedule::Schedule;
 use crate::constants::{FACES, NONE};
 use crate::error::Result;

@@ -1,5 +1,5 @@
-//! Draws the surfaces of a scene by the light of their corners, from an eye that moves freely. Shaders: `view_mesh.vert`,
-//! `view_mesh.frag`, `view_mesh_laid.vert`, `view_mesh_laid.frag`.
+//! Draws the surfaces of a scene by the light of their corners, from an eye that moves freely. Shaders: `view_mesh`,
+//! `view_mesh_laid` and `view_mesh_overlaid`, `.vert` and `.frag` of each.
 
 use std::sync::Arc;
 
@@ -100,11 +100,19 @@ pub struct Shown {
     pub chosen: Option<u32>,
 }
 
+impl Shown {
+    fn has_overlays(&self) -> bool {
+        self.elements || self.sources || self.chosen.is_some()
+    }
+}
+
 /// A scene ready to be drawn.
 pub struct SurfacePass {
     plain: GraphicsPipeline,
     /// With pictures laid over.
     laid: GraphicsPipeline,
+    /// With outlines, colours and a mark over both.
+    overlaid: GraphicsPipeline,
     sampler: Sampler,
     /// A picture ends at its edges.
     held: Sampler,
@@ -197,6 +205,11 @@ impl SurfacePass {
             shaders::VIEW_MESH_LAID_VERT,
             shaders::VIEW_MESH_LAID_FRAG,
         )?;
+        let overlaid = pipeline(
+            "surfaces under overlays",
+            shaders::VIEW_MESH_OVERLAID_VERT,
+            shaders::VIEW_MESH_OVERLAID_FRAG,
+        )?;
         let mut order: Vec<u32> = (0..scene.triangles.len() as u32).collect();
         let material = |e: u32| scene.triangles[e as usize].material;
         order.sort_by_key(|&e| material(e));
@@ -237,6 +250,7 @@ impl SurfacePass {
         let mut surfaces = Self {
             plain,
             laid,
+            overlaid,
             sampler: Sampler::new(device, "surfaces", true)?,
             held: Sampler::held(device, "detailed picture")?,
             textures,
@@ -367,8 +381,11 @@ impl SurfacePass {
     pub fn record(&self, cmd: &Commands, seen: &Rows, shown: &Shown) {
         cmd.bind_indices(&self.indices);
         let pipeline = match shown.picture {
+            _ if shown.has_overlays() => &self.overlaid,
             Laid::No => &self.plain,
-            Laid::Exactly | Laid::FromElsewhere => &self.laid,
+            Laid::FromElsewhere => &self.laid,
+            // What lies exactly over all of a frame is drawn without the surfaces.
+            Laid::Exactly => return,
         };
         for &(material, first, count) in &self.ranges {
             let material = material as usize;

@@ -14,7 +14,7 @@ use crate::error::Result;
 use crate::meso::Transport;
 use crate::quality::scaled;
 use crate::scene::Scene;
-use crate::solver::{EmitterShadows, Estimator, HEMICUBE_RANGE, Settings, Solver, StopReason};
+use crate::solver::{Estimator, HEMICUBE_RANGE, Settings, Solver, StopReason};
 use crate::vk::Device;
 
 /// The settings that are tried: each hemicube with each size of sources, for both estimators.
@@ -160,10 +160,7 @@ impl Try {
                     Estimator::Pixel => Method::Pixel,
                 },
                 hemicube: Some(self.hemicube),
-                emitter_hemicube: match settings.emitter_shadows() {
-                    EmitterShadows::Rays => None,
-                    EmitterShadows::Hemicubes(face) => Some(face),
-                },
+                emitter_hemicube: settings.emitter_shadows().face(),
                 source_scale: Some(self.scale),
                 directions: solver
                     .elements

@@ -23,6 +23,7 @@ impl Viewer {
             self.input.hovered = None;
         }
         self.update()?;
+        let updated = Instant::now();
         let seconds = begin.duration_since(self.last_frame).as_secs_f64();
         self.last_frame = begin;
         self.fly(seconds.min(0.1));
@@ -57,29 +58,33 @@ impl Viewer {
             chosen: self.input.chosen.or(self.input.hovered),
         };
         let capture = self.capture.is_some();
+        let prepared_at = Instant::now();
         let (surfaces, panel_pass) = (&self.surfaces, &self.panel_pass);
         // A software driver compiles a shader when something is drawn by it first: not while a person waits.
-        let first = (!self.timing.has_begun()).then_some(surface_pass::Shown {
-            picture: Laid::FromElsewhere,
+        let unseen = [
+            (Laid::No, false),
+            (Laid::FromElsewhere, false),
+            (Laid::No, true),
+        ];
+        let unseen = unseen.map(|(picture, elements)| surface_pass::Shown {
+            picture,
+            elements,
             ..shown
         });
+        let first = !self.timing.has_begun();
         let (answer, captured) = self.screen.show(capture, |cmd| {
-            if let Some(unseen) = &first {
+            if first {
                 cmd.scissor(0, 0, 1, 1);
-                surfaces.record(cmd, &rows, unseen);
+                unseen
+                    .iter()
+                    .for_each(|unseen| surfaces.record(cmd, &rows, unseen));
                 cmd.scissor(0, 0, size.0, size.1);
             }
             if shown.picture == Laid::Exactly {
                 panel_pass.record_picture(cmd, &prepared);
             }
-            // The picture has all but what lies over the surfaces.
-            if shown.picture != Laid::Exactly
-                || shown.elements
-                || shown.sources
-                || shown.chosen.is_some()
-            {
-                surfaces.record(cmd, &rows, &shown);
-            }
+            // Of surfaces that the picture shows, what lies over them alone.
+            surfaces.record(cmd, &rows, &shown);
             panel_pass.record(cmd, &prepared);
         })?;
         if answer != Shown::Yes {
@@ -88,6 +93,13 @@ impl Viewer {
             return Ok(false);
         }
         self.timing.frame(begin.elapsed(), self.is_baking());
+        tracing::debug!(
+            "frame: waited {:?}, updated in {:?}, prepared in {:?}, shown in {:?}",
+            unanswered.map(|since| begin - since),
+            updated - begin,
+            prepared_at - updated,
+            prepared_at.elapsed()
+        );
         if let Some(since) = unanswered {
             self.timing.answer(since);
         }

@@ -1,0 +1,7 @@
+// As view_mesh_laid.vert, with what tells where in its triangle a fragment is.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#define LAID
+#define OVERLAID
+#include "shared/view_corner.glsl"
