@@ -21,8 +21,8 @@ impl Quality {
         let (hemicube, scale, residual) = match self {
             Self::Draft => (64, 4.0, 5e-2),
             Self::Normal => (128, 1.0, 1e-3),
-            Self::High => (256, 0.125, 1e-4),
-            Self::Reference => (512, 0.0625, 1e-5),
+            Self::High => (256, 1.0 / 16.0, 1e-4),
+            Self::Reference => (512, 1.0 / 32.0, 1e-5),
         };
         Settings {
             hemicube,

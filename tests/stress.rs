@@ -41,7 +41,6 @@ cases! {
     scale offset no_emission emission black white many_shots
     nearly_white
     occluders
-    #[ignore = "receivers within 1e-6 of a wall are 13 % off"]
     slivers
     specks degenerate duplicates shuffled non_manifold
     touching interpenetrating

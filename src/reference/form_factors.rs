@@ -35,10 +35,23 @@ pub fn gather(
         .iter()
         .map(|&[u, v, weight]| {
             let p = triangle[0] + u * (triangle[1] - triangle[0]) + v * (triangle[2] - triangle[0]);
+            let p = before_plane(p, elements.normal[element], source);
             let f = form_factor(elements, source, p, element);
             if f > 0.0 && seen(p) { weight * f } else { 0.0 }
         })
         .sum()
+}
+
+/// As in the shader: a place in the plane of a source with which its surface is not level, a little before it.
+fn before_plane(p: DVec3, normal: DVec3, source: &Source) -> DVec3 {
+    const LEVEL: f64 = 0.99;
+    let height = (p - source.centroid).dot(source.normal);
+    let plane = source.kind != KIND_POINT && source.cone == 0.0;
+    if plane && height.abs() <= HEIGHT_EPSILON && normal.dot(source.normal).abs() < LEVEL {
+        p + (2.0 * HEIGHT_EPSILON - height) * source.normal
+    } else {
+        p
+    }
 }
 
 /// Form factor from a point of an element to the source, as if nothing stood between.

@@ -95,7 +95,7 @@ fn occluders(context: &Context) -> Result<Vec<Check>> {
         }
         Size::Full => {
             let bake = Quality::High.settings();
-            let elements = occluded_elements(20, 3, 0.95);
+            let elements = occluded_elements(25, 3, 0.95);
             (elements, bake, OCCLUDERS_RMS, OCCLUDERS_MOST)
         }
     };
