@@ -7,11 +7,11 @@ use glam::Vec3;
 use super::buffers::{SceneBuffers, upload};
 use super::occluder_tree::OccluderTree;
 use super::types::{Draw, ReceiverList, Slot, View};
-use crate::constants::{FACES, NONE};
+use crate::constants::{FACES, NONE, RECEIVE_KINDS};
 use crate::error::Result;
 use crate::hemicube::pixel_count;
 use crate::vk::{
-    Buffer, BufferUse, Device, Format, Framebuffer, Image, ImageUse, RenderPass, Sampler,
+    Buffer, BufferUse, Device, Format, Framebuffer, Image, ImageUse, Limits, RenderPass, Sampler,
 };
 
 /// The sources of a batch.
@@ -112,26 +112,30 @@ impl Batch {
     }
 }
 
+/// Slots whose lists and item buffers fit the device's largest buffer, its widest image and an eighth of its memory, for so many
+/// elements and occluders; 1 at least.
+fn most_slots(limits: &Limits, (elements, occluders): (u32, u32), face_size: u32) -> u32 {
+    let region = u64::from(FACES) * u64::from(occluders);
+    let corners = 12 * region;
+    // Of receivers: fresh form factors are no more.
+    let lists = 4 * u64::from(RECEIVE_KINDS) * u64::from(elements);
+    let by_buffer = limits.max_storage_buffer_range / corners.max(lists).max(1);
+    let by_memory =
+        limits.heap_bytes / 8 / (DRAWN_BYTES * region + 8 * pixel_count(face_size) as u64);
+    let by_width = u64::from(limits.max_image_side / face_size);
+    by_buffer.min(by_memory).min(by_width).max(1) as u32
+}
+
 impl Hemicubes {
-    /// How many slots a batch may have: what fits the device's largest buffer, its widest image and an eighth of its
-    /// memory, and no more than `wanted`.
+    /// How many slots a batch may have, no more than `wanted`; see [`most_slots`].
     pub fn fitting_slots(
         device: &Device,
         scene: &SceneBuffers,
         face_size: u32,
         wanted: u32,
     ) -> u32 {
-        let limits = device.limits();
-        let region = u64::from(FACES) * u64::from(scene.occluder_count);
-        let by_buffer = limits.max_storage_buffer_range / (12 * region).max(1);
-        let by_memory =
-            limits.heap_bytes / 8 / (DRAWN_BYTES * region + 8 * pixel_count(face_size) as u64);
-        let by_width = u64::from(limits.max_image_side / face_size);
-        u64::from(wanted)
-            .min(by_buffer)
-            .min(by_memory)
-            .min(by_width)
-            .max(1) as u32
+        let counts = (scene.element_count, scene.occluder_count);
+        wanted.min(most_slots(device.limits(), counts, face_size))
     }
 
     fn new(
@@ -162,5 +166,35 @@ impl Hemicubes {
             items,
             _depth: depth,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A million elements, merged to a few occluders and not: lists of receivers and of drawn corners fit a buffer of 128 MiB.
+    #[test]
+    fn no_list_outgrows_the_largest_buffer() {
+        let limits = Limits {
+            max_storage_buffer_range: 128 << 20,
+            heap_bytes: 16 << 30,
+            max_image_side: 16384,
+            subgroup_size: 8,
+            subpixel_bits: 8,
+            timestamp_period: 1.0,
+        };
+        for (elements, occluders, expected) in [
+            (1_000_000, 25_000, 8),
+            (1_000_000, 1_000_000, 2),
+            (10_000, 10_000, 128),
+            (100_000_000, 100_000_000, 1),
+        ] {
+            let slots = most_slots(&limits, (elements, occluders), 128);
+            assert_eq!(
+                slots, expected,
+                "{elements} elements, {occluders} occluders"
+            );
+        }
     }
 }

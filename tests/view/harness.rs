@@ -35,6 +35,17 @@ impl Display {
             name: format!(":{}", number.trim()),
         }
     }
+
+    /// What a person does on it, by xdotool; returns what that prints.
+    pub fn xdotool(&self, args: &[&str]) -> String {
+        let done = Command::new("xdotool")
+            .args(args)
+            .env("DISPLAY", &self.name)
+            .output()
+            .expect("the tests need xdotool");
+        assert!(done.status.success(), "xdotool {args:?}: {}", told(&done));
+        String::from_utf8_lossy(&done.stdout).trim().to_owned()
+    }
 }
 
 impl Drop for Display {

@@ -4,7 +4,7 @@
 
 mod harness;
 
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use image::RgbImage;
@@ -479,6 +479,23 @@ fn without_a_device_one_line_says_so() {
     assert!(text.contains("no device \"nosuch\""), "{text}");
 }
 
+#[test]
+fn is_taken_off_the_screen_and_put_back() {
+    let room = Room::baked("room");
+    let display = Display::new();
+    let script =
+        format!("{QUIET}frames 1\nscreenshot open.png\nwait 4\nframes 2\nscreenshot again.png");
+    let child = start(&display, SIZE, room.path(), "room.safetensors", &script);
+    wait_for(&room.path().join("open.png"));
+    let window = display.xdotool(&["search", "--name", "Mesolux"]);
+    let viewable = |of: &str| display.xdotool(&["search", "--onlyvisible", "--name", of]);
+    display.xdotool(&["windowunmap", "--sync", &window, "sleep", "0.5"]);
+    display.xdotool(&["windowmap", "--sync", &window]);
+    assert_eq!(viewable("Mesolux"), window);
+    finish(child, &script);
+    assert!(room.picture("again.png") == room.picture("open.png"));
+}
+
 /// What real keys and a real mouse do is what the same steps of a script do.
 #[test]
 fn obeys_real_keys_and_mouse() {
@@ -492,15 +509,7 @@ fn obeys_real_keys_and_mouse() {
     let script = format!("{QUIET}frames 1\nscreenshot open.png\nwait 6\nscreenshot real.png");
     let child = start(&display, SIZE, room.path(), "room.safetensors", &script);
     wait_for(&room.path().join("open.png"));
-    let xdotool = |args: &[&str]| {
-        let done = Command::new("xdotool")
-            .args(args)
-            .env("DISPLAY", &display.name)
-            .output()
-            .expect("the tests need xdotool");
-        assert!(done.status.success(), "xdotool {args:?}: {}", told(&done));
-        String::from_utf8_lossy(&done.stdout).trim().to_owned()
-    };
+    let xdotool = |args: &[&str]| display.xdotool(args);
     let window = xdotool(&["search", "--name", "Mesolux"]);
     xdotool(&["windowfocus", &window]);
     xdotool(&[
