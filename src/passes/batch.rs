@@ -112,8 +112,7 @@ impl Batch {
     }
 }
 
-/// Slots whose lists and item buffers fit the device's largest buffer, its widest image and an eighth of its memory, for so many
-/// elements and occluders; 1 at least.
+/// The same for so many elements and occluders, of any number that is wanted; 1 at least.
 fn most_slots(limits: &Limits, (elements, occluders): (u32, u32), face_size: u32) -> u32 {
     let region = u64::from(FACES) * u64::from(occluders);
     let corners = 12 * region;
@@ -127,7 +126,8 @@ fn most_slots(limits: &Limits, (elements, occluders): (u32, u32), face_size: u32
 }
 
 impl Hemicubes {
-    /// How many slots a batch may have, no more than `wanted`; see [`most_slots`].
+    /// How many slots a batch may have: what fits the device's largest buffer, its widest image and an eighth of its
+    /// memory, and no more than `wanted`.
     pub fn fitting_slots(
         device: &Device,
         scene: &SceneBuffers,
