@@ -112,19 +112,6 @@ impl Batch {
     }
 }
 
-/// The same for so many elements and occluders, of any number that is wanted; 1 at least.
-fn most_slots(limits: &Limits, (elements, occluders): (u32, u32), face_size: u32) -> u32 {
-    let region = u64::from(FACES) * u64::from(occluders);
-    let corners = 12 * region;
-    // Of receivers: fresh form factors are no more.
-    let lists = 4 * u64::from(RECEIVE_KINDS) * u64::from(elements);
-    let by_buffer = limits.max_storage_buffer_range / corners.max(lists).max(1);
-    let by_memory =
-        limits.heap_bytes / 8 / (DRAWN_BYTES * region + 8 * pixel_count(face_size) as u64);
-    let by_width = u64::from(limits.max_image_side / face_size);
-    by_buffer.min(by_memory).min(by_width).max(1) as u32
-}
-
 impl Hemicubes {
     /// How many slots a batch may have: what fits the device's largest buffer, its widest image and an eighth of its
     /// memory, and no more than `wanted`.
@@ -167,6 +154,19 @@ impl Hemicubes {
             _depth: depth,
         })
     }
+}
+
+/// As many slots as [`Hemicubes::fitting_slots`] may give, for so many elements and occluders; 1 at least.
+fn most_slots(limits: &Limits, (elements, occluders): (u32, u32), face_size: u32) -> u32 {
+    let region = u64::from(FACES) * u64::from(occluders);
+    let corners = 12 * region;
+    // Of receivers: fresh form factors are no more.
+    let lists = 4 * u64::from(RECEIVE_KINDS) * u64::from(elements);
+    let by_buffer = limits.max_storage_buffer_range / corners.max(lists).max(1);
+    let by_memory =
+        limits.heap_bytes / 8 / (DRAWN_BYTES * region + 8 * pixel_count(face_size) as u64);
+    let by_width = u64::from(limits.max_image_side / face_size);
+    by_buffer.min(by_memory).min(by_width).max(1) as u32
 }
 
 #[cfg(test)]

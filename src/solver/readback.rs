@@ -92,6 +92,7 @@ impl ReadbackLayout {
         }
         cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
     }
+
     pub fn read(&self, readback: &Buffer, stages: Stages) -> BatchResult {
         BatchResult {
             progress: readback.read::<Progress>(0, 1)[0],

@@ -167,8 +167,8 @@ impl Report {
     pub(super) fn add(&mut self, batch: &BatchResult, of_emitters: bool) {
         let selected = u64::from(batch.progress.selected);
         let faces = batch.progress.selected as usize * crate::constants::FACES as usize;
-        let by_rays = batch.draws.is_empty();
-        if by_rays {
+        // Rays draw nothing.
+        if batch.draws.is_empty() {
             self.emitters_by_rays += selected;
         } else {
             self.hemicubes += selected;
