@@ -166,9 +166,6 @@ const vec3 POINTS[11] = vec3[](
     vec3(0.101286507, 0.797426985, 0.125939181)
 );
 
-// Cosine of the angle from which on two surfaces are not level: 8°, at which less than 1/200 of a fold's light comes from its other side.
-const float LEVEL = 0.99;
-
 bool visible(vec3 p, vec3 n, uint element, Source s, bool asks) {
 #ifdef SHADOW_RAYS
     bool open[1] = bool[1](asks);
@@ -178,6 +175,9 @@ bool visible(vec3 p, vec3 n, uint element, Source s, bool asks) {
     return visible(p, n, element, first_slot, s, asks);
 #endif
 }
+
+// Cosine of the angle from which on two surfaces are not level: 8°, at which less than 1/200 of a fold's light comes from its other side.
+const float LEVEL = 0.99;
 
 // A place on a surface with normal n, put a little before a plane source where rounding leaves open on which side of its plane it is: a
 // sliver along the foot of a wall is lit by it. Surfaces that are level with the source see nothing of it there.
