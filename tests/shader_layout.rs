@@ -102,6 +102,7 @@ fn rust_and_glsl_agree() {
     check!(true, Source: eye area normal radius tangent cone_sin bitangent cone_cos emitted kind
         first_element element_count first_contour contour_count component middle facing part_radius first_part part_count);
     check!(true, Meshlet: centre radius axis cutoff first count component);
+    check!(true, ReceiverBlock: centre radius axis half_height cone_sin cone_cos largest);
     check!(true, Component: low closed high);
     check!(true, Slot: emitted source reflected scale);
     check!(true, View: eye x y w);

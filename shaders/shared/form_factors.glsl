@@ -176,9 +176,6 @@ bool visible(vec3 p, vec3 n, uint element, Source s, bool asks) {
 #endif
 }
 
-// Cosine of the angle from which on two surfaces are not level: 8°, at which less than 1/200 of a fold's light comes from its other side.
-const float LEVEL = 0.99;
-
 // A place on a surface with normal n, put a little before a plane source where rounding leaves open on which side of its plane it is: a
 // sliver along the foot of a wall is lit by it. Surfaces that are level with the source see nothing of it there.
 vec3 before_plane(vec3 p, vec3 n, Source s) {
@@ -205,7 +202,10 @@ FLUX mean_form_factor(uint element, vec4 ball, vec3 n, Source s) {
         bool mine = i == 0 ? !near : i < 4 ? near && !touching : near && touching;
         vec3 point = POINTS[i];
         vec3 p = before_plane(i == 0 ? ball.xyz : a + point.x * ab + point.y * ac, n, s);
-        mine = visible(p, n, element, s, mine && shows_front(s, p));
+        mine = mine && shows_front(s, p);
+        bool open = visible(p, n, element, s, mine && near);
+        // What is not near was looked at when it was sorted.
+        mine = mine && (open || !near);
         FLUX f = form_factor(p, n, element, s);
         sum += mine ? point.z * f : FLUX(0.0);
     }

@@ -40,6 +40,9 @@ const float HEIGHT_EPSILON = 1e-6;
 // How many pixels' footprints two points of one surface may lie apart and still be taken for one another.
 const float REACH = 1.5;
 
+// Cosine of the angle from which on two surfaces are not level: 8°, at which less than 1/200 of a fold's light comes from its other side.
+const float LEVEL = 0.99;
+
 // Where a source lies this many squared radii off, no edge of it is seen under more than a right angle.
 const float ACUTE = 2.1;
 // A source or a part of one is a point from so many of its radii off. The error of a square is then 2/3 of the square of that at most:
@@ -106,6 +109,13 @@ bool shows_whole_front(Source s, vec3 p) {
     float height = dot(d, s.normal);
     float flat_part = sqrt(max(dot(d, d) - height * height, 0.0));
     return s.cone_sin == 0.0 || height * s.cone_cos - flat_part * s.cone_sin - s.radius > 0.0;
+}
+
+// Whether p, on a surface with normal n, lies in the plane of a plane source with which it is level: of the source it sees nothing that
+// rounding does not make up.
+bool lies_in_plane(Source s, vec3 p, vec3 n) {
+    bool level = abs(dot(n, s.normal)) >= LEVEL;
+    return s.kind != KIND_POINT && s.cone_sin == 0.0 && level && dot(p - s.middle, s.normal) <= HEIGHT_EPSILON;
 }
 
 // Whether a source can show its front at p.

@@ -4,16 +4,25 @@
 // buffer, one slot a dispatch, since lavapipe ends all loops of an invocation after 65,535 turns.
 
 #ifdef SHADOW_RAYS
-#define SHADOW_OCCLUDERS 8
+#define SHADOW_OCCLUDERS 9
 #define RAYS SORT_ELEMENTS
 #endif
 #include "shared/receivers.glsl"
 
 // 1: what is passed over is counted by slot, so that a row of form factors that is drawn ahead brings its own count.
-layout(constant_id = 0) const uint BEHIND_BY_SLOT = 0;
+layout(constant_id = 0) const uint AWAY_BY_SLOT = 0;
 
-// Form factors that were passed over because the source lies behind the element's plane, by element or by slot.
-layout(scalar, binding = 7) buffer Behind { uint behind_count[]; };
+// 1: blocks of elements that see nothing of a source are passed over as a whole.
+layout(constant_id = 1) const uint CULL_BLOCKS = 1;
+
+// Elements that see nothing of a source, whatever stands between: it lies behind them or shows them its back. By block, counted at
+// one of its elements, or by slot.
+layout(scalar, binding = 7) buffer FacingAway { uint away_count[]; };
+// Those without relief, then those with it.
+layout(scalar, binding = 8) readonly buffer Blocks { ReceiverBlock blocks[]; };
+
+// Rounding of distances, a few steps of f32 at coordinates up to 1.
+const float BLOCK_EPSILON = 1e-6;
 
 // Lane k of a subgroup makes room in the list of kind k for all lanes.
 void append(uint slot, uint kind, bool mine, uint i) {
@@ -40,13 +49,13 @@ void append(uint slot, uint kind, bool mine, uint i) {
 }
 
 // How the form factor from an element to a source is found, should it be seen; RECEIVE_KINDS where it is 0. `near`: parts of the element
-// may be seen, whether its centroid is or not. `behind`: it is 0 since the source lies behind the element.
-uint kind_of(Source s, vec4 ball, vec3 n, out bool near, out bool behind) {
+// may be seen, whether its centroid is or not.
+uint kind_of(Source s, vec4 ball, vec3 n, out bool near) {
     vec3 d = ball.xyz - s.middle;
     float distance_middle = length(d);
     float across = dot(d, n);
     near = distance_middle - s.radius <= NEAR * ball.w;
-    behind = across >= s.radius;
+    bool behind = across >= s.radius;
     bool above = across <= -s.radius && distance_middle * distance_middle >= ACUTE * s.radius * s.radius;
     bool whole = shows_whole_front(s, ball.xyz);
     bool points = distance_middle - s.radius >= POINT_DISTANCE * s.part_radius;
@@ -56,63 +65,119 @@ uint kind_of(Source s, vec4 ball, vec3 n, out bool near, out bool behind) {
     bool by_parts = curved && points;
     uint kind = near ? RECEIVE_NEAR : far ? RECEIVE_FAR : by_parts ? RECEIVE_PARTS
         : whole && above ? RECEIVE_OUTLINE : RECEIVE_NEAR;
-    return !behind && (near || shows_front(s, ball.xyz)) ? kind : RECEIVE_KINDS;
+    bool shows = shows_front(s, ball.xyz) && !lies_in_plane(s, ball.xyz, n);
+    return !behind && (near || shows) ? kind : RECEIVE_KINDS;
+}
+
+// Whether `kind_of` is RECEIVE_KINDS for every element of a block. Each lane may ask of another source.
+bool none_sees(ReceiverBlock block, uint source) {
+    uint word = source * SOURCE_WORDS;
+    vec3 normal = uintBitsToFloat(uvec3(source_words[word + 4], source_words[word + 5], source_words[word + 6]));
+    float radius = uintBitsToFloat(source_words[word + 7]);
+    float cone_sin = uintBitsToFloat(source_words[word + 11]);
+    float cone_cos = uintBitsToFloat(source_words[word + 15]);
+    bool is_point = source_words[word + 19] == KIND_POINT;
+    vec3 middle = uintBitsToFloat(uvec3(source_words[word + 25], source_words[word + 26], source_words[word + 27]));
+    vec3 d = block.centre - middle;
+    float square = dot(d, d);
+    // Whether the source lies behind the element that is turned to it most.
+    float along = dot(d, block.axis);
+    float across = sqrt(max(square - along * along, 0.0));
+    float aside = block.radius * block.cone_sin + block.half_height + BLOCK_EPSILON;
+    bool behind = along * block.cone_cos - across * block.cone_sin - aside >= radius;
+    // Whether the element that lies highest sees none of its front.
+    float height = dot(d, normal);
+    float turned = length(cross(normal, block.axis));
+    float cosine = abs(dot(normal, block.axis));
+    float rise = block.radius * turned + block.half_height * cosine;
+    bool level = cosine * block.cone_cos - turned * block.cone_sin > LEVEL + BLOCK_EPSILON;
+    float flat_part = sqrt(max(square - height * height, 0.0));
+    bool below = is_point || cone_sin == 0.0
+        ? height + rise < (level && !is_point ? 0.5 * HEIGHT_EPSILON : -BLOCK_EPSILON)
+        : height * cone_cos + flat_part * cone_sin + radius + block.radius < -BLOCK_EPSILON;
+    bool near = sqrt(square) - radius - block.radius - BLOCK_EPSILON <= NEAR * block.largest;
+    return behind || below && !near;
+}
+
+// Bit k: the k-th slot from `first` on holds a source of which one of the elements from `low` to `high` may see something. `held`: it
+// holds one at all. A lane a slot, 32 slots at most.
+uint sighted_slots(uint first, uint low, uint high, out uint held) {
+    uint sighted = 0;
+    held = 0;
+    for (uint k = 0; first + k < end_slot; k += gl_SubgroupSize) {
+        uint slot = first + k + gl_SubgroupInvocationID;
+        uint source = slot < end_slot ? slots[slot].source : NONE;
+        bool holds = source != NONE;
+        bool none = CULL_BLOCKS == 1;
+        for (uint block = low / GROUP; block <= high / GROUP && none; block++) {
+            none = none_sees(blocks[first_block + block], holds ? source : 0);
+        }
+        held |= subgroupBallot(holds).x << k;
+        sighted |= subgroupBallot(holds && !none).x << k;
+    }
+    return sighted;
 }
 
 void main() {
-    vec4 ball[SORT_ELEMENTS];
-    vec3 n[SORT_ELEMENTS];
-    uint passed_over[SORT_ELEMENTS];
     // Of a subgroup the elements follow one another.
-    uint in_group = gl_SubgroupID * gl_SubgroupSize;
-    uint first = SORT_ELEMENTS * (GROUP * gl_WorkGroupID.x + in_group) + gl_SubgroupInvocationID;
-    for (uint j = 0; j < SORT_ELEMENTS; j++) {
-        uint e = first_element + min(first + j * gl_SubgroupSize, element_count - 1);
-        ball[j] = balls[e];
-        n[j] = planes[e].xyz;
-        passed_over[j] = 0;
+    uint begin = SORT_ELEMENTS * (GROUP * gl_WorkGroupID.x + gl_SubgroupID * gl_SubgroupSize);
+    uint first = begin + gl_SubgroupInvocationID;
+    uint last_element = element_count - 1;
+    uint in_range = min(begin + SORT_ELEMENTS * gl_SubgroupSize, element_count) - min(begin, element_count);
+    uint held;
+    uint sighted = sighted_slots(first_slot, min(begin, last_element), min(begin + in_range, element_count) - 1, held);
+    uint away = held & ~sighted;
+    uint passed_over = in_range * bitCount(away);
+    while (AWAY_BY_SLOT == 1 && away != 0) {
+        uint k = findLSB(away);
+        away &= away - 1;
+        if (subgroupElect()) {
+            atomicAdd(away_count[first_slot + k], in_range);
+        }
     }
-    for (uint slot = first_slot; slot < end_slot; slot++) {
-        uint source = slots[slot].source;
-        if (source == NONE) {
-            break;
-        }
-        Source s = load_source(source);
-        uint kind[SORT_ELEMENTS];
-        bool seen[SORT_ELEMENTS];
-        bool near[SORT_ELEMENTS];
-        bool behind[SORT_ELEMENTS];
+    // A loop of one turn or none: a software device works through what a branch leaves out.
+    for (uint left = sighted; left != 0; left = 0) {
+        vec4 ball[SORT_ELEMENTS];
+        vec3 n[SORT_ELEMENTS];
         for (uint j = 0; j < SORT_ELEMENTS; j++) {
-            uint i = first + j * gl_SubgroupSize;
-            kind[j] = kind_of(s, ball[j], n[j], near[j], behind[j]);
-            seen[j] = i < element_count && kind[j] < RECEIVE_KINDS && !near[j];
+            uint e = first_element + min(first + j * gl_SubgroupSize, last_element);
+            ball[j] = balls[e];
+            n[j] = planes[e].xyz;
         }
+        while (sighted != 0) {
+            uint slot = first_slot + findLSB(sighted);
+            sighted &= sighted - 1;
+            Source s = load_source(slots[slot].source);
+            uint kind[SORT_ELEMENTS];
+            bool seen[SORT_ELEMENTS];
+            bool near[SORT_ELEMENTS];
+            for (uint j = 0; j < SORT_ELEMENTS; j++) {
+                uint i = first + j * gl_SubgroupSize;
+                kind[j] = kind_of(s, ball[j], n[j], near[j]);
+                seen[j] = i < element_count && kind[j] < RECEIVE_KINDS && !near[j];
+            }
 #ifdef SHADOW_RAYS
-        look(s, ball, n, seen);
+            look(s, ball, n, seen);
 #else
-        for (uint j = 0; j < SORT_ELEMENTS; j++) {
-            uint e = first_element + first + j * gl_SubgroupSize;
-            seen[j] = visible(ball[j].xyz, n[j], e, slot, s, seen[j]);
-        }
+            for (uint j = 0; j < SORT_ELEMENTS; j++) {
+                uint e = first_element + first + j * gl_SubgroupSize;
+                seen[j] = visible(ball[j].xyz, n[j], e, slot, s, seen[j]);
+            }
 #endif
-        for (uint j = 0; j < SORT_ELEMENTS; j++) {
-            uint i = first + j * gl_SubgroupSize;
-            bool mine = i < element_count && kind[j] < RECEIVE_KINDS;
-            append(slot, kind[j], mine && (near[j] || seen[j]), i);
-            if (BEHIND_BY_SLOT == 1) {
-                uint lanes = subgroupBallotBitCount(subgroupBallot(behind[j] && i < element_count));
-                if (subgroupElect()) {
-                    atomicAdd(behind_count[slot], lanes);
-                }
-            } else {
-                passed_over[j] += behind[j] ? 1 : 0;
+            uint of_slot = 0;
+            for (uint j = 0; j < SORT_ELEMENTS; j++) {
+                uint i = first + j * gl_SubgroupSize;
+                bool mine = i < element_count && kind[j] < RECEIVE_KINDS;
+                append(slot, kind[j], mine && (near[j] || seen[j]), i);
+                of_slot += subgroupBallotBitCount(subgroupBallot(i < element_count && kind[j] == RECEIVE_KINDS));
+            }
+            passed_over += of_slot;
+            if (AWAY_BY_SLOT == 1 && subgroupElect()) {
+                atomicAdd(away_count[slot], of_slot);
             }
         }
     }
-    for (uint j = 0; j < SORT_ELEMENTS; j++) {
-        uint i = first + j * gl_SubgroupSize;
-        if (BEHIND_BY_SLOT == 0 && i < element_count) {
-            behind_count[first_element + i] += passed_over[j];
-        }
+    if (AWAY_BY_SLOT == 0 && in_range > 0 && subgroupElect()) {
+        away_count[first_element + begin] += passed_over;
     }
 }

@@ -56,6 +56,17 @@ struct Meshlet {
     uint component;
 };
 
+// GROUP consecutive elements, fewer at the end, as receivers.
+struct ReceiverBlock {
+    vec3 centre;       // of the ball and of the cylinder about the axis that hold their centroids
+    float radius;
+    vec3 axis;         // of the cone of their normals
+    float half_height; // of the cylinder
+    float cone_sin;    // a cone wider than a quarter turn to each side passes for that
+    float cone_cos;
+    float largest;     // radius of an element
+};
+
 // A connected part of the mesh.
 struct Component {
     vec3 low;

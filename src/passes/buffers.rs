@@ -5,6 +5,7 @@ use std::sync::Arc;
 use bytemuck::Pod;
 use glam::Vec3;
 
+use super::receiver_blocks::receiver_blocks;
 use super::types::{Component, KeptRow, Meshlet, Progress, Source, Triangle, contour_corners};
 use crate::charts::Connections;
 use crate::constants::NONE;
@@ -37,6 +38,8 @@ pub struct SceneBuffers {
     pub planes: Buffer,
     /// Centroid and radius.
     pub balls: Buffer,
+    /// Blocks of GROUP elements without relief, then of those with it.
+    pub receiver_blocks: Buffer,
     pub areas: Buffer,
     /// Of an element with a relief: that of even light.
     pub reflectance: Buffer,
@@ -130,6 +133,12 @@ impl SceneBuffers {
             parts: upload(device, "parts", &parts, BufferUse::Storage)?,
             planes: upload(device, "planes", &planes, BufferUse::Storage)?,
             balls: upload(device, "balls", &balls, BufferUse::Storage)?,
+            receiver_blocks: upload(
+                device,
+                "receiver blocks",
+                &receiver_blocks(elements),
+                BufferUse::Storage,
+            )?,
             areas: upload(device, "areas", &areas, BufferUse::Storage)?,
             reflectance: upload(
                 device,
@@ -176,8 +185,8 @@ pub struct State {
     pub direct_error: Buffer,
     pub indirect: Buffer,
     pub indirect_error: Buffer,
-    /// Shots that each element passed over because the source was behind it.
-    pub behind: Buffer,
+    /// Pairs of shot and element that faced away from one another, each counted at one of the elements about it.
+    pub facing_away: Buffer,
     pub shot: Buffer,
     pub unshot: Buffer,
     pub progress: Buffer,
@@ -196,7 +205,7 @@ impl State {
             direct_error: zeroed("direct error", 12 * elements)?,
             indirect: zeroed("indirect", 12 * elements)?,
             indirect_error: zeroed("indirect error", 12 * elements)?,
-            behind: zeroed("behind", 4 * elements)?,
+            facing_away: zeroed("facing away", 4 * elements)?,
             shot: zeroed("shot", 16 * sources)?,
             unshot: zeroed("unshot", 16 * sources)?,
             progress: zeroed("progress", size_of::<Progress>() as u64)?,

@@ -30,13 +30,22 @@ pub enum SeenBy {
     ShadowRays,
 }
 
-/// How elements are counted that a source lies behind.
+/// How elements are counted that see nothing of a source, whatever stands between: it lies behind them or shows them its back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Behind {
-    /// Shots by element, over all batches.
+pub enum FacingAway {
+    /// At one of a few neighbouring elements, over all batches.
     ByElement,
-    /// Elements by slot, of one batch.
+    /// By slot, of one batch.
     BySlot,
+}
+
+/// How receivers are sorted.
+#[derive(Debug, Clone, Copy)]
+pub struct Sorting {
+    pub seen_by: SeenBy,
+    pub facing_away: FacingAway,
+    /// Whether blocks of elements that see nothing of a source are passed over as a whole. The lists are the same.
+    pub culls: bool,
 }
 
 /// Sets of [`FormFactors`].
@@ -68,7 +77,7 @@ struct Parameters {
 
 /// Place of the item buffer, or of the tree's nodes, among the bindings, and how many there are for sorting and in all.
 const ITEMS: usize = 6;
-const SORT: usize = 8;
+const SORT: usize = 9;
 const PLAIN: usize = 12;
 
 fn pipeline(
@@ -95,12 +104,8 @@ fn pipeline(
 }
 
 impl FormFactors {
-    pub fn new(
-        device: &Arc<Device>,
-        with_relief: bool,
-        behind: Behind,
-        seen_by: SeenBy,
-    ) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, with_relief: bool, sorting: Sorting) -> Result<Self> {
+        let seen_by = sorting.seen_by;
         let kinds = |shader, bindings| -> Result<Vec<_>> {
             (0..RECEIVE_KINDS)
                 .map(|kind| pipeline(device, shader, bindings, (seen_by, &[kind])))
@@ -118,12 +123,13 @@ impl FormFactors {
                 shaders::FORM_FACTORS_RELIEF_RAYS_COMP,
             ],
         };
-        let by_slot = [(behind == Behind::BySlot).into()];
+        let by_slot = sorting.facing_away == FacingAway::BySlot;
+        let sort_constants = [by_slot.into(), sorting.culls.into()];
         let sort = ("sort receivers", sort);
         let plain = ("form factors", plain);
         let meso = ("form factors to relief", meso);
         Ok(Self {
-            sort: pipeline(device, sort, SORT, (seen_by, &by_slot))?,
+            sort: pipeline(device, sort, SORT, (seen_by, &sort_constants))?,
             plain: kinds(plain, PLAIN)?,
             meso: if with_relief {
                 kinds(meso, PLAIN + 1)?
@@ -138,11 +144,11 @@ impl FormFactors {
         [factors.plain_count, factors.meso_count].map(|count| groups(count.div_ceil(SORT_ELEMENTS)))
     }
 
-    /// `behind` counts as [`Behind`] says; `meso` are the elements with a relief.
+    /// `facing_away` counts as [`FacingAway`] says; `meso` are the elements with a relief.
     pub fn bind(
         &self,
         device: &Arc<Device>,
-        (scene, behind): (&SceneBuffers, &Buffer),
+        (scene, facing_away): (&SceneBuffers, &Buffer),
         batch: &Batch,
         factors: &FactorBuffers,
         meso: Option<&Buffer>,
@@ -167,7 +173,8 @@ impl FormFactors {
                 .map(Bind::Buffer)
                 .to_vec();
                 binds.push(seen);
-                let mut sort = [&binds[..], &[Bind::Buffer(behind)]].concat();
+                let mut sort = binds.clone();
+                sort.extend([facing_away, &scene.receiver_blocks].map(Bind::Buffer));
                 sort.extend(last);
                 let sort = self.sort.bind("sort receivers", &sort)?;
                 let rest = [
@@ -246,7 +253,7 @@ impl FormFactors {
                 let push = parameters(range, first..first + at_once);
                 cmd.dispatch_indirect(&self.sort, &range.sort, &push, (&batch.drawn_commands, at));
             }
-            // What lies behind is counted by the next ones too.
+            // What faces away is counted by the next ones too.
             cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         }
         // Every element is in one list of a slot at most.

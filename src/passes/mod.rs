@@ -16,6 +16,7 @@ pub mod normalise;
 pub mod occluder_tree;
 pub mod pixels_relief;
 pub mod recall;
+pub mod receiver_blocks;
 pub mod relief;
 pub mod relief_buffers;
 pub mod relief_rays;

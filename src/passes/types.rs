@@ -127,6 +127,21 @@ impl From<&meshlets::Meshlet> for Meshlet {
     }
 }
 
+/// Consecutive elements as receivers: bounds of their centroids and normals.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct ReceiverBlock {
+    pub centre: Vec3,
+    pub radius: f32,
+    pub axis: Vec3,
+    /// Of the cylinder about the axis.
+    pub half_height: f32,
+    pub cone_sin: f32,
+    pub cone_cos: f32,
+    /// Radius of an element.
+    pub largest: f32,
+}
+
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub struct Component {

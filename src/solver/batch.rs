@@ -243,9 +243,9 @@ impl BatchLoop {
         }
     }
 
-    /// Pairs of shot and element in which the source lay behind the element, where several devices counted them.
-    pub(super) fn behind(&self) -> u64 {
-        self.several.as_ref().map_or(0, Several::behind)
+    /// Pairs of shot and element that faced away from one another, where several devices counted them.
+    pub(super) fn facing_away(&self) -> u64 {
+        self.several.as_ref().map_or(0, Several::facing_away)
     }
 
     fn batch(&mut self, i: usize) -> &mut Commands {
@@ -331,7 +331,7 @@ impl Passes {
             select: Select::new(device)?,
             cull: Cull::new(device, settings.culling)?,
             item_buffer,
-            estimate: Estimate::new(device, settings.estimator, on)?,
+            estimate: Estimate::new(device, settings, on)?,
             relief: relief.transpose()?,
         })
     }

@@ -10,9 +10,9 @@ use crate::constants::{FACES, NONE};
 use crate::error::Result;
 use crate::passes::batch::{Batch, Hemicubes};
 use crate::passes::buffers::{SceneBuffers, filled, upload, write};
-use crate::passes::cull::Cull;
+use crate::passes::cull::{Cull, Culling};
 use crate::passes::factor_buffers::FactorBuffers;
-use crate::passes::form_factors::{self, Behind, FormFactors, SeenBy};
+use crate::passes::form_factors::{self, FacingAway, FormFactors, SeenBy, Sorting};
 use crate::passes::item_buffer::ItemBuffer;
 use crate::passes::normalise::Normalise;
 use crate::passes::types::{Draw, MesoElement, ReceiverList, Slot};
@@ -34,8 +34,8 @@ pub(super) struct Row {
     /// `[face]`, as in [`super::BatchResult`].
     pub counts: Vec<[u32; 2]>,
     pub draws: Vec<Draw>,
-    /// Elements that the source lies behind.
-    pub behind: u32,
+    /// Elements that see nothing of the source, whatever stands between.
+    pub facing_away: u32,
 }
 
 /// Words of a [`Row`]'s lists.
@@ -119,15 +119,25 @@ impl Drawer {
             [] => None,
             meso => Some(upload(device, "meso elements", meso, BufferUse::Storage)?),
         };
-        let behind = filled(device, "behind", 4 * u64::from(slots), 0)?;
+        let facing_away = filled(device, "facing away", 4 * u64::from(slots), 0)?;
         let cull = Cull::new(device, settings.culling)?;
-        let form_factors =
-            FormFactors::new(device, meso.is_some(), Behind::BySlot, SeenBy::ItemBuffer)?;
+        let sorting = Sorting {
+            seen_by: SeenBy::ItemBuffer,
+            facing_away: FacingAway::BySlot,
+            culls: settings.culling != Culling::Off,
+        };
+        let form_factors = FormFactors::new(device, meso.is_some(), sorting)?;
         let normalise = (scene.enclosed.then(|| Normalise::new(device))).transpose()?;
         let sets = (
             cull.bind(scene, &batch)?,
             item_buffer.bind(&batch)?,
-            form_factors.bind(device, (scene, &behind), &batch, &factors, meso.as_ref())?,
+            form_factors.bind(
+                device,
+                (scene, &facing_away),
+                &batch,
+                &factors,
+                meso.as_ref(),
+            )?,
             (normalise.as_ref().map(|n| n.bind(scene, &batch, &factors))).transpose()?,
         );
         // Something is always drawn.
@@ -150,7 +160,7 @@ impl Drawer {
             cmd.barrier(&used, &[Stage::Transfer]);
             cmd.copy(&wanted, 0, &batch.slots, 0, bytes);
             cmd.fill(&factors.occupied, 0);
-            cmd.fill(&behind, 0);
+            cmd.fill(&facing_away, 0);
             cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
             cmd.timestamp(&timestamps, 0);
             cull.record(cmd, &sets.0, scene, &batch);
@@ -166,7 +176,7 @@ impl Drawer {
             }
             cmd.timestamp(&timestamps, 3);
             cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
-            layout.record(cmd, &batch, &factors, &behind, &readback);
+            layout.record(cmd, &batch, &factors, &facing_away, &readback);
             cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
             Ok(())
         })?;
@@ -179,7 +189,7 @@ impl Drawer {
             slots,
             _sets: sets,
             _passes: (cull, item_buffer, form_factors, normalise),
-            _buffers: (batch, factors, behind, meso),
+            _buffers: (batch, factors, facing_away, meso),
             _scene: None,
         })
     }
@@ -226,7 +236,7 @@ struct Layout {
     chosen: u64,
     counts: u64,
     draws: u64,
-    behind: u64,
+    facing_away: u64,
     bytes: u64,
 }
 
@@ -239,7 +249,7 @@ impl Layout {
         let chosen = occupied + 4 * slots * words.occupied;
         let counts = chosen + slots * size_of::<Slot>() as u64;
         let draws = counts + faces * size_of::<[u32; 2]>() as u64;
-        let behind = draws + faces * size_of::<Draw>() as u64;
+        let facing_away = draws + faces * size_of::<Draw>() as u64;
         Self {
             slots,
             meso,
@@ -247,8 +257,8 @@ impl Layout {
             chosen,
             counts,
             draws,
-            behind,
-            bytes: behind + 4 * slots,
+            facing_away,
+            bytes: facing_away + 4 * slots,
         }
     }
 
@@ -257,7 +267,7 @@ impl Layout {
         cmd: &Commands,
         batch: &Batch,
         factors: &FactorBuffers,
-        behind: &Buffer,
+        facing_away: &Buffer,
         to: &Buffer,
     ) {
         for (from, at, end) in [
@@ -266,8 +276,8 @@ impl Layout {
             (&factors.occupied, self.occupied, self.chosen),
             (&batch.slots, self.chosen, self.counts),
             (&batch.hemicubes().counts, self.counts, self.draws),
-            (&batch.hemicubes().draws, self.draws, self.behind),
-            (behind, self.behind, self.bytes),
+            (&batch.hemicubes().draws, self.draws, self.facing_away),
+            (facing_away, self.facing_away, self.bytes),
         ] {
             cmd.copy(from, 0, to, at, end - at);
         }
@@ -287,7 +297,7 @@ impl Layout {
             scale: slot.scale,
             counts: from.read(counts, faces as usize),
             draws: from.read(draws, faces as usize),
-            behind: from.read(self.behind + 4 * i, 1)[0],
+            facing_away: from.read(self.facing_away + 4 * i, 1)[0],
         }
     }
 }

@@ -3,12 +3,13 @@
 
 use std::sync::Arc;
 
-use super::Estimator;
 use super::batch::OnDevice;
+use super::{Estimator, Settings};
 use crate::error::Result;
 use crate::passes::batch::{Batch, Sight};
 use crate::passes::bin_pixels::{self, BinPixels};
-use crate::passes::form_factors::{self, Behind, FormFactors, SeenBy};
+use crate::passes::cull::Culling;
+use crate::passes::form_factors::{self, FacingAway, FormFactors, SeenBy, Sorting};
 use crate::passes::gather::{self, Gather, GatherRelief};
 use crate::passes::keep::{self, Keep};
 use crate::passes::measure_relief::MeasureRelief;
@@ -32,6 +33,8 @@ pub(super) enum Sending {
 pub(super) enum Estimate {
     Receivers {
         form_factors: FormFactors,
+        /// See [`Sorting`].
+        culls: bool,
         /// In enclosed scenes.
         normalise: Option<Normalise>,
         /// None where nothing is to be kept.
@@ -68,13 +71,23 @@ pub(super) enum GatherSets {
     Relief(gather::ReliefSets),
 }
 
-fn form_factors(device: &Arc<Device>, on: &OnDevice<'_>, seen_by: SeenBy) -> Result<FormFactors> {
-    FormFactors::new(device, on.relief.is_some(), Behind::ByElement, seen_by)
+fn form_factors(
+    device: &Arc<Device>,
+    on: &OnDevice<'_>,
+    (seen_by, culls): (SeenBy, bool),
+) -> Result<FormFactors> {
+    let sorting = Sorting {
+        seen_by,
+        facing_away: FacingAway::ByElement,
+        culls,
+    };
+    FormFactors::new(device, on.relief.is_some(), sorting)
 }
 
 impl Estimate {
-    pub fn new(device: &Arc<Device>, estimator: Estimator, on: &OnDevice<'_>) -> Result<Self> {
-        let Some(factors) = on.factors.filter(|_| estimator == Estimator::Receiver) else {
+    pub fn new(device: &Arc<Device>, settings: &Settings, on: &OnDevice<'_>) -> Result<Self> {
+        let receives = settings.estimator == Estimator::Receiver;
+        let Some(factors) = on.factors.filter(|_| receives) else {
             return Ok(match on.relief {
                 Some(_) => Self::PixelsRelief(PixelsRelief::new(device)?),
                 None => Self::Pixels(BinPixels::new(device)?),
@@ -82,8 +95,10 @@ impl Estimate {
         };
         let normalise = on.scene.enclosed.then(|| Normalise::new(device));
         let keep = factors.keeps().then(|| Keep::new(device));
+        let culls = settings.culling != Culling::Off;
         Ok(Self::Receivers {
-            form_factors: form_factors(device, on, SeenBy::ItemBuffer)?,
+            form_factors: form_factors(device, on, (SeenBy::ItemBuffer, culls))?,
+            culls,
             normalise: normalise.transpose()?,
             keep: keep.transpose()?,
             gather: match on.relief {
@@ -99,6 +114,7 @@ impl Estimate {
             (
                 Self::Receivers {
                     form_factors,
+                    culls,
                     normalise,
                     keep,
                     gather,
@@ -108,12 +124,16 @@ impl Estimate {
             ) => {
                 let by_rays = match batch.sight {
                     Sight::Hemicubes(_) => None,
-                    Sight::Rays(_) => Some(self::form_factors(device, on, SeenBy::ShadowRays)?),
+                    Sight::Rays(_) => Some(self::form_factors(
+                        device,
+                        on,
+                        (SeenBy::ShadowRays, *culls),
+                    )?),
                 };
                 Bound::Receivers {
                     form_factors: by_rays.as_ref().unwrap_or(form_factors).bind(
                         device,
-                        (scene, &state.behind),
+                        (scene, &state.facing_away),
                         batch,
                         factors,
                         relief.map(|relief| &relief.elements),

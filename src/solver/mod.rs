@@ -336,9 +336,10 @@ impl Solver {
             };
             report.kept_sources = state.rows.into();
         }
-        let behind: Vec<u32> = download(&self.device, &self.state.behind, self.elements.len())?;
-        let behind: u64 = behind.iter().map(|&b| u64::from(b)).sum();
-        report.skipped.receivers_behind_source = behind + self.batches.behind();
+        let facing_away = &self.state.facing_away;
+        let away: Vec<u32> = download(&self.device, facing_away, self.elements.len())?;
+        let away: u64 = away.iter().map(|&a| u64::from(a)).sum();
+        report.skipped.receivers_facing_away = away + self.batches.facing_away();
         if let Some(relief) = &self.relief {
             let sources = relief.source_count as usize;
             let dark: Vec<u32> = download(&self.device, &relief.dark_slots, sources)?;

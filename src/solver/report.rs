@@ -54,8 +54,8 @@ pub struct Skipped {
     pub meshlets_culled: u64,
     /// Triangles of the other meshlets that a face did not draw.
     pub triangles_culled: u64,
-    /// Pairs of shot and element in which the source lay behind the element.
-    pub receivers_behind_source: u64,
+    /// Pairs of shot and element that faced away from one another.
+    pub receivers_facing_away: u64,
     /// Slots that held no light when their element was to send by direction.
     pub dark_slots: u64,
 }

@@ -56,8 +56,8 @@ pub(super) struct Several {
     gathering: bool,
     team: Team,
     schedule: Schedule,
-    /// Pairs of shot and element in which the source lay behind the element.
-    behind: u64,
+    /// Pairs of shot and element that faced away from one another.
+    facing_away: u64,
 }
 
 /// The same, as sources with a relief send.
@@ -146,13 +146,13 @@ impl Several {
             parameters,
             gathering: false,
             team,
-            behind: 0,
+            facing_away: 0,
         })
     }
 
-    /// Pairs of shot and element in which the source lay behind the element.
-    pub fn behind(&self) -> u64 {
-        self.behind
+    /// Pairs of shot and element that faced away from one another.
+    pub fn facing_away(&self) -> u64 {
+        self.facing_away
     }
 
     /// As [`super::batch::BatchLoop::run`]: one more batch follows the one at which `look` says no.
@@ -200,7 +200,10 @@ impl Several {
         } else {
             self.choose.of(sending).submit()?;
         }
-        self.behind += rows.iter().map(|row| u64::from(row.behind)).sum::<u64>();
+        self.facing_away += rows
+            .iter()
+            .map(|row| u64::from(row.facing_away))
+            .sum::<u64>();
         let faces = FACES as usize * self.put.len();
         let mut counts: Vec<_> = rows.iter().flat_map(|r| r.counts.iter().copied()).collect();
         let mut draws: Vec<_> = rows.iter().flat_map(|r| r.draws.iter().copied()).collect();

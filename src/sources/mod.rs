@@ -17,7 +17,7 @@ use crate::elements::Elements;
 use crate::error::{Error, Result};
 use crate::scene::PointLight;
 use group::{Shape, bisect, group, holds};
-use near::near_others;
+use near::Surroundings;
 use single::{halves, part, point};
 
 /// Where groups are cut.
@@ -169,10 +169,10 @@ pub fn build(
     let mut chart_of = Vec::with_capacity(elements.len());
     let mut charts = charts(elements, &connections, &morton_order(elements));
     let reach = (grouping.max_area * total_area).sqrt();
-    let near = near_others(elements, &charts, reach);
     // Elements with a relief come last, and so do their sources.
     charts.sort_by_key(|chart| elements.is_meso(chart[0] as usize));
-    for (c, chart) in charts.into_iter().enumerate() {
+    let surroundings = Surroundings::new(elements, &charts, reach);
+    for (c, chart) in (0_u32..).zip(charts) {
         let mut stack = vec![chart];
         while let Some(mut members) = stack.pop() {
             let area = members.iter().map(|&e| elements.area[e as usize]).sum();
@@ -182,7 +182,7 @@ pub fn build(
             let many = members.len() > grouping.max_elements && !plane;
             let uneven = plane
                 && area > grouping.max_area_near * total_area
-                && members.iter().any(|&e| near[e as usize]);
+                && members.iter().any(|&e| surroundings.any_before(e, c));
             let large = many || uneven || too_much(area, emitted);
             if large && members.len() > 1 {
                 let at = bisect(elements, &mut members);
@@ -190,7 +190,7 @@ pub fn build(
                 stack.push(members);
             } else {
                 groups.push((order.len() as u32, members.len() as u32));
-                chart_of.extend(std::iter::repeat_n(c as u32, members.len()));
+                chart_of.extend(std::iter::repeat_n(c, members.len()));
                 order.extend(members);
             }
         }

@@ -1,50 +1,129 @@
 //! Which elements have another surface close before them: light there changes over short ways, and falls on it unevenly.
 
-use std::collections::HashMap;
+use std::time::Duration;
 
-use glam::{DVec3, IVec3};
+use glam::DVec3;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::builder::build_bvh2;
+use obvhs::{Boundable, BvhBuildParams};
 
 use crate::elements::Elements;
 
 /// Heights above an element's plane below which a place lies in the plane, in internal units.
 const FLAT: f64 = 1e-6;
 
-/// Per element: whether anything of another chart lies before it within `reach` of its centroid.
-pub(super) fn near_others(elements: &Elements, charts: &[Vec<u32>], reach: f64) -> Vec<bool> {
-    let cell = |p: DVec3| (p / reach).floor().as_ivec3();
-    // Places on the triangles, no more than `reach` apart, by chart.
-    let mut places: HashMap<IVec3, Vec<(u32, Vec<DVec3>)>> = HashMap::new();
-    for (c, chart) in (0_u32..).zip(charts) {
-        for &e in chart {
-            for place in spread(elements.triangle(e as usize), reach) {
-                let here = places.entry(cell(place)).or_default();
-                match here.last_mut() {
-                    Some((last, places)) if *last == c => places.push(place),
-                    _ => here.push((c, vec![place])),
-                }
+/// Boxes are wider than what they hold: coordinates of 1 in f32.
+const BOX_MARGIN: f32 = 1.0 / (1 << 22) as f32;
+
+/// A place on a triangle, and the chart that the triangle is of.
+struct Place(DVec3, u32);
+
+impl Boundable for Place {
+    fn aabb(&self) -> Aabb {
+        let mut bounds = Aabb::from_point(self.0.as_vec3a());
+        bounds.min -= BOX_MARGIN;
+        bounds.max += BOX_MARGIN;
+        bounds
+    }
+}
+
+/// Places on all triangles, no more than `reach` apart, in a tree of boxes.
+pub(super) struct Surroundings<'a> {
+    elements: &'a Elements,
+    reach: f64,
+    places: Vec<Place>,
+    bvh: Bvh2,
+    /// The chart of all places in a node, where it is one, `[node]`.
+    charts: Vec<Option<u32>>,
+}
+
+impl<'a> Surroundings<'a> {
+    pub fn new(elements: &'a Elements, charts: &[Vec<u32>], reach: f64) -> Self {
+        let mut places = Vec::new();
+        for (c, chart) in (0_u32..).zip(charts) {
+            for &e in chart {
+                let of_element = spread(elements.triangle(e as usize), reach);
+                places.extend(of_element.map(|place| Place(place, c)));
             }
         }
-    }
-    let mut near = vec![false; elements.len()];
-    let square = reach * reach;
-    for (c, chart) in (0_u32..).zip(charts) {
-        for &e in chart {
-            let (middle, normal) = (elements.centroid[e as usize], elements.normal[e as usize]);
-            let before = |place: &DVec3| {
-                let way = *place - middle;
-                way.length_squared() <= square && way.dot(normal) > FLAT
-            };
-            let home = cell(middle);
-            near[e as usize] = (0..27).any(|i| {
-                let beside = IVec3::new(i % 3, i / 3 % 3, i / 9) - 1;
-                let others = places.get(&(home + beside)).into_iter().flatten();
-                others
-                    .filter(|(of, _)| *of != c)
-                    .any(|(_, places)| places.iter().any(before))
-            });
+        let params = BvhBuildParams::fast_build();
+        let bvh = build_bvh2(&places, params, &mut Duration::default());
+        let charts = charts_of_nodes(&bvh, &places);
+        Self {
+            elements,
+            reach,
+            places,
+            bvh,
+            charts,
         }
     }
-    near
+
+    /// Whether anything of another chart lies before an element of this chart within `reach` of its centroid.
+    pub fn any_before(&self, element: u32, chart: u32) -> bool {
+        let (middle, normal) = (
+            self.elements.centroid[element as usize],
+            self.elements.normal[element as usize],
+        );
+        let square = self.reach * self.reach;
+        let before = |&place: &u32| {
+            let Place(place, of) = self.places[place as usize];
+            let way = place - middle;
+            of != chart && way.length_squared() <= square && way.dot(normal) > FLAT
+        };
+        let mut nodes = vec![0];
+        while let Some(n) = nodes.pop() {
+            let node = &self.bvh.nodes[n];
+            let (low, high) = (
+                node.aabb.min.as_dvec3() - middle,
+                node.aabb.max.as_dvec3() - middle,
+            );
+            let nearest = DVec3::ZERO.clamp(low, high);
+            let highest = (low * normal).max(high * normal).element_sum();
+            if self.charts[n] == Some(chart) || nearest.length_squared() > square || highest <= FLAT
+            {
+                continue;
+            }
+            let first = node.first_index as usize;
+            if !node.is_leaf() {
+                nodes.extend([first, first + 1]);
+                continue;
+            }
+            let own = first..first + node.prim_count as usize;
+            if self.bvh.primitive_indices[own].iter().any(before) {
+                return true;
+            }
+        }
+        false
+    }
+}
+
+fn charts_of_nodes(bvh: &Bvh2, places: &[Place]) -> Vec<Option<u32>> {
+    // Parents before their children.
+    let mut order = vec![0];
+    let mut next = 0;
+    while next < order.len() {
+        let node = &bvh.nodes[order[next]];
+        let first = node.first_index as usize;
+        if !node.is_leaf() {
+            order.extend([first, first + 1]);
+        }
+        next += 1;
+    }
+    let mut charts = vec![None; bvh.nodes.len()];
+    for &n in order.iter().rev() {
+        let node = &bvh.nodes[n];
+        let first = node.first_index as usize;
+        charts[n] = if node.is_leaf() {
+            let own = &bvh.primitive_indices[first..first + node.prim_count as usize];
+            let chart = |place: u32| places[place as usize].1;
+            let one = own.iter().all(|&place| chart(place) == chart(own[0]));
+            one.then(|| chart(own[0]))
+        } else {
+            charts[first].filter(|_| charts[first] == charts[first + 1])
+        };
+    }
+    charts
 }
 
 /// Middles of equal parts of a triangle, no part longer than `most`.
@@ -71,7 +150,7 @@ mod tests {
     use crate::charts::{Connections, charts, morton_order};
     use crate::scene::{BuiltinOptions, load};
 
-    /// The grid finds what a look at all pairs finds.
+    /// The tree finds what a look at all pairs finds.
     #[test]
     fn elements_near_others_are_those_of_all_pairs() {
         let options = BuiltinOptions {
@@ -88,8 +167,11 @@ mod tests {
         }
         // Longer than any element, each of which is thus one place.
         let reach = 0.15;
-        let near = near_others(&elements, &charts, reach);
-        for (e, &near) in near.iter().enumerate() {
+        let surroundings = Surroundings::new(&elements, &charts, reach);
+        let mut found = [0, 0];
+        for e in 0..elements.len() {
+            let near = surroundings.any_before(e as u32, chart_of[e]);
+            found[usize::from(near)] += 1;
             let sees = |other: usize| {
                 let way = elements.centroid[other] - elements.centroid[e];
                 chart_of[other] != chart_of[e]
@@ -98,6 +180,6 @@ mod tests {
             };
             assert_eq!(near, (0..elements.len()).any(sees), "element {e}");
         }
-        assert!(near.contains(&true) && near.contains(&false));
+        assert!(found[0] > 0 && found[1] > 0, "{found:?}");
     }
 }
