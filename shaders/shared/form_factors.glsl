@@ -103,9 +103,18 @@ FLUX parts_as_points(vec3 p, vec3 n, Source s) {
 // Of the members that show p their fronts, exactly.
 FLUX members(vec3 p, vec3 n, uint element, Source s) {
     FLUX sum = FLUX(0.0);
-    for (uint i = 0; i < s.element_count; i++) {
-        uint member = s.first_element + i;
-        Triangle t = load_triangle(member);
+    uint member = s.first_element;
+    uint end = member + s.element_count;
+    while (member < end) {
+        // On to the next one that shows its front to any lane, in a loop of its own: a software device works through what a branch
+        // leaves out.
+        Triangle t;
+        bool shows;
+        do {
+            t = load_triangle(member);
+            shows = member != element && dot(t.normal, p) > t.height;
+            member++;
+        } while (subgroupBallot(shows) == uvec4(0) && member < end);
         vec3 a = t.a - p;
         vec3 b = t.b - p;
         vec3 c = t.c - p;
@@ -114,7 +123,6 @@ FLUX members(vec3 p, vec3 n, uint element, Source s) {
         contour_edge(contour, b, c, n);
         contour_edge(contour, c, a, n);
         contour_close(contour, n);
-        bool shows = member != element && dot(t.normal, p) > t.height;
         sum += shows ? flux_above(contour_form_factor(contour), n) : FLUX(0.0);
     }
     return sum;
@@ -193,16 +201,17 @@ FLUX mean_form_factor(uint element, vec4 ball, vec3 n, Source s) {
     float gap = length(ball.xyz - s.middle) - s.radius;
     bool near = gap <= NEAR * ball.w;
     bool touching = gap <= ball.w;
-    bool any_near = subgroupAny(near);
+    uint first = touching ? 4 : near ? 1 : 0;
+    uint count = touching ? 7 : near ? 3 : 1;
+    uint most = subgroupBallot(touching) != uvec4(0) ? 7 : subgroupBallot(near) != uvec4(0) ? 3 : 1;
     vec3 a = own_corner(element, 0);
     vec3 ab = own_corner(element, 1) - a;
     vec3 ac = own_corner(element, 2) - a;
     FLUX sum = FLUX(0.0);
-    for (uint i = 0; i < (any_near ? 11 : 1); i++) {
-        bool mine = i == 0 ? !near : i < 4 ? near && !touching : near && touching;
-        vec3 point = POINTS[i];
-        vec3 p = before_plane(i == 0 ? ball.xyz : a + point.x * ab + point.y * ac, n, s);
-        mine = mine && shows_front(s, p);
+    for (uint i = 0; i < most; i++) {
+        vec3 point = POINTS[min(first + i, 10)];
+        vec3 p = before_plane(near ? a + point.x * ab + point.y * ac : ball.xyz, n, s);
+        bool mine = i < count && shows_front(s, p);
         bool open = visible(p, n, element, s, mine && near);
         // What is not near was looked at when it was sorted.
         mine = mine && (open || !near);

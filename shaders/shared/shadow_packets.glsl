@@ -80,36 +80,38 @@ void look(Source s, vec4 p[RAYS], vec3 n[RAYS], inout bool open[RAYS]) {
     uint count = node_words[3];
     uint at = 0;
     while (at < count) {
-        uvec4 low_word;
-        uvec4 high_word;
-        LOAD8(node_words, NODE_WORDS * at, low_word, high_word)
-        vec3 low = uintBitsToFloat(low_word.xyz) - s.eye;
-        vec3 high = uintBitsToFloat(high_word.xyz) - s.eye;
+        // On to the next leaf that a ray enters, in a loop of its own: a software device works through what a branch leaves out.
         // A ray is asked of no triangle whose box it misses: what it meets is the same in any company.
         bool enters[RAYS];
-        bool any_enters = false;
-        for (uint r = 0; r < RAYS; r++) {
-            vec3 one = low * each[r];
-            vec3 other = high * each[r];
-            vec3 in_at = min(one, other);
-            vec3 out_at = max(one, other);
-            float enter = max(max(in_at.x, in_at.y), max(in_at.z, begin[r]));
-            float leave = min(min(out_at.x, out_at.y), min(out_at.z, end[r]));
-            enters[r] = open[r] && enter <= leave;
-            any_enters = any_enters || enters[r];
-        }
-        // A ballot, since lavapipe goes through all lanes for a vote.
-        if (subgroupBallot(any_enters) == uvec4(0)) {
-            at = low_word.w;
-            continue;
-        }
-        uint first = high_word.w / LEAF_TRIANGLES;
-        for (uint i = first; i < first + high_word.w % LEAF_TRIANGLES; i++) {
+        uint leaf = 0;
+        do {
+            uvec4 low_word;
+            uvec4 high_word;
+            LOAD8(node_words, NODE_WORDS * at, low_word, high_word)
+            vec3 low = uintBitsToFloat(low_word.xyz) - s.eye;
+            vec3 high = uintBitsToFloat(high_word.xyz) - s.eye;
+            bool any_enters = false;
+            for (uint r = 0; r < RAYS; r++) {
+                vec3 one = low * each[r];
+                vec3 other = high * each[r];
+                vec3 in_at = min(one, other);
+                vec3 out_at = max(one, other);
+                float enter = max(max(in_at.x, in_at.y), max(in_at.z, begin[r]));
+                float leave = min(min(out_at.x, out_at.y), min(out_at.z, end[r]));
+                enters[r] = open[r] && enter <= leave;
+                any_enters = any_enters || enters[r];
+            }
+            // A ballot, since lavapipe goes through all lanes for a vote.
+            bool entered = subgroupBallot(any_enters) != uvec4(0);
+            leaf = entered ? high_word.w : 0;
+            at = entered ? at + 1 : low_word.w;
+        } while (leaf == 0 && at < count);
+        uint first = leaf / LEAF_TRIANGLES;
+        for (uint i = first; i < first + leaf % LEAF_TRIANGLES; i++) {
             Met t = met(s, i);
             for (uint r = 0; r < RAYS; r++) {
                 open[r] = open[r] && !(enters[r] && stands_in(t, way[r]));
             }
         }
-        at++;
     }
 }

@@ -23,7 +23,8 @@ use single::{halves, part, point};
 /// Where groups are cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grouping {
-    /// Most elements of a source that is curved or has a relief: a plane one's outline stands for any number.
+    /// Most elements of a source that is curved or has a relief: a plane one's outline stands for any number. Where more than
+    /// [`Self::MANY`] elements are curved, curved sources have more, as the square root of their number.
     pub max_elements: usize,
     /// Most area of a source, as a share of the scene's.
     pub max_area: f64,
@@ -32,6 +33,18 @@ pub struct Grouping {
     pub max_area_near: f64,
     /// Most emitted power of a source, as a share of the scene's.
     pub max_power: f64,
+}
+
+impl Grouping {
+    /// The work of drawing is that of sources times elements, and that of what lies near a source that of elements times the members of a
+    /// source. With members as the square root of the elements both grow alike, and sources still become smaller.
+    pub const MANY: usize = 1 << 15;
+
+    /// Most elements of a curved source without relief, where so many are curved in all.
+    fn most_curved(&self, curved: usize) -> usize {
+        let times = (curved as f64 / Self::MANY as f64).sqrt().max(1.0);
+        (self.max_elements as f64 * times) as usize
+    }
 }
 
 impl Default for Grouping {
@@ -171,6 +184,9 @@ pub fn build(
     let reach = (grouping.max_area * total_area).sqrt();
     // Elements with a relief come last, and so do their sources.
     charts.sort_by_key(|chart| elements.is_meso(chart[0] as usize));
+    let is_curved = |chart: &&Vec<u32>| !elements.is_meso(chart[0] as usize) && !is_flat(chart);
+    let curved: usize = charts.iter().filter(is_curved).map(Vec::len).sum();
+    let most_curved = grouping.most_curved(curved);
     let surroundings = Surroundings::new(elements, &charts, reach);
     for (c, chart) in (0_u32..).zip(charts) {
         let mut stack = vec![chart];
@@ -178,8 +194,14 @@ pub fn build(
             let area = members.iter().map(|&e| elements.area[e as usize]).sum();
             let emitted = members.iter().map(|&e| power(e as usize)).sum();
             // A plane group's outline stands for all its members, however many.
-            let plane = !elements.is_meso(members[0] as usize) && is_flat(&members);
-            let many = members.len() > grouping.max_elements && !plane;
+            let relief = elements.is_meso(members[0] as usize);
+            let plane = !relief && is_flat(&members);
+            let most = if relief {
+                grouping.max_elements
+            } else {
+                most_curved
+            };
+            let many = members.len() > most && !plane;
             let uneven = plane
                 && area > grouping.max_area_near * total_area
                 && members.iter().any(|&e| surroundings.any_before(e, c));
@@ -339,5 +361,24 @@ mod tests {
             build(&mut elements, &[], &grouping, 0).0.list.len()
         };
         assert_eq!(count(48), count(usize::MAX));
+    }
+
+    /// Sources of a fine ball are as many as the square root of its elements.
+    #[test]
+    fn sources_of_finer_balls_grow_as_the_square_root() {
+        let count = |levels| {
+            let mut shapes = Shapes::new();
+            shapes.sphere(DVec3::ZERO, 1.0, levels, true, 0);
+            let mut elements = Elements::new(&shapes.scene);
+            let grouping = Grouping {
+                max_area: 1.0,
+                ..Grouping::default()
+            };
+            build(&mut elements, &[], &grouping, 0).0.list.len() as f64
+        };
+        // 20,480 elements, 81,920 and 327,680.
+        let [coarse, fine, finer] = [5, 6, 7].map(count);
+        assert!((1.2..3.0).contains(&(fine / coarse)), "{coarse} {fine}");
+        assert!((1.6..2.5).contains(&(finer / fine)), "{fine} {finer}");
     }
 }

@@ -161,8 +161,8 @@ mod tests {
         let elements = Elements::new(&scene);
         let connections = Connections::new(&elements);
         let charts = charts(&elements, &connections, &morton_order(&elements));
-        let mut chart_of = vec![0; elements.len()];
-        for (c, chart) in charts.iter().enumerate() {
+        let mut chart_of = vec![0_u32; elements.len()];
+        for (c, chart) in (0_u32..).zip(&charts) {
             chart.iter().for_each(|&e| chart_of[e as usize] = c);
         }
         // Longer than any element, each of which is thus one place.

@@ -184,9 +184,11 @@ fn one_pixel(context: &Context) -> Result<Vec<Check>> {
     let mut shapes = Shapes::new();
     let material = furnace_material(&mut shapes, 0.6);
     let sides = shapes.room(DVec3::ZERO, DVec3::ONE, 6, material);
-    // A pixel in the middle of a face is 2/16 of its distance wide.
+    // A pixel in the middle of a face is 2/16 of its distance wide. The walls' emission is drawn as well: shadow rays would aim at
+    // each of the ball's elements.
     let coarse = Settings {
         hemicube: 16,
+        emitter_hemicube: Some(16),
         ..settings()
     };
     let ball = shapes.sphere(DVec3::splat(0.52), 0.01, levels, true, material);
