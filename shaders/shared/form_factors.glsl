@@ -108,13 +108,14 @@ FLUX members(vec3 p, vec3 n, uint element, Source s) {
     while (member < end) {
         // On to the next one that shows its front to any lane, in a loop of its own: a software device works through what a branch
         // leaves out.
-        Triangle t;
         bool shows;
         do {
-            t = load_triangle(member);
-            shows = member != element && dot(t.normal, p) > t.height;
+            float height = LOAD4(triangle_words, member * TRIANGLE_WORDS + 4).w;
+            vec3 normal = LOAD4(triangle_words, member * TRIANGLE_WORDS + 12).xyz;
+            shows = member != element && dot(normal, p) > height;
             member++;
         } while (subgroupBallot(shows) == uvec4(0) && member < end);
+        Triangle t = load_triangle(member - 1);
         vec3 a = t.a - p;
         vec3 b = t.b - p;
         vec3 c = t.c - p;

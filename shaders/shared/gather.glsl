@@ -239,15 +239,22 @@ void main() {
 
     // Each lane looks up one slot and shares it with the others; slots of which the block sees nothing are passed over.
 #ifdef TO_RELIEF
-    for (uint first = first_slot; first < slot_count && part != LOOSE_FACTORS; first += LANES) {
+    uint next = part != LOOSE_FACTORS ? first_slot : slot_count;
 #else
-    for (uint first = 0; first < slot_count; first += LANES) {
+    uint next = 0;
 #endif
-        Sent mine = look_up(first + gl_SubgroupInvocationID);
-        if (first >= fresh_slots && !subgroupAny(mine.source != NONE)) {
-            break;
-        }
-        uvec4 even = subgroupBallot(mine.block != 0);
+    while (next < slot_count) {
+        // On to the next slots of which the block sees any, in a loop of its own: a software device works through what a branch leaves out.
+        uint first;
+        Sent mine;
+        uvec4 even;
+        do {
+            first = next;
+            mine = look_up(first + gl_SubgroupInvocationID);
+            even = subgroupBallot(mine.block != 0);
+            bool last = first >= fresh_slots && subgroupBallot(mine.source != NONE) == uvec4(0);
+            next = last ? slot_count : first + LANES;
+        } while (even == uvec4(0) && next < slot_count);
 #ifdef FROM_RELIEF
         uvec4 directed = subgroupBallot(mine.block != 0 && by_direction(mine.source));
         even &= ~directed;
