@@ -1,5 +1,5 @@
 // Lists the occluders that each face of each chosen hemicube must draw: one subgroup a face, in their order, so that
-// the list is the same every run. A meshlet falls as a whole where the face's frustum or the shooter's horizon leaves it
+// the list is the same every run. Where a list has no room for all, the next part goes on where it ended, once what it holds is drawn. A meshlet falls as a whole where the face's frustum or the shooter's horizon leaves it
 // out or where it shows its back; a triangle falls also where it covers no pixel's centre.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -24,15 +24,19 @@ layout(scalar, binding = 7) writeonly buffer Drawn { uint drawn_corners[]; };
 layout(scalar, binding = 8) writeonly buffer Items { uint drawn_items[]; };
 layout(scalar, binding = 9) writeonly buffer Draws { Draw draws[]; };
 layout(scalar, binding = 10) writeonly buffer Views { View views[]; };
-// [slot][face]: meshlets kept, triangles looked at.
-layout(scalar, binding = 11) writeonly buffer Counts { uvec2 counts[]; };
+// [slot][face]: meshlets kept, triangles looked at, triangles listed; of all parts so far.
+layout(scalar, binding = 11) buffer Counts { uvec3 counts[]; };
 // [occluder]: the element that it is drawn as.
 layout(scalar, binding = 12) readonly buffer OccluderItems { uint items[]; };
 
+// [slot][face]: the meshlet that the next part begins with.
+layout(scalar, binding = 13) buffer Resume { uint resume[]; };
+
 layout(push_constant, scalar) uniform Parameters {
     uint meshlet_count;
-    uint occluder_count;
+    uint room;           // of a list, triangles; a meshlet's at least
     uint face_size;      // pixels
+    uint part;
 };
 
 // Rounding of a plane's height at a point: a few steps of f32 at coordinates up to 1.
@@ -141,7 +145,9 @@ void main() {
     uint written = 0;
     uint meshlets_kept = 0;
     uint triangles_tested = 0;
-    uint first_out = region * occluder_count;
+    uint first_out = region * room;
+    uint begin = part == 0 ? 0 : resume[region];
+    uint next = meshlet_count;
     if (source_index != NONE) {
         Source s = sources[source_index];
         View view = face_view(s, face);
@@ -149,7 +155,7 @@ void main() {
         if (lane == 0) {
             views[region] = view;
         }
-        for (uint first = 0; first < meshlet_count; first += gl_SubgroupSize) {
+        for (uint first = begin; first < next; first += gl_SubgroupSize) {
             uint mine = first + lane;
             bool keep = mine < meshlet_count;
             bool away = false;
@@ -158,11 +164,15 @@ void main() {
                 keep = meshlet_seen(s, view, m, faces_away(s, m.component));
             }
             uvec4 kept = subgroupBallot(keep);
-            meshlets_kept += subgroupBallotBitCount(kept);
             while (any(notEqual(kept, uvec4(0)))) {
                 uint bit = subgroupBallotFindLSB(kept);
                 kept[bit / 32] &= ~(1u << (bit % 32));
                 Meshlet m = meshlets[first + bit];
+                if (written + m.count > room) {
+                    next = first + bit;
+                    break;
+                }
+                meshlets_kept++;
                 bool m_away = faces_away(s, m.component);
                 bool same = s.kind == KIND_SURFACE && m.component == s.component;
                 bool own = same && components[m.component].closed == 1;
@@ -204,6 +214,8 @@ void main() {
     }
     if (lane == 0) {
         draws[region] = Draw(3 * written, written > 0 ? 1 : 0, 3 * first_out, 0, 0);
-        counts[region] = uvec2(meshlets_kept, triangles_tested);
+        uvec3 count = uvec3(meshlets_kept, triangles_tested, written);
+        counts[region] = part == 0 ? count : counts[region] + count;
+        resume[region] = next;
     }
 }

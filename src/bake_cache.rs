@@ -38,6 +38,8 @@ impl CachedBake {
             culling,
             merging,
             batch,
+            // It changes nothing.
+            list_room: _,
             visibility_memory,
             relief,
         } = settings;

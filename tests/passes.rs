@@ -12,7 +12,7 @@ use mesolux::elements::Elements;
 use mesolux::passes::cull::Culling;
 use mesolux::passes::occluder_tree::shadow_occluders;
 use mesolux::reference;
-use mesolux::solver::{Estimator, Settings, Solver};
+use mesolux::solver::{Estimator, Report, Settings, Solver};
 
 const FACE: u32 = 32;
 
@@ -102,7 +102,7 @@ fn item_buffers_equal_rays_and_culling_changes_nothing() {
         let mut buffers = Vec::new();
         for _ in 0..8 {
             solver
-                .run_batches(1, |batch| drawn = batch.draws.clone())
+                .run_batches(1, |batch| drawn = batch.counts.clone())
                 .expect("a batch runs");
             let (items, sources) = solver.item_buffers().expect("the item buffers come back");
             for (column, &source) in columns(&items, sources.len()).iter().zip(&sources) {
@@ -140,25 +140,59 @@ fn item_buffers_equal_rays_and_culling_changes_nothing() {
         }
         if culling == Culling::Off {
             // All but what lies in one plane with an eye on its own part.
-            let least = 3 * (solver.occluders.len() - solver.sources.list.len().min(48)) as u32;
-            assert!(
-                drawn
-                    .iter()
-                    .all(|d| d.index_count == 0 || d.index_count >= least)
-            );
+            let least = (solver.occluders.len() - solver.sources.list.len().min(48)) as u32;
+            assert!(drawn.iter().all(|&[_, _, d]| d == 0 || d >= least));
         }
     }
+    assert_silent();
+}
+
+/// Whether lists hold all triangles of a face or are filled again and again, and whether blocks of receivers are passed over as a whole or one by
+/// one: the same light, and the same counts.
+#[test]
+fn light_does_not_depend_on_lists_nor_on_blocks() {
+    let build = enclosed();
+    let solve = |culling, list_room| {
+        let settings = Settings {
+            culling,
+            list_room,
+            merging: false,
+            shots: Some(400),
+            // No rays: all is drawn.
+            ..settings()
+        };
+        let solved = build.solve(&settings);
+        (solved.irradiance, solved.report)
+    };
+    let (light, report) = solve(Culling::Triangles, None);
+    // Of 620 triangles: a meshlet or two at a time.
+    let (in_parts, of_parts) = solve(Culling::Triangles, Some(100));
+    assert_eq!(light, in_parts);
+    assert_eq!(report.triangles_drawn, of_parts.triangles_drawn);
+    assert_eq!(
+        report.skipped.meshlets_culled,
+        of_parts.skipped.meshlets_culled
+    );
+    assert_eq!(
+        report.skipped.triangles_culled,
+        of_parts.skipped.triangles_culled
+    );
+    let (one_by_one, of_all) = solve(Culling::Off, None);
+    assert_eq!(light, one_by_one);
+    let away = |report: &Report| report.skipped.receivers_facing_away;
+    assert!(away(&report) > 0);
+    assert_eq!(away(&report), away(&of_all));
     assert_silent();
 }
 
 #[test]
 fn culling_keeps_every_element_that_owns_a_pixel() {
     let mut solver = solver(&scene(), Estimator::Receiver, Culling::Triangles, 6);
-    let mut draws = Vec::new();
+    let mut counts = Vec::new();
     solver
         .run_batches(1, |batch| {
             if batch.progress.selected > 0 {
-                draws = batch.draws.clone();
+                counts = batch.counts.clone();
             }
         })
         .expect("a batch runs");
@@ -179,7 +213,7 @@ fn culling_keeps_every_element_that_owns_a_pixel() {
                 face,
                 FACE,
             );
-            let drawn = draws[slot * 5 + face as usize].index_count / 3;
+            let [_, _, drawn] = counts[slot * 5 + face as usize];
             assert!(
                 drawn as usize >= shown.len(),
                 "slot {slot}, face {face}: {drawn} drawn, {} shown",

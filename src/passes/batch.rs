@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::buffers::{SceneBuffers, upload};
 use super::occluder_tree::OccluderTree;
 use super::types::{Draw, ReceiverList, Slot, View};
-use crate::constants::{FACES, NONE, RECEIVE_KINDS};
+use crate::constants::{FACES, MESHLET_TRIANGLES, NONE, RECEIVE_KINDS};
 use crate::error::Result;
 use crate::hemicube::pixel_count;
 use crate::vk::{
@@ -44,7 +44,11 @@ pub struct Hemicubes {
     pub views: Buffer,
     pub draws: Buffer,
     pub counts: Buffer,
-    /// `[slot][face][occluder]`: room for every triangle in every face.
+    /// `[slot][face]`: the meshlet that the next part begins with.
+    pub resume: Buffer,
+    /// Triangles that a list of a face holds: all, or what fits the device's largest buffer.
+    pub room: u32,
+    /// `[slot][face][triangle]`.
     pub drawn_corners: Buffer,
     pub drawn_items: Buffer,
     /// Columns of N × 3 N texels side by side, one a slot.
@@ -56,6 +60,8 @@ pub struct Hemicubes {
 
 /// Bytes of the lists of drawn triangles, for one occluder in one face of one slot.
 const DRAWN_BYTES: u64 = 16;
+/// Those of the corners.
+const CORNER_BYTES: u64 = 12;
 
 impl Batch {
     /// `(slot_count, replay_slots)` as in the fields.
@@ -86,15 +92,15 @@ impl Batch {
         })
     }
 
-    /// One that draws, into faces of `face_size` pixels a side.
+    /// One that draws, into faces of `face_size` pixels a side, with lists that hold `list_room` triangles or what fits.
     pub fn drawing(
         device: &Arc<Device>,
         pass: &RenderPass,
         scene: &SceneBuffers,
-        face_size: u32,
+        (face_size, list_room): (u32, Option<u32>),
         slots: (u32, u32),
     ) -> Result<Self> {
-        let hemicubes = Hemicubes::new(device, pass, scene, face_size, slots.0)?;
+        let hemicubes = Hemicubes::new(device, pass, scene, (face_size, list_room), slots.0)?;
         Self::new(device, slots, Sight::Hemicubes(hemicubes))
     }
 
@@ -125,15 +131,28 @@ impl Hemicubes {
         wanted.min(most_slots(device.limits(), counts, face_size))
     }
 
+    /// In how many parts it is drawn. Each but the last leaves less than a meshlet of its room.
+    pub fn parts(&self, scene: &SceneBuffers) -> u32 {
+        let filled = self.room.saturating_sub(MESHLET_TRIANGLES - 1).max(1);
+        match scene.occluder_count > self.room {
+            true => scene.occluder_count.div_ceil(filled),
+            false => 1,
+        }
+    }
+
     fn new(
         device: &Arc<Device>,
         pass: &RenderPass,
         scene: &SceneBuffers,
-        face_size: u32,
+        (face_size, list_room): (u32, Option<u32>),
         slot_count: u32,
     ) -> Result<Self> {
         let regions = u64::from(slot_count * FACES);
-        let drawn = regions * u64::from(scene.occluder_count);
+        let most = device.limits().max_storage_buffer_range / (CORNER_BYTES * regions);
+        let wanted = list_room.map_or(u64::MAX, u64::from);
+        let most = most.min(wanted).max(MESHLET_TRIANGLES.into());
+        let room = most.min(scene.occluder_count.into()) as u32;
+        let drawn = regions * u64::from(room);
         let buffer = |name, bytes, usage| Buffer::new(device, name, bytes, usage);
         let size = (slot_count * face_size, 3 * face_size);
         let image = |name, format, usage| Image::new(device, name, size, format, usage);
@@ -143,10 +162,12 @@ impl Hemicubes {
         let draws = regions * size_of::<Draw>() as u64;
         Ok(Self {
             face_size,
+            room,
             views: buffer("views", views, BufferUse::Storage)?,
             draws: buffer("draws", draws, BufferUse::Geometry)?,
-            counts: buffer("cull counts", regions * 8, BufferUse::Storage)?,
-            drawn_corners: buffer("drawn corners", 12 * drawn, BufferUse::Geometry)?,
+            counts: buffer("cull counts", regions * 12, BufferUse::Storage)?,
+            resume: buffer("cull resume", regions * 4, BufferUse::Storage)?,
+            drawn_corners: buffer("drawn corners", CORNER_BYTES * drawn, BufferUse::Geometry)?,
             drawn_items: buffer("drawn items", 4 * drawn, BufferUse::Storage)?,
             framebuffer: Framebuffer::new(device, "item buffer", pass, &items, &depth)?,
             sampler: Sampler::new(device, "item buffer", false)?,
@@ -159,10 +180,9 @@ impl Hemicubes {
 /// As many slots as [`Hemicubes::fitting_slots`] may give, for so many elements and occluders; 1 at least.
 fn most_slots(limits: &Limits, (elements, occluders): (u32, u32), face_size: u32) -> u32 {
     let region = u64::from(FACES) * u64::from(occluders);
-    let corners = 12 * region;
-    // Of receivers: fresh form factors are no more.
+    // Of receivers: fresh form factors are no more. Lists of triangles may be drawn in parts.
     let lists = 4 * u64::from(RECEIVE_KINDS) * u64::from(elements);
-    let by_buffer = limits.max_storage_buffer_range / corners.max(lists).max(1);
+    let by_buffer = limits.max_storage_buffer_range / lists.max(1);
     let by_memory =
         limits.heap_bytes / 8 / (DRAWN_BYTES * region + 8 * pixel_count(face_size) as u64);
     let by_width = u64::from(limits.max_image_side / face_size);
@@ -173,7 +193,7 @@ fn most_slots(limits: &Limits, (elements, occluders): (u32, u32), face_size: u32
 mod tests {
     use super::*;
 
-    /// A million elements, merged to a few occluders and not: lists of receivers and of drawn corners fit a buffer of 128 MiB.
+    /// A million elements, merged to a few occluders and not: lists of receivers fit a buffer of 128 MiB.
     #[test]
     fn no_list_outgrows_the_largest_buffer() {
         let limits = Limits {
@@ -186,7 +206,7 @@ mod tests {
         };
         for (elements, occluders, expected) in [
             (1_000_000, 25_000, 8),
-            (1_000_000, 1_000_000, 2),
+            (1_000_000, 1_000_000, 8),
             (10_000, 10_000, 128),
             (100_000_000, 100_000_000, 1),
         ] {

@@ -31,8 +31,9 @@ pub struct Cull {
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 struct Parameters {
     meshlet_count: u32,
-    occluder_count: u32,
+    room: u32,
     face_size: u32,
+    part: u32,
 }
 
 impl Cull {
@@ -48,7 +49,7 @@ impl Cull {
                 device,
                 "cull",
                 shaders::CULL_COMP,
-                &[Binding::Storage; 13],
+                &[Binding::Storage; 14],
                 size_of::<Parameters>(),
                 &constants,
                 true,
@@ -74,17 +75,26 @@ impl Cull {
                 &hemicubes.views,
                 &hemicubes.counts,
                 &scene.occluder_items,
+                &hemicubes.resume,
             ]
             .map(Bind::Buffer),
         )
     }
 
-    pub fn record(&self, cmd: &Commands, set: &DescriptorSet, scene: &SceneBuffers, batch: &Batch) {
+    /// Lists what the part of this number draws: what found no room before.
+    pub(super) fn record(
+        &self,
+        cmd: &Commands,
+        set: &DescriptorSet,
+        (scene, batch): (&SceneBuffers, &Batch),
+        part: u32,
+    ) {
         let hemicubes = batch.hemicubes();
         let parameters = Parameters {
             meshlet_count: scene.meshlet_count,
-            occluder_count: scene.occluder_count,
+            room: hemicubes.room,
             face_size: hemicubes.face_size,
+            part,
         };
         cmd.dispatch(
             &self.pipeline,

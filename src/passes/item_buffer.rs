@@ -7,6 +7,7 @@ use bytemuck::{Pod, Zeroable};
 
 use super::batch::Batch;
 use super::buffers::SceneBuffers;
+use super::cull::Cull;
 use super::shaders;
 use super::types::Draw;
 use crate::constants::{FACES, NONE};
@@ -14,11 +15,13 @@ use crate::error::Result;
 use crate::hemicube::face_rectangle;
 use crate::vk::{
     Attachment, Bind, Binding, Commands, DescriptorSet, Device, Format, GraphicsPipeline,
-    GraphicsState, RenderPass, VertexAttribute,
+    GraphicsState, RenderPass, Stage, VertexAttribute,
 };
 
 pub struct ItemBuffer {
     pub pass: RenderPass,
+    /// For the parts after the first.
+    further: RenderPass,
     pipeline: GraphicsPipeline,
 }
 
@@ -36,11 +39,8 @@ const NEAR: f32 = 1e-6;
 
 impl ItemBuffer {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
-        let pass = RenderPass::new(
-            device,
-            "item buffer",
-            Attachment::read_by_shaders(Format::R32_UINT),
-        )?;
+        let items = Attachment::read_by_shaders(Format::R32_UINT);
+        let [pass, further] = RenderPass::in_parts(device, "item buffer", items)?;
         let pipeline = GraphicsPipeline::new(
             device,
             &pass,
@@ -58,7 +58,11 @@ impl ItemBuffer {
                 sums: false,
             },
         )?;
-        Ok(Self { pass, pipeline })
+        Ok(Self {
+            pass,
+            further,
+            pipeline,
+        })
     }
 
     pub fn bind(&self, batch: &Batch) -> Result<DescriptorSet> {
@@ -72,9 +76,36 @@ impl ItemBuffer {
         )
     }
 
-    pub fn record(&self, cmd: &Commands, set: &DescriptorSet, scene: &SceneBuffers, batch: &Batch) {
+    /// Culls and draws the hemicubes of a batch, in as many parts as their lists need. `listed` is recorded when the first are full.
+    pub fn record(
+        &self,
+        cmd: &Commands,
+        set: &DescriptorSet,
+        (cull, cull_set): (&Cull, &DescriptorSet),
+        (scene, batch): (&SceneBuffers, &Batch),
+        listed: impl FnOnce(),
+    ) {
+        cull.record(cmd, cull_set, (scene, batch), 0);
+        cmd.barrier(&[Stage::Compute], &[Stage::Draw]);
+        listed();
+        self.draw(cmd, set, (scene, batch), &self.pass);
+        for part in 1..batch.hemicubes().parts(scene) {
+            cmd.barrier(&[Stage::Draw], &[Stage::Compute]);
+            cull.record(cmd, cull_set, (scene, batch), part);
+            cmd.barrier(&[Stage::Compute], &[Stage::Draw]);
+            self.draw(cmd, set, (scene, batch), &self.further);
+        }
+    }
+
+    fn draw(
+        &self,
+        cmd: &Commands,
+        set: &DescriptorSet,
+        (scene, batch): (&SceneBuffers, &Batch),
+        pass: &RenderPass,
+    ) {
         let hemicubes = batch.hemicubes();
-        cmd.begin_render_pass(&self.pass, &hemicubes.framebuffer, [NONE; 4]);
+        cmd.begin_render_pass(pass, &hemicubes.framebuffer, [NONE; 4]);
         cmd.bind_graphics(&self.pipeline, set, &scene.vertices);
         cmd.bind_indices(&hemicubes.drawn_corners);
         for slot in 0..batch.slot_count {
@@ -86,7 +117,7 @@ impl ItemBuffer {
                     &self.pipeline,
                     &Parameters {
                         region,
-                        first_item: region * scene.occluder_count,
+                        first_item: region * hemicubes.room,
                         near: NEAR,
                         half_size: [width as f32 / 2.0, height as f32 / 2.0],
                     },

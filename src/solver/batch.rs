@@ -117,13 +117,14 @@ impl BatchLoop {
                 cmd.timestamp(stamps, 0);
                 passes.choose(cmd, &sets, on, &batch, (&parameters, sending));
                 cmd.timestamp(stamps, 1);
-                if let Some((cull, _)) = &sets.drawing {
-                    passes.cull.record(cmd, cull, scene, &batch);
-                    cmd.barrier(&[Stage::Compute], &[Stage::Draw]);
-                }
-                cmd.timestamp(stamps, 2);
-                if let Some((_, item_buffer)) = &sets.drawing {
-                    (passes.item_buffer).record(cmd, item_buffer, scene, &batch);
+                let listed = || cmd.timestamp(stamps, 2);
+                match &sets.drawing {
+                    Some((cull, item_buffer)) => {
+                        let cull = (&passes.cull, cull);
+                        let of = (scene, &batch);
+                        (passes.item_buffer).record(cmd, item_buffer, cull, of, listed);
+                    }
+                    None => listed(),
                 }
                 cmd.timestamp(stamps, 3);
                 let found = || cmd.timestamp(stamps, 4);

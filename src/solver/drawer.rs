@@ -15,7 +15,7 @@ use crate::passes::factor_buffers::FactorBuffers;
 use crate::passes::form_factors::{self, FacingAway, FormFactors, SeenBy, Sorting};
 use crate::passes::item_buffer::ItemBuffer;
 use crate::passes::normalise::Normalise;
-use crate::passes::types::{Draw, MesoElement, ReceiverList, Slot};
+use crate::passes::types::{MesoElement, ReceiverList, Slot};
 use crate::vk::{Buffer, BufferUse, Commands, DescriptorSet, Device, Stage, Timestamps};
 
 /// Sources drawn at once, at most: few, so that what is asked for next does not wait long.
@@ -32,8 +32,7 @@ pub(super) struct Row {
     /// Of all form factors.
     pub scale: f32,
     /// `[face]`, as in [`super::BatchResult`].
-    pub counts: Vec<[u32; 2]>,
-    pub draws: Vec<Draw>,
+    pub counts: Vec<[u32; 3]>,
     /// Elements that see nothing of the source, whatever stands between.
     pub facing_away: u32,
 }
@@ -113,7 +112,13 @@ impl Drawer {
             .min(settings.batch)
             .clamp(1, scene.source_count.max(1));
         let slots = Hemicubes::fitting_slots(device, scene, face, wanted);
-        let batch = Batch::drawing(device, &item_buffer.pass, scene, face, (slots, 0))?;
+        let batch = Batch::drawing(
+            device,
+            &item_buffer.pass,
+            scene,
+            (face, settings.list_room),
+            (slots, 0),
+        )?;
         let factors = FactorBuffers::new(device, scene, meso.len() as u32, slots, (0, None))?;
         let meso = match meso {
             [] => None,
@@ -163,10 +168,8 @@ impl Drawer {
             cmd.fill(&facing_away, 0);
             cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
             cmd.timestamp(&timestamps, 0);
-            cull.record(cmd, &sets.0, scene, &batch);
-            cmd.barrier(&[Stage::Compute], &[Stage::Draw]);
-            cmd.timestamp(&timestamps, 1);
-            item_buffer.record(cmd, &sets.1, scene, &batch);
+            let listed = || cmd.timestamp(&timestamps, 1);
+            item_buffer.record(cmd, &sets.1, (&cull, &sets.0), (scene, &batch), listed);
             cmd.timestamp(&timestamps, 2);
             cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
             form_factors.record(cmd, &sets.2, &batch, &factors);
@@ -235,7 +238,6 @@ struct Layout {
     occupied: u64,
     chosen: u64,
     counts: u64,
-    draws: u64,
     facing_away: u64,
     bytes: u64,
 }
@@ -248,15 +250,13 @@ impl Layout {
         let occupied = meso + 4 * slots * words.meso;
         let chosen = occupied + 4 * slots * words.occupied;
         let counts = chosen + slots * size_of::<Slot>() as u64;
-        let draws = counts + faces * size_of::<[u32; 2]>() as u64;
-        let facing_away = draws + faces * size_of::<Draw>() as u64;
+        let facing_away = counts + faces * size_of::<[u32; 3]>() as u64;
         Self {
             slots,
             meso,
             occupied,
             chosen,
             counts,
-            draws,
             facing_away,
             bytes: facing_away + 4 * slots,
         }
@@ -275,8 +275,7 @@ impl Layout {
             (&factors.fresh_meso, self.meso, self.occupied),
             (&factors.occupied, self.occupied, self.chosen),
             (&batch.slots, self.chosen, self.counts),
-            (&batch.hemicubes().counts, self.counts, self.draws),
-            (&batch.hemicubes().draws, self.draws, self.facing_away),
+            (&batch.hemicubes().counts, self.counts, self.facing_away),
             (facing_away, self.facing_away, self.bytes),
         ] {
             cmd.copy(from, 0, to, at, end - at);
@@ -288,15 +287,13 @@ impl Layout {
         let list = |at: u64, words: u64| from.read(at + 4 * i * words, words as usize);
         let faces = u64::from(FACES);
         let slot = from.read::<Slot>(self.chosen + i * size_of::<Slot>() as u64, 1)[0];
-        let counts = self.counts + i * faces * size_of::<[u32; 2]>() as u64;
-        let draws = self.draws + i * faces * size_of::<Draw>() as u64;
+        let counts = self.counts + i * faces * size_of::<[u32; 3]>() as u64;
         Row {
             plain: list(0, words.plain),
             meso: list(self.meso, words.meso),
             occupied: list(self.occupied, words.occupied),
             scale: slot.scale,
             counts: from.read(counts, faces as usize),
-            draws: from.read(draws, faces as usize),
             facing_away: from.read(self.facing_away + 4 * i, 1)[0],
         }
     }

@@ -48,7 +48,13 @@ pub(super) fn new(
             }
             let slots = Hemicubes::fitting_slots(device, on.scene, face, slots.min(SLOTS));
             let pass = &passes.item_buffer.pass;
-            Batch::drawing(device, pass, on.scene, face, (slots, 0))?
+            Batch::drawing(
+                device,
+                pass,
+                on.scene,
+                (face, settings.list_room),
+                (slots, 0),
+            )?
         }
     };
     let rule = Rule {

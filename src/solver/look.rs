@@ -50,7 +50,7 @@ impl Solver {
         let (device, scene) = (&self.device, &self.scene);
         let face = self.settings.hemicube;
         let item_buffer = ItemBuffer::new(device)?;
-        let batch = Batch::drawing(device, &item_buffer.pass, scene, face, (1, 0))?;
+        let batch = Batch::drawing(device, &item_buffer.pass, scene, (face, None), (1, 0))?;
         let slot = Slot {
             emitted: Vec3::ONE,
             source,
@@ -64,9 +64,7 @@ impl Solver {
         let bytes = 4 * pixels as u64;
         let readback = Buffer::new(device, "item picture", bytes, BufferUse::Readback)?;
         Commands::run(device, "item picture", |cmd| {
-            cull.record(cmd, &sets.0, scene, &batch);
-            cmd.barrier(&[Stage::Compute], &[Stage::Draw]);
-            item_buffer.record(cmd, &sets.1, scene, &batch);
+            item_buffer.record(cmd, &sets.1, (&cull, &sets.0), (scene, &batch), || {});
             cmd.copy_shader_image_to_buffer(&batch.hemicubes().items, &readback);
             cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
             Ok(())

@@ -176,7 +176,13 @@ impl Solver {
             _ => 0,
         };
         let (face, slots) = (settings.hemicube, (slots, replays));
-        let batch = Batch::drawing(device, &item_buffer.pass, &scene, face, slots)?;
+        let batch = Batch::drawing(
+            device,
+            &item_buffer.pass,
+            &scene,
+            (face, settings.list_room),
+            slots,
+        )?;
         let relief = elements
             .relief
             .as_ref()

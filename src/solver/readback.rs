@@ -3,7 +3,7 @@
 use crate::constants::FACES;
 use crate::passes::batch::{Batch, Hemicubes, Sight};
 use crate::passes::buffers::State;
-use crate::passes::types::{Draw, Progress};
+use crate::passes::types::Progress;
 use crate::vk::{Buffer, Commands, Stage};
 
 /// Seconds of each stage of a batch, by GPU timestamps.
@@ -53,17 +53,14 @@ impl std::ops::AddAssign for Stages {
 pub struct BatchResult {
     pub progress: Progress,
     pub stages: Stages,
-    /// `[slot][face]`: meshlets kept, triangles tested.
-    pub counts: Vec<[u32; 2]>,
-    /// `[slot][face]`.
-    pub draws: Vec<Draw>,
+    /// `[slot][face]`: meshlets kept, triangles tested, triangles drawn. Empty where shadow rays tell what is seen.
+    pub counts: Vec<[u32; 3]>,
 }
 
-/// Where a batch's results lie in its readback buffer: progress, then counts, then draws.
+/// Where a batch's results lie in its readback buffer: progress, then counts.
 pub(super) struct ReadbackLayout {
     regions: usize,
     counts: u64,
-    draws: u64,
     pub bytes: u64,
 }
 
@@ -74,21 +71,18 @@ impl ReadbackLayout {
             Sight::Rays(_) => 0,
         };
         let counts = size_of::<Progress>() as u64;
-        let draws = counts + (regions * size_of::<[u32; 2]>()) as u64;
         Self {
             regions,
             counts,
-            draws,
-            bytes: draws + (regions * size_of::<Draw>()) as u64,
+            bytes: counts + (regions * size_of::<[u32; 3]>()) as u64,
         }
     }
 
     pub fn record(&self, cmd: &Commands, state: &State, batch: &Batch, to: &Buffer) {
         cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
         cmd.copy(&state.progress, 0, to, 0, self.counts);
-        if let Sight::Hemicubes(Hemicubes { counts, draws, .. }) = &batch.sight {
-            cmd.copy(counts, 0, to, self.counts, self.draws - self.counts);
-            cmd.copy(draws, 0, to, self.draws, self.bytes - self.draws);
+        if let Sight::Hemicubes(Hemicubes { counts, .. }) = &batch.sight {
+            cmd.copy(counts, 0, to, self.counts, self.bytes - self.counts);
         }
         cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
     }
@@ -98,7 +92,6 @@ impl ReadbackLayout {
             progress: readback.read::<Progress>(0, 1)[0],
             stages,
             counts: readback.read(self.counts, self.regions),
-            draws: readback.read(self.draws, self.regions),
         }
     }
 }

@@ -168,7 +168,7 @@ impl Report {
         let selected = u64::from(batch.progress.selected);
         let faces = batch.progress.selected as usize * crate::constants::FACES as usize;
         // Rays draw nothing.
-        if batch.draws.is_empty() {
+        if batch.counts.is_empty() {
             self.emitters_by_rays += selected;
         } else {
             self.hemicubes += selected;
@@ -180,13 +180,13 @@ impl Report {
         self.seconds.bin += batch.stages.bin;
         self.seconds.gather += batch.stages.gather;
         self.replayed += u64::from(batch.progress.replayed);
-        for (draw, counts) in batch.draws.iter().zip(&batch.counts).take(faces) {
-            let drawn = u64::from(draw.index_count / 3);
+        for &counts in batch.counts.iter().take(faces) {
+            let [kept, tested, drawn] = counts.map(u64::from);
             self.triangles_drawn += drawn;
             self.skipped.empty_faces += u64::from(drawn == 0);
             if self.culls {
-                self.skipped.meshlets_culled += self.meshlets - u64::from(counts[0]);
-                self.skipped.triangles_culled += u64::from(counts[1]) - drawn;
+                self.skipped.meshlets_culled += self.meshlets - kept;
+                self.skipped.triangles_culled += tested - drawn;
             }
         }
     }

@@ -80,7 +80,7 @@ pub fn ids_come_back_right(device: &Arc<Device>) -> Result<bool> {
     let scene = SceneBuffers::new(device, &elements, &sources, &connections, &occluders)?;
     let state = State::new(device, &scene)?;
     let item_buffer = ItemBuffer::new(device)?;
-    let batch = Batch::drawing(device, &item_buffer.pass, &scene, SIZE, (1, 0))?;
+    let batch = Batch::drawing(device, &item_buffer.pass, &scene, (SIZE, None), (1, 0))?;
     let measure = crate::passes::measure::Measure::new(device)?;
     let select = crate::passes::select::Select::new(device)?;
     let cull = crate::passes::cull::Cull::new(device, settings.culling)?;
@@ -106,9 +106,7 @@ pub fn ids_come_back_right(device: &Arc<Device>) -> Result<bool> {
         };
         select.record(cmd, &sets.1, &parameters);
         then();
-        cull.record(cmd, &sets.2, &scene, &batch);
-        then();
-        item_buffer.record(cmd, &sets.3, &scene, &batch);
+        item_buffer.record(cmd, &sets.3, (&cull, &sets.2), (&scene, &batch), || {});
         cmd.copy_shader_image_to_buffer(&batch.hemicubes().items, &readback);
         cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
         Ok(())

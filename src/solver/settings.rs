@@ -57,6 +57,9 @@ pub struct Settings {
     pub merging: bool,
     /// Sources of a batch that are drawn, at most.
     pub batch: u32,
+    /// Triangles that are listed at once for a face of a hemicube, at most; what is left is drawn after them. None: as many as fit
+    /// the device's largest buffer. The light is the same.
+    pub list_room: Option<u32>,
     /// Bytes on the device for form factors of sources that have been drawn, so that their further shots need no drawing. None:
     /// [`VISIBILITY_MEMORY`], or a third of the device's memory if that is less. The `pixel` estimator keeps none.
     pub visibility_memory: Option<u64>,
@@ -78,6 +81,7 @@ impl Default for Settings {
             culling: Culling::default(),
             merging: true,
             batch: 16,
+            list_room: None,
             visibility_memory: None,
             relief: meso::Options::default(),
         }

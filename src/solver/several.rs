@@ -206,14 +206,11 @@ impl Several {
             .sum::<u64>();
         let faces = FACES as usize * self.put.len();
         let mut counts: Vec<_> = rows.iter().flat_map(|r| r.counts.iter().copied()).collect();
-        let mut draws: Vec<_> = rows.iter().flat_map(|r| r.draws.iter().copied()).collect();
         counts.resize(faces, bytemuck::Zeroable::zeroed());
-        draws.resize(faces, bytemuck::Zeroable::zeroed());
         Ok(BatchResult {
             progress,
             stages,
             counts,
-            draws,
         })
     }
 

@@ -25,6 +25,14 @@ pub enum AfterPass {
     Copy,
 }
 
+/// What happens to the depths after a render pass.
+#[derive(Debug, Clone, Copy)]
+enum Depth {
+    Dropped,
+    Kept,
+    Copied,
+}
+
 impl Attachment {
     pub fn read_by_shaders(format: vk::Format) -> Self {
         Self {
@@ -41,7 +49,8 @@ impl Attachment {
     }
 }
 
-/// A render pass of one subpass: one colour attachment (cleared, stored) and a depth attachment (cleared, stored if asked for).
+/// A render pass of one subpass: one colour attachment (cleared, stored) and a depth attachment (cleared, stored if asked for). In further
+/// parts of one, neither is cleared.
 pub struct RenderPass {
     pub(super) raw: vk::RenderPass,
     device: Arc<Device>,
@@ -61,12 +70,37 @@ impl RenderPass {
         colour: Attachment,
         copied: bool,
     ) -> Result<Self> {
-        let (depth_store, depth_layout) = match copied {
-            true => (
+        let depth = if copied {
+            Depth::Copied
+        } else {
+            Depth::Dropped
+        };
+        Self::from_attachments(device, name, colour, depth, false)
+    }
+
+    /// Two: for what is drawn first, and for what is drawn to it afterwards, as often as there is more.
+    pub fn in_parts(device: &Arc<Device>, name: &str, colour: Attachment) -> Result<[Self; 2]> {
+        let part = |further| Self::from_attachments(device, name, colour, Depth::Kept, further);
+        Ok([part(false)?, part(true)?])
+    }
+
+    fn from_attachments(
+        device: &Arc<Device>,
+        name: &str,
+        colour: Attachment,
+        depth: Depth,
+        further: bool,
+    ) -> Result<Self> {
+        let (depth_store, depth_layout) = match depth {
+            Depth::Copied => (
                 vk::AttachmentStoreOp::STORE,
                 vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
             ),
-            false => (
+            Depth::Kept => (
+                vk::AttachmentStoreOp::STORE,
+                vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL,
+            ),
+            Depth::Dropped => (
                 vk::AttachmentStoreOp::DONT_CARE,
                 vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL,
             ),
@@ -83,24 +117,28 @@ impl RenderPass {
                 vk::AccessFlags::TRANSFER_READ,
             ),
         };
+        let (load, from) = match further {
+            true => (vk::AttachmentLoadOp::LOAD, [layout, depth_layout]),
+            false => (vk::AttachmentLoadOp::CLEAR, [vk::ImageLayout::UNDEFINED; 2]),
+        };
         let attachments = [
             vk::AttachmentDescription::default()
                 .format(colour.format)
                 .samples(vk::SampleCountFlags::TYPE_1)
-                .load_op(vk::AttachmentLoadOp::CLEAR)
+                .load_op(load)
                 .store_op(vk::AttachmentStoreOp::STORE)
                 .stencil_load_op(vk::AttachmentLoadOp::DONT_CARE)
                 .stencil_store_op(vk::AttachmentStoreOp::DONT_CARE)
-                .initial_layout(vk::ImageLayout::UNDEFINED)
+                .initial_layout(from[0])
                 .final_layout(layout),
             vk::AttachmentDescription::default()
                 .format(DEPTH_FORMAT)
                 .samples(vk::SampleCountFlags::TYPE_1)
-                .load_op(vk::AttachmentLoadOp::CLEAR)
+                .load_op(load)
                 .store_op(depth_store)
                 .stencil_load_op(vk::AttachmentLoadOp::DONT_CARE)
                 .stencil_store_op(vk::AttachmentStoreOp::DONT_CARE)
-                .initial_layout(vk::ImageLayout::UNDEFINED)
+                .initial_layout(from[1])
                 .final_layout(depth_layout),
         ];
         let colours = [vk::AttachmentReference::default()
@@ -116,7 +154,8 @@ impl RenderPass {
         let targets = vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT
             | vk::PipelineStageFlags::EARLY_FRAGMENT_TESTS
             | vk::PipelineStageFlags::LATE_FRAGMENT_TESTS;
-        let writes = vk::AccessFlags::COLOR_ATTACHMENT_WRITE
+        let writes = vk::AccessFlags::COLOR_ATTACHMENT_READ
+            | vk::AccessFlags::COLOR_ATTACHMENT_WRITE
             | vk::AccessFlags::DEPTH_STENCIL_ATTACHMENT_READ
             | vk::AccessFlags::DEPTH_STENCIL_ATTACHMENT_WRITE;
         let dependencies = [
@@ -125,7 +164,10 @@ impl RenderPass {
                 .src_subpass(vk::SUBPASS_EXTERNAL)
                 .dst_subpass(0)
                 .src_stage_mask(stage | targets)
-                .src_access_mask(vk::AccessFlags::DEPTH_STENCIL_ATTACHMENT_WRITE)
+                .src_access_mask(
+                    vk::AccessFlags::COLOR_ATTACHMENT_WRITE
+                        | vk::AccessFlags::DEPTH_STENCIL_ATTACHMENT_WRITE,
+                )
                 .dst_stage_mask(targets)
                 .dst_access_mask(writes),
             // What was drawn is seen by whoever reads it next.
