@@ -31,6 +31,8 @@ shared! {
     RECEIVE_KINDS = 4;
     /// Elements that an invocation sorts: as many share what it loads of each source.
     SORT_ELEMENTS = 4;
+    /// Slots that a dispatch sorts receivers for, at most: the bits of a word.
+    SORT_SLOTS = 32;
     /// Sources of a batch, at most, whose form factors were kept and need no drawing.
     REPLAYS = 496;
     /// A kept source is shot again once it has this share (one over it) of the power of the strongest source.

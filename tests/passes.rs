@@ -182,6 +182,23 @@ fn light_does_not_depend_on_lists_nor_on_blocks() {
     let away = |report: &Report| report.skipped.receivers_facing_away;
     assert!(away(&report) > 0);
     assert_eq!(away(&report), away(&of_all));
+    // More slots than a dispatch sorts for: sources are shot in another order.
+    let [narrow, wide] = [6, 50].map(|batch| {
+        let solved = build.solve(&Settings {
+            batch,
+            residual: 1e-6,
+            ..settings()
+        });
+        assert_eq!(solved.report.batch, batch);
+        solved.irradiance
+    });
+    let mean = narrow.iter().map(|e| e.element_sum()).sum::<f32>() / narrow.len() as f32;
+    let apart = narrow
+        .iter()
+        .zip(&wide)
+        .map(|(a, b)| (*a - *b).element_sum().abs());
+    let most = apart.fold(0.0, f32::max) / mean;
+    assert!(most < 1e-3, "light is {most} apart");
     assert_silent();
 }
 

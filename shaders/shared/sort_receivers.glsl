@@ -100,7 +100,7 @@ bool none_sees(ReceiverBlock block, uint source) {
 }
 
 // Bit k: the k-th slot from `first` on holds a source of which one of the elements from `low` to `high` may see something. `held`: it
-// holds one at all. A lane a slot, 32 slots at most.
+// holds one at all. A lane a slot, SORT_SLOTS at most.
 uint sighted_slots(uint first, uint low, uint high, out uint held) {
     uint sighted = 0;
     held = 0;

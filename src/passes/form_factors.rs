@@ -11,7 +11,7 @@ use super::buffers::{SceneBuffers, write};
 use super::factor_buffers::{FactorBuffers, ReceiverLists};
 use super::types::ReceiverList;
 use super::{groups, shaders};
-use crate::constants::{RECEIVE_KINDS, SORT_ELEMENTS};
+use crate::constants::{RECEIVE_KINDS, SORT_ELEMENTS, SORT_SLOTS};
 use crate::error::Result;
 use crate::vk::{Bind, Binding, Buffer, Commands, ComputePipeline, DescriptorSet, Device, Stage};
 
@@ -234,7 +234,7 @@ impl FormFactors {
         cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
         // Rays of one slot at a time.
         let (face_size, at_once) = match &batch.sight {
-            Sight::Hemicubes(hemicubes) => (hemicubes.face_size, batch.slot_count),
+            Sight::Hemicubes(hemicubes) => (hemicubes.face_size, SORT_SLOTS),
             Sight::Rays(_) => (0, 1),
         };
         let parameters = |range: &Range, slots: std::ops::Range<u32>| Parameters {
@@ -250,7 +250,8 @@ impl FormFactors {
             for (i, (range, ..)) in ranges().enumerate() {
                 // A batch of replays alone sorts nothing.
                 let at = (size_of::<ReceiverList>() * i) as u64;
-                let push = parameters(range, first..first + at_once);
+                let slots = first..(first + at_once).min(batch.slot_count);
+                let push = parameters(range, slots);
                 cmd.dispatch_indirect(&self.sort, &range.sort, &push, (&batch.drawn_commands, at));
             }
             // What faces away is counted by the next ones too.

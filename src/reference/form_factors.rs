@@ -24,6 +24,9 @@ pub fn gather(
     let centroid = elements.centroid[element];
     let size = elements.radius(element);
     let gap = centroid.distance(source.centroid) - source.radius;
+    if gap > 4.0 * size && lies_in_plane(centroid, elements.normal[element], source) {
+        return 0.0;
+    }
     let points: &[[f64; 3]] = if gap > 4.0 * size {
         &POINTS[..1]
     } else if gap > size {
@@ -42,9 +45,18 @@ pub fn gather(
         .sum()
 }
 
+/// Cosine of the angle from which on two surfaces are not level, as in the shader.
+const LEVEL: f64 = 0.99;
+
+/// As in the shader: whether a place lies in the plane of a plane source with which its surface is level.
+fn lies_in_plane(p: DVec3, normal: DVec3, source: &Source) -> bool {
+    let level = normal.dot(source.normal).abs() >= LEVEL;
+    let plane = source.kind != KIND_POINT && source.cone == 0.0;
+    plane && level && (p - source.centroid).dot(source.normal) <= HEIGHT_EPSILON
+}
+
 /// As in the shader: a place in the plane of a source with which its surface is not level, a little before it.
 fn before_plane(p: DVec3, normal: DVec3, source: &Source) -> DVec3 {
-    const LEVEL: f64 = 0.99;
     let height = (p - source.centroid).dot(source.normal);
     let plane = source.kind != KIND_POINT && source.cone == 0.0;
     if plane && height.abs() <= HEIGHT_EPSILON && normal.dot(source.normal).abs() < LEVEL {
