@@ -100,9 +100,7 @@ void main() {
     }
     float unshot_emitted = sum_emitted[0];
     float unshot_reflected = sum_reflected[0];
-    // Little that is left matters the less while there is emission to be drawn: each of many weak emitters would have all others replayed.
-    bool replays = unshot_emitted == 0.0 || unshot_reflected > stop_power / float(REPLAY_SHARE);
-    float kept_power = replays ? best_kept[0] : 0.0;
+    float kept_power = best_kept[0];
     uint shots = progress.shots;
     barrier();
     bool stop = unshot_emitted == 0.0 && unshot_reflected <= stop_power;
@@ -146,7 +144,7 @@ void main() {
     }
 
     // Replay: each invocation looks after a range of sources, and its slots follow those of the invocations before it.
-    uint most = replays ? min(replay_slots, shots_left - chosen) : 0;
+    uint most = min(replay_slots, shots_left - chosen);
     float least = top / float(REPLAY_SHARE);
     uint share = (source_count + SELECT_GROUP - 1) / SELECT_GROUP;
     uint begin = min(lane * share, source_count);
