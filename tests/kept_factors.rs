@@ -202,6 +202,18 @@ fn relights(emitter_hemicube: Option<u32>) {
         assert!(off <= f64::from(TOLERANCE));
     }
 
+    // Without a point light nothing is left to draw: all that is emitted is replayed.
+    let mut lamps = scene(true).0.scene;
+    lamps.point_lights.clear();
+    let replayed = solve(&lamps, Some(&kept));
+    let report = replayed.report();
+    assert_eq!((report.hemicubes, report.emitters_by_rays), (0, 0));
+    assert!(
+        report.shots > 0 && report.unshot_share < 1e-3,
+        "{}",
+        report.unshot_share
+    );
+
     // Back to the first lights: the same as at first, to rounding.
     let back = solve(&first, Some(&kept))
         .light()
