@@ -1,6 +1,7 @@
 // Lists the occluders that each face of each chosen hemicube must draw: one subgroup a face, in their order, so that
-// the list is the same every run. Where a list has no room for all, the next part goes on where it ended, once what it holds is drawn. A meshlet falls as a whole where the face's frustum or the shooter's horizon leaves it
-// out or where it shows its back; a triangle falls also where it covers no pixel's centre.
+// the list is the same every run. A meshlet falls as a whole where the face's frustum or the shooter's horizon leaves it
+// out or where it shows its back; a triangle falls also where it covers no pixel's centre. Where a list has no room for all,
+// the next part goes on where it ended, once what it holds is drawn.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_basic : require
@@ -28,7 +29,6 @@ layout(scalar, binding = 10) writeonly buffer Views { View views[]; };
 layout(scalar, binding = 11) buffer Counts { uvec3 counts[]; };
 // [occluder]: the element that it is drawn as.
 layout(scalar, binding = 12) readonly buffer OccluderItems { uint items[]; };
-
 // [slot][face]: the meshlet that the next part begins with.
 layout(scalar, binding = 13) buffer Resume { uint resume[]; };
 

@@ -135,8 +135,7 @@ void main() {
             atomicAdd(away_count[first_slot + k], in_range);
         }
     }
-    // A loop of one turn or none: a software device works through what a branch leaves out.
-    for (uint left = sighted; left != 0; left = 0) {
+    if (sighted != 0) {
         vec4 ball[SORT_ELEMENTS];
         vec3 n[SORT_ELEMENTS];
         for (uint j = 0; j < SORT_ELEMENTS; j++) {

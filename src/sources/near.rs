@@ -99,8 +99,8 @@ impl<'a> Surroundings<'a> {
 }
 
 fn charts_of_nodes(bvh: &Bvh2, places: &[Place]) -> Vec<Option<u32>> {
-    // Parents before their children.
-    let mut order = vec![0];
+    // Parents before their children; the tree of no place has no node.
+    let mut order = Vec::from_iter((!bvh.nodes.is_empty()).then_some(0));
     let mut next = 0;
     while next < order.len() {
         let node = &bvh.nodes[order[next]];
