@@ -28,8 +28,8 @@ layout(push_constant, scalar) uniform Parameters {
 
 shared float best_power[SELECT_GROUP];
 shared uint best_source[SELECT_GROUP];
-shared float sum_emitted[SELECT_GROUP];
-shared float sum_reflected[SELECT_GROUP];
+// Unshot power: emitted, of it what is to be drawn; reflected; and all that kept sources have to send.
+shared vec4 sums[SELECT_GROUP];
 shared float best_kept[SELECT_GROUP];
 shared uint replays_before[SELECT_GROUP];
 shared uint emitting;
@@ -74,33 +74,40 @@ void shoot(uint slot, uint source) {
 void main() {
     uint lane = gl_LocalInvocationID.x;
     float emitted = 0.0;
+    float to_draw = 0.0;
     float reflected = 0.0;
+    float of_kept = 0.0;
     float kept = 0.0;
     for (uint s = lane; s < source_count; s += SELECT_GROUP) {
         vec3 rgb = abs(unshot[s].rgb);
         bool emission_left = shot[s].w == SHOT_NOTHING;
         float of_reflected = sources[s].kind == KIND_POINT ? 0.0 : sources[s].area * (rgb.r + rgb.g + rgb.b);
         reflected += emission_left ? of_reflected : unshot[s].w;
-        emitted += emission_left ? max(unshot[s].w - of_reflected, 0.0) : 0.0;
+        float of_emitted = emission_left ? max(unshot[s].w - of_reflected, 0.0) : 0.0;
+        emitted += of_emitted;
+        to_draw += is_kept(s) ? 0.0 : of_emitted;
+        of_kept += is_kept(s) ? unshot[s].w : 0.0;
         kept = is_kept(s) && least_emitted == 0.0 ? max(kept, unshot[s].w) : kept;
     }
     best_kept[lane] = kept;
-    sum_emitted[lane] = emitted;
-    sum_reflected[lane] = reflected;
+    sums[lane] = vec4(emitted, to_draw, reflected, of_kept);
     emitting = 0;
     scan(lane);
     barrier();
     for (uint half_count = SELECT_GROUP / 2; half_count > 0; half_count /= 2) {
         if (lane < half_count) {
-            sum_emitted[lane] += sum_emitted[lane + half_count];
-            sum_reflected[lane] += sum_reflected[lane + half_count];
+            sums[lane] += sums[lane + half_count];
             best_kept[lane] = max(best_kept[lane], best_kept[lane + half_count]);
         }
         barrier();
     }
-    float unshot_emitted = sum_emitted[0];
-    float unshot_reflected = sum_reflected[0];
-    float kept_power = best_kept[0];
+    float unshot_emitted = sums[0].x;
+    float emission_to_draw = sums[0].y;
+    float unshot_reflected = sums[0].z;
+    // All emission is drawn at last: as long as kept sources have less to send than that, or too little to go on for, they wait, or what
+    // few sources add would be replayed after every few.
+    bool replays_wait = emission_to_draw > 0.0 && sums[0].w <= max(emission_to_draw, stop_power);
+    float kept_power = replays_wait ? 0.0 : best_kept[0];
     uint shots = progress.shots;
     barrier();
     bool stop = unshot_emitted == 0.0 && unshot_reflected <= stop_power;
@@ -144,7 +151,7 @@ void main() {
     }
 
     // Replay: each invocation looks after a range of sources, and its slots follow those of the invocations before it.
-    uint most = min(replay_slots, shots_left - chosen);
+    uint most = replays_wait ? 0 : min(replay_slots, shots_left - chosen);
     float least = top / float(REPLAY_SHARE);
     uint share = (source_count + SELECT_GROUP - 1) / SELECT_GROUP;
     uint begin = min(lane * share, source_count);

@@ -6,8 +6,9 @@ use common::{Build, assert_silent, device};
 use glam::{DVec3, Vec3};
 use mesolux::bake;
 use mesolux::directions::Directions;
+use mesolux::elements::Elements;
 use mesolux::meso::{Options, Transport};
-use mesolux::solver::{Light, Report, Settings, Visibility};
+use mesolux::solver::{Light, Report, Settings, Solver, Visibility};
 
 /// Unshot light that each solution leaves, as a share of all. It lands on elements as large as any other, and half of it and
 /// the rounding of sums in another order are what two solutions differ by.
@@ -106,6 +107,49 @@ fn replayed_sources_light_as_drawn_ones_do() {
             }
         }
     }
+    assert_silent();
+}
+
+/// All emission is drawn in the end, and what a few weak emitters add is not replayed after every few of them: the light is the same.
+#[test]
+fn kept_sources_wait_while_more_emission_is_to_be_drawn() {
+    let mut build = scene(false);
+    let glow = build.material(0.5, 0.02);
+    build.sphere(DVec3::new(0.8, 0.2, 0.2), 0.1, 3, true, glow);
+    let solve = |visibility_memory| {
+        let settings = Settings {
+            batch: 1,
+            visibility_memory,
+            emitter_hemicube: Some(settings().hemicube),
+            ..settings()
+        };
+        let scene = &build.scene;
+        let lights = &scene.point_lights;
+        let mut solver = Solver::new(&device(), Elements::new(scene), lights, &settings)
+            .expect("the scene fits the device");
+        let mut waited = 0;
+        solver
+            .run_batches(100, |batch| {
+                let progress = batch.progress;
+                if progress.unshot_reflected <= progress.unshot_emitted {
+                    assert_eq!(progress.replayed, 0, "{progress:?}");
+                    waited += 1;
+                }
+            })
+            .expect("the first batches run");
+        solver.run(|_| true).expect("the scene is solved");
+        let light = solver.light().expect("the light comes back");
+        (light, solver.report().clone(), waited)
+    };
+    let (drawn, every, ..) = solve(Some(0));
+    let (light, once, waited) = solve(None);
+    let difference = largest_difference(&drawn.irradiance, &light.irradiance);
+    println!(
+        "{waited} batches waited, {} replays, {} of {} sources drawn: {difference:.1e}",
+        once.replayed, once.hemicubes, every.sources
+    );
+    assert!(waited > 0);
+    assert!(difference <= TOLERANCE);
     assert_silent();
 }
 

@@ -81,9 +81,22 @@ fn first(
         .map_or(NONE, |(_, i)| occluders.items[i])
 }
 
-/// Whether an occluder can be seen at all: it rises above the source's own plane, does not lie in one plane with the eye on
-/// the part that it stands on, and is no back of that part where it is closed.
+/// Whether an occluder can be seen at all: it rises above the source's own plane and is none that every face leaves out.
 fn above(
+    elements: &Elements,
+    connections: &Connections,
+    occluders: &Occluders,
+    source: &Source,
+    i: usize,
+) -> bool {
+    let rises = |v: &DVec3| (*v - source.eye).dot(source.normal) > 1e-9;
+    !is_left_out(elements, connections, occluders, source, i)
+        && occluders.triangle(elements, i).iter().any(rises)
+}
+
+/// Whether an occluder is drawn in no face, culled or not: it lies in one plane with the eye on the part that it stands on, or is a back
+/// of that part where it is closed.
+pub fn is_left_out(
     elements: &Elements,
     connections: &Connections,
     occluders: &Occluders,
@@ -95,10 +108,9 @@ fn above(
     let same = source.kind == KIND_SURFACE && component == source.component;
     let own = same && connections.closed[component as usize];
     let height = (source.eye - elements.centroid[item]).dot(elements.normal[item]);
-    let rises = |v: &DVec3| (*v - source.eye).dot(source.normal) > 1e-9;
     let edge_on = same && height.abs() <= 1e-6;
     let own_back = own && height <= 0.0;
-    !edge_on && !own_back && occluders.triangle(elements, i).iter().any(rises)
+    edge_on || own_back
 }
 
 /// How far outside a triangle, in pixels, a pixel's centre may lie and still be drawn: a rasteriser with 4 subpixel bits
