@@ -35,6 +35,8 @@ shared! {
     SORT_SLOTS = 32;
     /// Sources of a batch, at most, whose form factors were kept and need no drawing.
     REPLAYS = 496;
+    /// Blocks of GROUP elements of a slot that a subgroup keeps the form factors of.
+    KEEP_BLOCKS = 64;
     /// A kept source is shot again once it has this share (one over it) of the power of the strongest source.
     REPLAY_SHARE = 16;
     /// Binary digits behind the point of a form factor summed by integer atomics. A hemicube's whole sum is 1, so that

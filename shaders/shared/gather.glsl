@@ -13,6 +13,7 @@
 #extension GL_EXT_buffer_reference_uvec2 : require
 #include "shared/types.glsl"
 #include "shared/kept.glsl"
+#include "shared/lanes.glsl"
 #ifdef FROM_RELIEF
 #include "shared/directions.glsl"
 #include "shared/load4.glsl"
@@ -212,13 +213,6 @@ void kept_pair(Words words, uint block, uint n, out FLUX f[2]) {
         f[side] = factor;
 #endif
     }
-}
-
-// The first lane of a set, which it leaves.
-uint next_lane(inout uvec4 lanes) {
-    uint lane = subgroupBallotFindLSB(lanes);
-    lanes[lane / 32] &= ~(1u << (lane % 32));
-    return lane;
 }
 
 void main() {

@@ -7,8 +7,9 @@ use super::batch::Batch;
 use super::buffers::State;
 use super::factor_buffers::FactorBuffers;
 use super::shaders;
+use crate::constants::KEEP_BLOCKS;
 use crate::error::Result;
-use crate::vk::{Bind, Commands, ComputePipeline, DescriptorSet, Device, Stage};
+use crate::vk::{Bind, Binding, Commands, ComputePipeline, DescriptorSet, Device, Stage};
 
 pub struct Keep {
     allocate: ComputePipeline,
@@ -28,7 +29,15 @@ impl Keep {
         };
         Ok(Self {
             allocate: make("allocate", shaders::ALLOCATE_COMP, 6, 5)?,
-            keep: make("keep", shaders::KEEP_COMP, 5, 3)?,
+            keep: ComputePipeline::new(
+                device,
+                "keep",
+                shaders::KEEP_COMP,
+                &[Binding::Storage; 5],
+                4 * 4,
+                &[device.limits().subgroup_size],
+                true,
+            )?,
         })
     }
 
@@ -70,8 +79,9 @@ impl Keep {
             factors.plain_count,
             factors.plain_blocks(),
             factors.meso_count,
+            factors.blocks(),
         ];
-        let size = [factors.blocks(), batch.slot_count, 1];
+        let size = [factors.blocks().div_ceil(KEEP_BLOCKS), batch.slot_count, 1];
         cmd.dispatch(&self.keep, &sets.keep, &keep, size);
     }
 }
