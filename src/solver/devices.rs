@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::occluders::Occluders;
 use crate::passes::buffers::SceneBuffers;
 use crate::passes::relief_buffers::meso_elements;
-use crate::sources::Sources;
+use crate::sources::{Sources, least_strong};
 use crate::vk::{Device, Instance};
 
 /// Opens the devices asked for: one as [`open_device`] does, or several, divided by commas. One that is named twice is opened twice: a
@@ -93,6 +93,8 @@ impl Parts<'_> {
         }
         let relief = self.elements.relief.as_ref();
         let meso = relief.map_or_else(Vec::new, |relief| meso_elements(self.elements, relief));
+        let sources = &self.sources.list;
+        let least = least_strong(sources, &settings.grouping);
         let helper = |device| {
             let scene = self.scene(device)?;
             let drawer = Drawer::with_scene(device, settings, scene, &meso)?;
@@ -110,7 +112,9 @@ impl Parts<'_> {
             Ok(Some(Team {
                 own,
                 helpers: helpers.collect::<Result<_>>()?,
-                emits: Team::emits(&self.sources.list),
+                strong: (sources.iter())
+                    .map(|s| s.emitted_power() >= least)
+                    .collect(),
             }))
         })
     }

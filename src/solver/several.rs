@@ -17,7 +17,6 @@ use crate::passes::buffers::{SceneBuffers, State};
 use crate::passes::factor_buffers::FactorBuffers;
 use crate::passes::select::Parameters;
 use crate::passes::types::{KeptRow, Progress, Slot};
-use crate::sources::Source;
 use crate::vk::{Buffer, BufferUse, Commands, Device, Stage, Timestamps};
 
 /// Rows that are drawn ahead, in batches, and their bytes, at most: while emitters are shot, others have all that time.
@@ -28,14 +27,8 @@ const BYTES_AHEAD: u64 = 128 << 20;
 pub(super) struct Team {
     pub own: Drawer,
     pub helpers: Vec<Helper>,
-    /// Of each source, whether it emits.
-    pub emits: Vec<bool>,
-}
-
-impl Team {
-    pub fn emits(sources: &[Source]) -> Vec<bool> {
-        sources.iter().map(|s| s.emitted_power() > 0.0).collect()
-    }
+    /// Of each source, whether it is a strong emitter, which the loop before this one shoots.
+    pub strong: Vec<bool>,
 }
 
 pub(super) struct Several {
@@ -278,12 +271,13 @@ impl Several {
     pub fn foresee(&mut self, emitters: u32) -> Result<()> {
         self.look_ahead.submit()?;
         self.look_ahead.wait()?;
-        self.schedule.emitters(emitters);
         let chosen = self.layout.read(&self.chosen);
-        // Emitters are drawn finer, for now.
-        let emits = std::mem::take(&mut self.team.emits);
-        self.ask(&chosen, |source| !emits[source.index as usize]);
-        self.team.emits = emits;
+        let strong = std::mem::take(&mut self.team.strong);
+        let is_strong = |source: &Waiting| strong[source.index as usize];
+        let left = chosen.waiting.iter().filter(|s| is_strong(s)).count();
+        self.schedule.emitters(emitters, left as u32);
+        self.ask(&chosen, |source| !is_strong(source));
+        self.team.strong = strong;
         Ok(())
     }
 
