@@ -1,5 +1,6 @@
 // Chooses the sources of a batch: those to be drawn with the most unshot power (Southwell), ties to the lower index, and of
-// those whose form factors are kept all that come near the strongest in power, in the order of their indices. One workgroup.
+// those whose form factors are kept all that come near the strongest in power, in the order of their indices, or none while they wait
+// for emission to be drawn. One workgroup.
 // When the stop rule holds it chooses none, so that batches already submitted do nothing.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -83,7 +84,7 @@ void main() {
         bool emission_left = shot[s].w == SHOT_NOTHING;
         float of_reflected = sources[s].kind == KIND_POINT ? 0.0 : sources[s].area * (rgb.r + rgb.g + rgb.b);
         reflected += emission_left ? of_reflected : unshot[s].w;
-        float of_emitted = emission_left ? max(unshot[s].w - of_reflected, 0.0) : 0.0;
+        float of_emitted = emission_left && sources[s].emitted != vec3(0.0) ? max(unshot[s].w - of_reflected, 0.0) : 0.0;
         emitted += of_emitted;
         to_draw += is_kept(s) ? 0.0 : of_emitted;
         of_kept += is_kept(s) ? unshot[s].w : 0.0;
@@ -104,8 +105,8 @@ void main() {
     float unshot_emitted = sums[0].x;
     float emission_to_draw = sums[0].y;
     float unshot_reflected = sums[0].z;
-    // All emission is drawn at last: as long as kept sources have less to send than that, or too little to go on for, they wait, or what
-    // few sources add would be replayed after every few.
+    // All emission is drawn in the end. While kept sources have less to send than that, or too little to go on for, they wait: else all
+    // would be replayed after every few weak emitters.
     bool replays_wait = emission_to_draw > 0.0 && sums[0].w <= max(emission_to_draw, stop_power);
     float kept_power = replays_wait ? 0.0 : best_kept[0];
     uint shots = progress.shots;
@@ -129,7 +130,7 @@ void main() {
                 }
             }
             top = max(top, power);
-            // Replaying costs next to nothing: as long as a kept source has more to send, nothing is drawn.
+            // Replaying costs next to nothing: as long as a kept source has more to send and need not wait, nothing is drawn.
             if (power < kept_power) {
                 winner = NONE;
                 wanted = slot;
