@@ -13,6 +13,7 @@ use mesolux::passes::cull::Culling;
 use mesolux::passes::occluder_tree::shadow_occluders;
 use mesolux::reference;
 use mesolux::solver::{Estimator, Report, Settings, Solver};
+use mesolux::sources::Source;
 
 const FACE: u32 = 32;
 
@@ -131,17 +132,7 @@ fn item_buffers_equal_rays_and_culling_changes_nothing() {
                     "{culling:?}: pixels differ from what rays meet (pixel, expected, drawn): {wrong:?}"
                 );
                 if culling == Culling::Off {
-                    let all = (0..solver.occluders.len())
-                        .filter(|&i| {
-                            !reference::item_buffer::is_left_out(
-                                &solver.elements,
-                                &solver.connections,
-                                &solver.occluders,
-                                source,
-                                i,
-                            )
-                        })
-                        .count();
+                    let all = drawn_without_culling(&solver, source);
                     let of_slot = &drawn[5 * slot..5 * (slot + 1)];
                     assert!(
                         of_slot.iter().all(|&[_, _, d]| d as usize == all),
@@ -162,6 +153,22 @@ fn item_buffers_equal_rays_and_culling_changes_nothing() {
         }
     }
     assert_silent();
+}
+
+/// Occluders that each face of a source's hemicube draws where none is culled.
+fn drawn_without_culling(solver: &Solver, source: &Source) -> usize {
+    let is_left_out = |&i: &usize| {
+        reference::item_buffer::is_left_out(
+            &solver.elements,
+            &solver.connections,
+            &solver.occluders,
+            source,
+            i,
+        )
+    };
+    (0..solver.occluders.len())
+        .filter(|i| !is_left_out(i))
+        .count()
 }
 
 /// Whether lists hold all triangles of a face or are filled again and again, and whether blocks of receivers are passed over as a whole or one by

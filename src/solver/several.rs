@@ -179,7 +179,7 @@ impl Several {
         let progress = chosen.progress;
         let shots = progress.selected + progress.replayed;
         let owners = self.schedule.choose(&chosen.sources, shots);
-        self.ask(&chosen, |source| source.power > 0.0);
+        self.ask(&chosen);
         let rows = self.draw(&chosen.sources, &owners, &mut stages)?;
 
         if let Some(last) = rows.len().checked_sub(1) {
@@ -271,19 +271,19 @@ impl Several {
     pub fn foresee(&mut self, emitters: u32) -> Result<()> {
         self.look_ahead.submit()?;
         self.look_ahead.wait()?;
-        let chosen = self.layout.read(&self.chosen);
-        let strong = std::mem::take(&mut self.team.strong);
-        let is_strong = |source: &Waiting| strong[source.index as usize];
-        let left = chosen.waiting.iter().filter(|s| is_strong(s)).count();
+        let mut chosen = self.layout.read(&self.chosen);
+        let waiting = chosen.waiting.len();
+        let strong = &self.team.strong;
+        chosen.waiting.retain(|s| !strong[s.index as usize]);
+        let left = waiting - chosen.waiting.len();
         self.schedule.emitters(emitters, left as u32);
-        self.ask(&chosen, |source| !is_strong(source));
-        self.team.strong = strong;
+        self.ask(&chosen);
         Ok(())
     }
 
     /// Asks the other devices for the sources with the most unshot power that are not drawn.
-    fn ask(&mut self, chosen: &Chosen, may: impl Fn(&Waiting) -> bool) {
-        let mut waiting: Vec<&Waiting> = chosen.waiting.iter().filter(|s| may(s)).collect();
+    fn ask(&mut self, chosen: &Chosen) {
+        let mut waiting: Vec<&Waiting> = chosen.waiting.iter().collect();
         waiting.sort_by(|a, b| b.power.total_cmp(&a.power).then(a.index.cmp(&b.index)));
         // The last ones may stay unshot when all is done.
         let mut left = 0.0;
