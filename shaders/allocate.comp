@@ -1,6 +1,7 @@
-// Finds room for the form factors of the batch's fresh sources and writes the tables of their rows: for each block of GROUP
-// elements where its factors start, 0 for a block that sees nothing of the source. One workgroup; slots in order, so that
-// which sources are kept is the same every run.
+// Finds room for the rows of a batch and writes their tables: for each block of GROUP elements where
+// its factors start, 0 for a block that sees nothing of the source. Rows that find no room go to a
+// chunk that the batch after the next overwrites. One workgroup; slots in order, so that which
+// sources are kept is the same every run.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_buffer_reference : require
@@ -11,19 +12,19 @@ layout(local_size_x = SELECT_GROUP) in;
 
 layout(scalar, binding = 0) readonly buffer Slots { Slot slots[]; };
 // [slot][block]
-layout(scalar, binding = 1) buffer Occupied { uint occupied[]; };
-layout(scalar, binding = 2) buffer KeptRows { KeptRow kept_rows[]; };
+layout(scalar, binding = 1) readonly buffer Occupied { uint occupied[]; };
+// [slot]
+layout(scalar, binding = 2) writeonly buffer Rows { KeptRow rows[]; };
 layout(scalar, binding = 3) readonly buffer Chunks { uvec2 chunks[]; };
 layout(scalar, binding = 4) buffer State { KeptState state; };
-// Of the pass over elements with a relief for light whose form factors found no room.
-layout(scalar, binding = 5) buffer LooseCommand { ReceiverList loose_command; };
 
 layout(push_constant, scalar) uniform Parameters {
-    uint fresh_slots;
+    uint slot_count;
     uint block_count;
     uint meso_blocks;    // the last of them, with vectors
     uint chunk_count;
     uint chunk_words;
+    uint scratch_chunk;  // has room for all slots
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Words { uint word[]; };
@@ -33,7 +34,6 @@ const uint PLAIN_WORDS = GROUP / 2;
 const uint MESO_WORDS = GROUP / 2 + GROUP;
 
 shared uint first_word[SELECT_GROUP];
-shared uint row_words;
 shared uint row_chunk;
 shared uint row_first;
 
@@ -47,12 +47,9 @@ void main() {
     uint share = (block_count + SELECT_GROUP - 1) / SELECT_GROUP;
     uint begin = min(lane * share, block_count);
     uint end = min(begin + share, block_count);
-    if (lane == 0) {
-        loose_command.groups_y = 0;
-    }
-    for (uint slot = 0; slot < fresh_slots; slot++) {
-        uint source = slots[slot].source;
-        if (source == NONE) {
+    uint scratch_used = 0;
+    for (uint slot = 0; slot < slot_count; slot++) {
+        if (slots[slot].source == NONE) {
             break;
         }
         uint mine = 0;
@@ -73,28 +70,23 @@ void main() {
                 state.used = 0;
             }
             bool fits = state.chunk < chunk_count && words <= chunk_words;
-            row_chunk = fits ? state.chunk : NONE;
-            row_first = state.used;
+            row_chunk = fits ? state.chunk : scratch_chunk;
+            row_first = fits ? state.used : scratch_used;
+            rows[slot] = KeptRow(row_chunk, row_first, slots[slot].scale);
             if (fits) {
-                kept_rows[source] = KeptRow(row_chunk, row_first, slots[slot].scale);
                 state.used += words;
                 state.rows++;
             } else {
-                loose_command.groups_y = 1;
+                scratch_used += words;
             }
         }
         barrier();
-        if (row_chunk != NONE) {
-            Words words = Words(chunks[row_chunk]);
-            uint at = first_word[lane];
-            for (uint block = begin; block < end; block++) {
-                uint count = words_of(slot, block);
-                words.word[row_first + block] = count == 0 ? 0 : at;
-                at += count;
-            }
-        }
+        Words words = Words(chunks[row_chunk]);
+        uint at = first_word[lane];
         for (uint block = begin; block < end; block++) {
-            occupied[slot * block_count + block] = 0;
+            uint count = words_of(slot, block);
+            words.word[row_first + block] = count == 0 ? 0 : at;
+            at += count;
         }
         barrier();
     }

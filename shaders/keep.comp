@@ -1,5 +1,6 @@
-// Keeps the form factors of the batch's fresh sources in the rows that allocate.comp found for them. One subgroup looks after
-// KEEP_BLOCKS blocks of GROUP elements of one slot, most of which may see nothing of the source.
+// Writes the form factors of a batch to the rows that allocate.comp found for them. One subgroup
+// looks after KEEP_BLOCKS blocks of GROUP elements of one slot, most of which may see nothing of the
+// source.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_basic : require
@@ -15,7 +16,8 @@ layout(constant_id = 0) const uint LANES = GROUP / 2;
 layout(local_size_x_id = 0) in;
 
 layout(scalar, binding = 0) readonly buffer Slots { Slot slots[]; };
-layout(scalar, binding = 1) readonly buffer KeptRows { KeptRow kept_rows[]; };
+// [slot]
+layout(scalar, binding = 1) readonly buffer Rows { KeptRow rows[]; };
 layout(scalar, binding = 2) readonly buffer Chunks { uvec2 chunks[]; };
 // [slot][element], of elements without and with relief.
 layout(scalar, binding = 3) readonly buffer Fresh { float fresh[]; };
@@ -55,11 +57,10 @@ void keep(Words words, uint slot, uint block, uint first) {
 
 void main() {
     uint slot = gl_WorkGroupID.y;
-    uint source = slots[slot].source;
-    if (source == NONE || kept_rows[source].chunk == NONE) {
+    if (slots[slot].source == NONE) {
         return;
     }
-    KeptRow row = kept_rows[source];
+    KeptRow row = rows[slot];
     Words words = Words(chunks[row.chunk]);
     uint next = KEEP_BLOCKS * gl_WorkGroupID.x;
     uint end = min(next + KEEP_BLOCKS, block_count);

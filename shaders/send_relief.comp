@@ -43,6 +43,7 @@ layout(push_constant, scalar) uniform Parameters {
     uint most_members;
     uvec2 cells;
     uint by_pixel;            // 1: the pixel estimator has reflected the light already
+    uint first_slot;
 };
 
 shared vec3 part[MOST_DIRECTIONS];
@@ -72,10 +73,11 @@ vec3 with_power(vec3 value, vec3 power, vec3 wanted) {
 }
 
 void main() {
+    // Light by direction is indexed from first_slot on.
     uint slot = gl_WorkGroupID.x;
     uint j = gl_LocalInvocationID.x;
     uint count = cells.x * cells.y;
-    Slot shot = slots[slot];
+    Slot shot = slots[first_slot + slot];
     if (shot.source - first_source >= source_count) {
         return;
     }

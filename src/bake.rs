@@ -42,7 +42,7 @@ pub fn solve_on(
     kept: Option<&Visibility>,
     go_on: impl FnMut(&Update) -> bool,
 ) -> Result<Solver> {
-    let (first, _) = solver::check_devices(devices, settings)?;
+    let first = solver::check_devices(devices, settings)?;
     let elements = elements(first, scene, settings)?;
     if let Some(kept) = kept {
         kept.check(scene, settings)?;

@@ -41,12 +41,13 @@ impl CachedBake {
             // It changes nothing.
             list_room: _,
             visibility_memory,
+            coupling_memory,
             relief,
         } = settings;
         let emitter_shadows = settings.emitter_shadows();
         let key = format!(
-            "bake cache 3, layout {VERSION}\n{maker}\n{scene_hash}\n{estimator:?} {hemicube} {emitter_shadows:?} {residual:?} {shots:?} {seed} \
-             {grouping:?} {culling:?} {merging} {batch} {visibility_memory:?} {:?} {:?}",
+            "bake cache 4, layout {VERSION}\n{maker}\n{scene_hash}\n{estimator:?} {hemicube} {emitter_shadows:?} {residual:?} {shots:?} {seed} \
+             {grouping:?} {culling:?} {merging} {batch} {visibility_memory:?} {coupling_memory} {:?} {:?}",
             relief.transport, relief.directions
         );
         let name: String = Sha256::digest(key)[..16]

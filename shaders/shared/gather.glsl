@@ -1,10 +1,11 @@
-// Every element adds up what the chosen sources send it: form factor times radiosity, the paper's equation (2) by reciprocity. One
-// subgroup a block of GROUP elements, sources in slot order: no atomics, the same bits every run and for every size of subgroup.
-// FROM_RELIEF: some sources send by direction. TO_RELIEF: the elements of this dispatch receive by direction. RELIEF_EVENLY: they
-// have a relief, and take their irradiance alone.
+// Every element adds up what kept rows bring it: form factor times radiosity, the paper's equation (2)
+// by reciprocity. One subgroup a block of GROUP elements, sources in slot order: no atomics, the same
+// bits every run and for every size of subgroup. FROM_RELIEF: some sources send by direction.
+// TO_RELIEF: the elements of this dispatch receive by direction.
 //
-// A dispatch takes emitted or reflected light. Few sources emit, so that its other half mostly need not run; and a software device
-// pays for both sides of every branch, but a loop over the slots of one kind costs what there are of them.
+// A dispatch takes emitted or reflected light. Few sources emit, so that its other half mostly need
+// not run; and a software device pays for both sides of every branch, but a loop over the slots of
+// one kind costs what there are of them.
 
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_ballot : require
@@ -24,11 +25,6 @@
 #else
 #define FLUX float
 #endif
-#if defined(TO_RELIEF) || defined(RELIEF_EVENLY)
-#define FACTOR vec3
-#else
-#define FACTOR float
-#endif
 
 // The workgroup is one subgroup. An invocation takes PAIRS pairs of elements, a pair because two kept factors share a word; the
 // pairs of one step lie side by side.
@@ -36,36 +32,36 @@ layout(constant_id = 0) const uint LANES = GROUP / 2;
 layout(local_size_x_id = 0) in;
 const uint PAIRS = LANES < GROUP / 2 ? GROUP / 2 / LANES : 1;
 
-// The batch's sources: fresh_slots that were just drawn, then kept ones; each fill their slots from the first on.
+// What each source sends, and where its row lies.
 layout(scalar, binding = 0) readonly buffer Slots { Slot slots[]; };
 // Of emitted or of reflected light.
 layout(scalar, binding = 1) buffer Irradiance { vec3 irradiance[]; };
 layout(scalar, binding = 2) buffer IrradianceError { vec3 irradiance_error[]; };
-// Form factors of those that were drawn, [slot][element of this dispatch].
-layout(scalar, binding = 3) readonly buffer Fresh { FACTOR fresh[]; };
-layout(scalar, binding = 4) readonly buffer KeptRows { KeptRow kept_rows[]; };
-layout(scalar, binding = 5) readonly buffer Chunks { uvec2 chunks[]; };
+// [slot]
+layout(scalar, binding = 3) readonly buffer Rows { KeptRow rows[]; };
+layout(scalar, binding = 4) readonly buffer Chunks { uvec2 chunks[]; };
 #ifdef FROM_RELIEF
-// Light that the sources with a relief send by direction, [slot][emitted, reflected][direction].
-layout(scalar, binding = 6) readonly buffer Exits { vec3 exits[]; };
+// Light that the sources with a relief send by direction,
+// [slot from first_slot on][emitted, reflected][direction].
+layout(scalar, binding = 5) readonly buffer Exits { vec3 exits[]; };
 // Words of struct Source.
-layout(scalar, binding = 7) readonly buffer Sources { uint source_words[]; };
-layout(scalar, binding = 8) readonly buffer Balls { vec4 balls[]; };
+layout(scalar, binding = 6) readonly buffer Sources { uint source_words[]; };
+layout(scalar, binding = 7) readonly buffer Balls { vec4 balls[]; };
 #endif
 #ifdef TO_RELIEF
-layout(scalar, binding = 9) readonly buffer MesoElements { MesoElement meso_elements[]; };
+layout(scalar, binding = 8) readonly buffer MesoElements { MesoElement meso_elements[]; };
 // Radiosity for each moment, [response][direction][colour].
-layout(scalar, binding = 10) readonly buffer Albedos { vec3 albedos[]; };
+layout(scalar, binding = 9) readonly buffer Albedos { vec3 albedos[]; };
 // Moments ∫ L ω dω of the light that arrives, in the element's frame, [meso element][direction][colour].
-layout(scalar, binding = 11) buffer Moments { vec3 moments[]; };
-layout(scalar, binding = 12) buffer MesoReflected { Reflected meso_reflected[]; };
+layout(scalar, binding = 10) buffer Moments { vec3 moments[]; };
+layout(scalar, binding = 11) buffer MesoReflected { Reflected meso_reflected[]; };
 #endif
 
 layout(push_constant, scalar) uniform Parameters {
     uint first_element;
     uint element_count;
-    uint fresh_slots;
-    uint slot_count;          // with kept ones
+    uint first_slot;
+    uint end_slot;
     uint first_block;
     uint reflected;           // 0: light that is emitted, 1: that is reflected
 #ifdef FROM_RELIEF
@@ -73,15 +69,7 @@ layout(push_constant, scalar) uniform Parameters {
     uint relief_source_count;
     uvec2 cells;              // of the directions' square
 #endif
-#ifdef TO_RELIEF
-    uint first_slot;
-    uint part;                // EVERYTHING, or of moments alone those by LOOSE_FACTORS or by KEPT_FACTORS
-#endif
 };
-
-const uint EVERYTHING = 0;
-const uint LOOSE_FACTORS = 1;
-const uint KEPT_FACTORS = 2;
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Words { uint word[]; };
 
@@ -90,7 +78,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Wor
 #include "shared/sent.glsl"
 #endif
 
-// One element of this invocation, and what it has received from the batch.
+// One element of this invocation, and what it has received.
 struct Receiver {
     uint i;         // of the elements of the dispatch; NONE: past the last one
     vec3 irradiance;
@@ -103,14 +91,13 @@ struct Receiver {
 #endif
 };
 
-// What a slot sends, and the place of its kept form factors.
+// What a slot sends, and the place of its form factors.
 struct Sent {
     vec3 light;
     uint source;
     float scale;
     uvec2 address;  // of the chunk with the factors
     uint block;     // where this block's factors start; 0: it sees nothing of the source
-    bool loose;     // its form factors are fresh and were not kept
 };
 
 // Place of the n-th element in its block; past the block where there are more lanes than pairs.
@@ -159,7 +146,7 @@ Sender sender(uint source) {
 vec3 sent_to(uint slot, Sender s, vec3 middle) {
     vec3 d = middle - s.middle;
     vec3 local = vec3(dot(d, s.tangent), dot(d, s.bitangent), dot(d, s.normal));
-    return sent_towards(slot, reflected, local * inversesqrt(max(dot(d, d), 1e-38)));
+    return sent_towards(slot - first_slot, reflected, local * inversesqrt(max(dot(d, d), 1e-38)));
 }
 
 bool by_direction(uint source) {
@@ -169,37 +156,31 @@ bool by_direction(uint source) {
 
 // This lane's slot, for all lanes to share.
 Sent look_up(uint slot) {
-    Sent sent = Sent(vec3(0.0), NONE, 1.0, uvec2(0), 0, false);
-    if (slot < slot_count) {
+    Sent sent = Sent(vec3(0.0), NONE, 1.0, uvec2(0), 0);
+    if (slot < end_slot) {
         Slot shot = slots[slot];
         sent.light = reflected == 1 ? shot.reflected : shot.emitted;
         sent.source = shot.source;
         sent.scale = shot.scale;
     }
-    if (sent.source != NONE && sent.light != vec3(0.0)) {
-        KeptRow row = kept_rows[sent.source];
-        sent.loose = row.chunk == NONE;
-        if (!sent.loose) {
-            sent.address = chunks[row.chunk];
-            sent.block = Words(sent.address).word[row.first + first_block + gl_WorkGroupID.x];
-            sent.block += sent.block == 0 ? 0 : row.first;
-        }
+    bool sends = sent.light != vec3(0.0);
+#ifdef FROM_RELIEF
+    // What leaves by direction may sum to nothing.
+    sends = sends || reflected == 1 && by_direction(sent.source);
+#endif
+    if (sends) {
+        KeptRow row = rows[slot];
+        sent.address = chunks[row.chunk];
+        sent.block = Words(sent.address).word[row.first + first_block + gl_WorkGroupID.x];
+        sent.block += sent.block == 0 ? 0 : row.first;
     }
     return sent;
 }
 
 Sent share(Sent sent, uint lane) {
-    return Sent(subgroupBroadcast(sent.light, lane), subgroupBroadcast(sent.source, lane), subgroupBroadcast(sent.scale, lane),
-                subgroupBroadcast(sent.address, lane), subgroupBroadcast(sent.block, lane), false);
-}
-
-// What this dispatch takes of a fresh or kept form factor.
-FLUX as_flux(FACTOR f) {
-#ifdef RELIEF_EVENLY
-    return f.z;
-#else
-    return f;
-#endif
+    return Sent(subgroupBroadcast(sent.light, lane), subgroupBroadcast(sent.source, lane),
+                subgroupBroadcast(sent.scale, lane), subgroupBroadcast(sent.address, lane),
+                subgroupBroadcast(sent.block, lane));
 }
 
 // The two kept form factors of the n-th and the next element.
@@ -207,8 +188,9 @@ void kept_pair(Words words, uint block, uint n, out FLUX f[2]) {
     uint pair = in_block(n) < GROUP ? words.word[block + in_block(n) / 2] : 0;
     for (uint side = 0; side < 2; side++) {
         float factor = kept_factor(side == 0 ? pair & 0xffff : pair >> 16);
-#if defined(TO_RELIEF) || defined(RELIEF_EVENLY)
-        f[side] = as_flux(factor == 0.0 ? vec3(0.0) : factor * kept_direction(words.word[block + GROUP / 2 + in_block(n + side)]));
+#ifdef TO_RELIEF
+        uint direction = words.word[block + GROUP / 2 + in_block(n + side)];
+        f[side] = factor == 0.0 ? vec3(0.0) : factor * kept_direction(direction);
 #else
         f[side] = factor;
 #endif
@@ -231,14 +213,12 @@ void main() {
 #endif
     }
 
-    // Each lane looks up one slot and shares it with the others; slots of which the block sees nothing are passed over.
-#ifdef TO_RELIEF
-    uint next = part != LOOSE_FACTORS ? first_slot : slot_count;
-#else
-    uint next = 0;
-#endif
-    while (next < slot_count) {
-        // On to the next slots of which the block sees any, in a loop of its own: a software device works through what a branch leaves out.
+    // Each lane looks up one slot and shares it with the others; slots of which the block sees nothing
+    // are passed over.
+    uint next = first_slot;
+    while (next < end_slot) {
+        // On to the next slots of which the block sees any, in a loop of its own: a software device
+        // works through what a branch leaves out.
         uint first;
         Sent mine;
         uvec4 even;
@@ -246,9 +226,8 @@ void main() {
             first = next;
             mine = look_up(first + gl_SubgroupInvocationID);
             even = subgroupBallot(mine.block != 0);
-            bool last = first >= fresh_slots && subgroupBallot(mine.source != NONE) == uvec4(0);
-            next = last ? slot_count : first + LANES;
-        } while (even == uvec4(0) && next < slot_count);
+            next = first + LANES;
+        } while (even == uvec4(0) && next < end_slot);
 #ifdef FROM_RELIEF
         uvec4 directed = subgroupBallot(mine.block != 0 && by_direction(mine.source));
         even &= ~directed;
@@ -277,45 +256,13 @@ void main() {
         }
     }
 
-    // Fresh form factors that no memory was left for.
-    for (uint first = 0; first < fresh_slots; first += LANES) {
-        Sent mine = look_up(first + gl_SubgroupInvocationID);
-        uvec4 loose = subgroupBallot(mine.loose);
-        while (any(notEqual(loose, uvec4(0)))) {
-            uint lane = next_lane(loose);
-            Sent sent = share(mine, lane);
-#ifdef FROM_RELIEF
-            Sender s = sender(sent.source);
-#endif
-            for (uint n = 0; n < 2 * PAIRS; n++) {
-                uint i = receivers[n].i;
-                FLUX f = FLUX(0.0);
-                if (i != NONE) {
-                    f = as_flux(fresh[(first + lane) * element_count + i]);
-                }
-                vec3 light = sent.light;
-#ifdef FROM_RELIEF
-                if (by_direction(sent.source)) {
-                    light = sent_to(first + lane, s, receivers[n].middle);
-                }
-#endif
-                receive(receivers[n], sent.scale * f, light);
-            }
-        }
-    }
-
     for (uint n = 0; n < 2 * PAIRS; n++) {
         uint i = receivers[n].i;
         if (i == NONE) {
             continue;
         }
         uint e = first_element + i;
-#ifdef TO_RELIEF
-        if (part == EVERYTHING)
-#endif
-        {
-            accumulate(irradiance[e], irradiance_error[e], receivers[n].irradiance);
-        }
+        accumulate(irradiance[e], irradiance_error[e], receivers[n].irradiance);
 #ifdef TO_RELIEF
         accumulate(meso_reflected[i].sum, meso_reflected[i].error, receivers[n].reflected * meso_elements[i].scale);
 #endif

@@ -9,14 +9,11 @@
 #endif
 #include "shared/receivers.glsl"
 
-// 1: what is passed over is counted by slot, so that a row of form factors that is drawn ahead brings its own count.
-layout(constant_id = 0) const uint AWAY_BY_SLOT = 0;
-
 // 1: blocks of elements that see nothing of a source are passed over as a whole.
-layout(constant_id = 1) const uint CULL_BLOCKS = 1;
+layout(constant_id = 0) const uint CULL_BLOCKS = 1;
 
-// Elements that see nothing of a source, whatever stands between: it lies behind them or shows them its back. By block, counted at
-// one of its elements, or by slot.
+// Elements that see nothing of a source, whatever stands between: it lies behind them or shows them
+// its back, [slot].
 layout(scalar, binding = 7) buffer FacingAway { uint away_count[]; };
 // Those without relief, then those with it.
 layout(scalar, binding = 8) readonly buffer Blocks { ReceiverBlock blocks[]; };
@@ -127,8 +124,7 @@ void main() {
     uint held;
     uint sighted = sighted_slots(first_slot, min(begin, last_element), min(begin + in_range, element_count) - 1, held);
     uint away = held & ~sighted;
-    uint passed_over = in_range * bitCount(away);
-    while (AWAY_BY_SLOT == 1 && away != 0) {
+    while (away != 0) {
         uint k = findLSB(away);
         away &= away - 1;
         if (subgroupElect()) {
@@ -170,13 +166,9 @@ void main() {
                 append(slot, kind[j], mine && (near[j] || seen[j]), i);
                 of_slot += subgroupBallotBitCount(subgroupBallot(i < element_count && kind[j] == RECEIVE_KINDS));
             }
-            passed_over += of_slot;
-            if (AWAY_BY_SLOT == 1 && subgroupElect()) {
+            if (subgroupElect()) {
                 atomicAdd(away_count[slot], of_slot);
             }
         }
-    }
-    if (AWAY_BY_SLOT == 0 && in_range > 0 && subgroupElect()) {
-        away_count[first_element + begin] += passed_over;
     }
 }

@@ -3,12 +3,6 @@
 
 #extension GL_EXT_scalar_block_layout : require
 
-// What is behind the reflected radiosity that a source has shot: nothing yet; its emission too; so, and evenly in all directions
-// though it has a relief.
-const float SHOT_NOTHING = 0.0;
-const float SHOT_EMISSION = 1.0;
-const float SHOT_EVENLY = 2.0;
-
 // A group of neighbouring, nearly coplanar elements that shoots together, or half of a point light.
 struct Source {
     vec3 eye;          // what it sees from: a place on the group's surface, or the point light
@@ -74,7 +68,7 @@ struct Component {
     vec3 high;
 };
 
-// One place of a batch: what is shot now.
+// A source of a batch, and what it sends now.
 struct Slot {
     vec3 emitted;
     uint source;
@@ -90,10 +84,10 @@ struct ReceiverList {
     uint count;
 };
 
-// Where the kept form factors of a source start: first the table of its blocks, in words from here.
+// Where the form factors of a source lie: first the table of its blocks.
 struct KeptRow {
-    uint chunk;        // NONE: they are not kept
-    uint first;
+    uint chunk;
+    uint first;        // word of the chunk
     float scale;       // of all of them
 };
 
@@ -121,13 +115,13 @@ struct Draw {
     uint first_instance;
 };
 
-// What select.comp found before it chose, and what it chose.
-struct Progress {
-    float unshot_emitted;    // power, internal units
-    float unshot_reflected;
-    uint shots;              // so far, this batch included
-    uint selected;           // to be drawn in this batch
-    uint replayed;           // in this batch, from kept form factors
+// A source as it receives: the words of a coupling row that belong to it.
+struct CouplingTarget {
+    uint first_element;
+    uint element_count;
+    uint first_word;
+    uint word_count;   // 1: one reflectance; 3: a colour each; 0 is in no list
+    float inverse_area;
 };
 
 // An element with a relief.

@@ -18,7 +18,15 @@ const BATCHES: [(&str, Culling, bool, usize); 4] = [
     ("no culling", Culling::Off, false, 1),
 ];
 
-/// Prints hemicubes a second, drawing alone (culling and item buffer) and with everything (choosing and binning too).
+/// The sources of a batch, each batch spread over all of them.
+fn batch_of_sources(solver: &Solver, batch: usize) -> Vec<u32> {
+    let count = solver.sources.list.len();
+    let slots = (solver.report().batch as usize).min(count);
+    let source = |slot: usize| ((slot * count / slots + batch) % count) as u32;
+    (0..slots).map(source).collect()
+}
+
+/// Prints hemicubes a second, drawing alone (culling and item buffer) and with everything (form factors, coupling and keeping too).
 pub fn run(device: &Arc<Device>, scene: &Scene, hemicube: u32, rounds: usize) -> Result<()> {
     let mut solvers = Vec::new();
     for (_, culling, merging, _) in BATCHES {
@@ -39,15 +47,16 @@ pub fn run(device: &Arc<Device>, scene: &Scene, hemicube: u32, rounds: usize) ->
     }
     let mut draw = [const { Vec::new() }; BATCHES.len()];
     let mut whole = [const { Vec::new() }; BATCHES.len()];
-    for _ in 0..rounds.max(1) {
+    for round in 0..rounds.max(1) {
         for (i, (.., batches)) in BATCHES.iter().enumerate() {
-            solvers[i].run_batches(*batches, |batch| {
-                let stages = batch.stages;
-                let count = f64::from(batch.progress.selected);
+            for batch in 0..*batches {
+                let sources = batch_of_sources(&solvers[i], round * batches + batch);
+                let stages = solvers[i].draw(&sources)?.stages;
+                let count = sources.len() as f64;
                 let drawing = stages.cull + stages.item_buffer;
                 draw[i].push(count / drawing);
-                whole[i].push(count / (drawing + stages.select + stages.bin));
-            })?;
+                whole[i].push(count / (drawing + stages.bin + stages.keep));
+            }
         }
     }
     println!(
@@ -57,7 +66,7 @@ pub fn run(device: &Arc<Device>, scene: &Scene, hemicube: u32, rounds: usize) ->
         solvers[0].sources.list.len(),
         device.name()
     );
-    println!("hemicubes a second      drawn (10 % to 90 %)         with choosing and binning");
+    println!("hemicubes a second      drawn (10 % to 90 %)         with form factors and keeping");
     for (i, (name, ..)) in BATCHES.iter().enumerate() {
         let (d, d10, d90) = spread(&mut draw[i]);
         let (w, w10, w90) = spread(&mut whole[i]);

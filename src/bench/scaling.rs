@@ -54,7 +54,7 @@ pub struct Row {
     pub setup_seconds: f64,
     pub solve_seconds: f64,
     /// Of the shots, by the device's own clock: choosing, culling, drawing, form factors, gathering.
-    pub select_seconds: f64,
+    pub keep_seconds: f64,
     pub cull_seconds: f64,
     pub draw_seconds: f64,
     pub form_factor_seconds: f64,
@@ -89,7 +89,7 @@ const QUANTITIES: [Quantity; 11] = [
     ("of it elements", |r| r.elements_seconds),
     ("of it setup", |r| r.setup_seconds),
     ("of it shots", |r| r.solve_seconds),
-    ("device: choosing", |r| r.select_seconds),
+    ("device: coupling and keeping", |r| r.keep_seconds),
     ("device: culling", |r| r.cull_seconds),
     ("device: drawing", |r| r.draw_seconds),
     ("device: form factors", |r| r.form_factor_seconds),
@@ -216,7 +216,7 @@ fn bake(
         elements_seconds,
         setup_seconds,
         solve_seconds,
-        select_seconds: report.seconds.select,
+        keep_seconds: report.seconds.keep,
         cull_seconds: report.seconds.cull,
         draw_seconds: report.seconds.item_buffer,
         form_factor_seconds: report.seconds.bin,
@@ -261,7 +261,7 @@ const HEADER: &str = "elements  a source  sources  elements, s  setup, s  shots,
 fn line(row: &Row) -> String {
     let percent = |v: Option<f64>| v.map_or("-".into(), |v| format!("{:.2}", 100.0 * v));
     let stages = [
-        row.select_seconds,
+        row.keep_seconds,
         row.cull_seconds,
         row.draw_seconds,
         row.form_factor_seconds,
@@ -304,7 +304,7 @@ fn write(rows: &[Row], options: &Options, folder: &Path) -> Result<()> {
     write_atomically(&folder.join("scaling.csv"), |out| {
         writeln!(
             out,
-            "scene,max_elements,elements,sources,elements_seconds,setup_seconds,solve_seconds,select_seconds,cull_seconds,draw_seconds,form_factor_seconds,gather_seconds,hemicubes,shots,kept_sources,error_bound,device_bytes,resident_bytes,bias,bias_interval,rms"
+            "scene,max_elements,elements,sources,elements_seconds,setup_seconds,solve_seconds,keep_seconds,cull_seconds,draw_seconds,form_factor_seconds,gather_seconds,hemicubes,shots,kept_sources,error_bound,device_bytes,resident_bytes,bias,bias_interval,rms"
         )?;
         for r in rows {
             let optional = |v: Option<f64>| v.map_or(String::new(), |v| v.to_string());
@@ -319,7 +319,7 @@ fn write(rows: &[Row], options: &Options, folder: &Path) -> Result<()> {
                 r.elements_seconds,
                 r.setup_seconds,
                 r.solve_seconds,
-                r.select_seconds,
+                r.keep_seconds,
                 r.cull_seconds,
                 r.draw_seconds,
                 r.form_factor_seconds,

@@ -89,7 +89,7 @@ pub struct SolveOptions {
     /// Stop after this many seconds
     #[arg(long, value_name = "SECONDS")]
     budget: Option<f64>,
-    /// Stop after this many shots, replayed ones included
+    /// Stop after drawing this many sources
     #[arg(long, value_name = "N")]
     shots: Option<u32>,
     /// MiB on the device for the form factors of sources that have been drawn, which then need no drawing for their further

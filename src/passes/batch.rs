@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::buffers::{SceneBuffers, upload};
 use super::occluder_tree::OccluderTree;
-use super::types::{Draw, ReceiverList, Slot, View};
+use super::types::{Draw, Slot, View};
 use crate::constants::{FACES, MESHLET_TRIANGLES, NONE, RECEIVE_KINDS};
 use crate::error::Result;
 use crate::hemicube::pixel_count;
@@ -16,18 +16,20 @@ use crate::vk::{
 
 /// The sources of a batch.
 pub struct Batch {
-    /// Sources whose form factors are found.
     pub slot_count: u32,
-    /// Slots behind theirs, for sources whose form factors were kept.
-    pub replay_slots: u32,
+    /// [`Slot`], `[slot]`; the slots after the last source hold `NONE`.
     pub slots: Buffer,
-    /// [`ReceiverList`]s: dispatches over the elements without and with relief, where form factors are found in this batch, …
-    pub drawn_commands: Buffer,
-    /// … and where some emit.
-    pub emitting_commands: Buffer,
-    /// One over the elements with relief, where fresh form factors found no room to be kept.
-    pub loose_command: Buffer,
     pub sight: Sight,
+}
+
+/// How large the item buffers of a batch are.
+#[derive(Debug, Clone, Copy)]
+pub struct BatchSize {
+    pub slots: u32,
+    /// Pixels a side of a face.
+    pub face: u32,
+    /// Triangles that a list of a face holds, at most. None: as many as fit the largest buffer.
+    pub list_room: Option<u32>,
 }
 
 /// What finds out what sources see.
@@ -64,49 +66,30 @@ const DRAWN_BYTES: u64 = 16;
 const CORNER_BYTES: u64 = 12;
 
 impl Batch {
-    /// `(slot_count, replay_slots)` as in the fields.
-    pub fn new(
-        device: &Arc<Device>,
-        (slot_count, replay_slots): (u32, u32),
-        sight: Sight,
-    ) -> Result<Self> {
-        let commands = |name| {
-            let bytes = 2 * size_of::<ReceiverList>() as u64;
-            Buffer::new(device, name, bytes, BufferUse::Geometry)
-        };
+    pub fn new(device: &Arc<Device>, slot_count: u32, sight: Sight) -> Result<Self> {
         let empty = Slot {
             emitted: Vec3::ZERO,
             source: NONE,
             reflected: Vec3::ZERO,
             scale: 1.0,
         };
-        let empty = vec![empty; (slot_count + replay_slots) as usize];
+        let empty = vec![empty; slot_count as usize];
         Ok(Self {
             slot_count,
-            replay_slots,
             slots: upload(device, "slots", &empty, BufferUse::Storage)?,
-            drawn_commands: commands("drawn commands")?,
-            emitting_commands: commands("emitting commands")?,
-            loose_command: commands("loose command")?,
             sight,
         })
     }
 
-    /// One that draws, into faces of `face_size` pixels a side, with lists that hold `list_room` triangles or what fits.
+    /// A batch that draws hemicubes.
     pub fn drawing(
         device: &Arc<Device>,
         pass: &RenderPass,
         scene: &SceneBuffers,
-        (face_size, list_room): (u32, Option<u32>),
-        slots: (u32, u32),
+        size: &BatchSize,
     ) -> Result<Self> {
-        let hemicubes = Hemicubes::new(device, pass, scene, (face_size, list_room), slots.0)?;
-        Self::new(device, slots, Sight::Hemicubes(hemicubes))
-    }
-
-    /// Of both kinds.
-    pub fn all_slots(&self) -> u32 {
-        self.slot_count + self.replay_slots
+        let hemicubes = Hemicubes::new(device, pass, scene, size)?;
+        Self::new(device, size.slots, Sight::Hemicubes(hemicubes))
     }
 
     /// Of a batch that draws.
@@ -144,9 +127,13 @@ impl Hemicubes {
         device: &Arc<Device>,
         pass: &RenderPass,
         scene: &SceneBuffers,
-        (face_size, list_room): (u32, Option<u32>),
-        slot_count: u32,
+        size: &BatchSize,
     ) -> Result<Self> {
+        let &BatchSize {
+            slots: slot_count,
+            face: face_size,
+            list_room,
+        } = size;
         let regions = u64::from(slot_count * FACES);
         let most = device.limits().max_storage_buffer_range / (CORNER_BYTES * regions);
         let wanted = list_room.map_or(u64::MAX, u64::from);

@@ -1,12 +1,13 @@
-//! The `pixel` estimator, the paper's equations (1) and (2): form factors summed pixel by pixel, then irradiance. Shaders:
-//! `bin_pixels.comp`, `apply_pixels.comp`; twin: [`crate::reference::bin_pixels`].
+//! The `pixel` estimator, the paper's equations (1) and (2): form factors summed pixel by pixel, as
+//! rows. Shaders: `bin_pixels.comp`, `pixel_rows.comp`; twin: [`crate::reference::bin_pixels`].
 
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
 use super::batch::Batch;
-use super::buffers::{SceneBuffers, State, upload};
+use super::buffers::{SceneBuffers, upload};
+use super::fresh_rows::FreshRows;
 use super::{groups, shaders};
 use crate::error::{Error, Result};
 use crate::hemicube::{fixed_point_tables, pixel_count};
@@ -16,29 +17,22 @@ use crate::vk::{
 
 pub struct BinPixels {
     bin: ComputePipeline,
-    apply: ComputePipeline,
+    rows: ComputePipeline,
 }
 
-/// The form factors of a batch, `[slot][element]`, and the pixels' own.
-pub struct Buffers {
-    deltas: Buffer,
-    form_factors: Buffer,
+/// The pixels' own form factors, and their sums for a batch, `[slot][element]`.
+pub struct Bound {
+    _deltas: Buffer,
+    _sums: Buffer,
     bin: DescriptorSet,
-    apply: DescriptorSet,
-}
-
-impl Buffers {
-    /// The pixels' own form factors and the sums, which live as long as the sets that bind them.
-    pub fn bytes(&self) -> u64 {
-        self.deltas.bytes() + self.form_factors.bytes()
-    }
+    rows: DescriptorSet,
 }
 
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 struct Parameters {
     element_count: u32,
-    /// Of `bin`: pixels a side of a face. Of `apply`: slots of the batch.
+    /// Of `bin`: pixels a side of a face. Of `rows`: blocks of a row.
     second: u32,
 }
 
@@ -63,11 +57,11 @@ impl BinPixels {
                 &[],
                 false,
             )?,
-            apply: ComputePipeline::storage(
+            rows: ComputePipeline::storage(
                 device,
-                "apply pixels",
-                shaders::APPLY_PIXELS_COMP,
-                8,
+                "pixel rows",
+                shaders::PIXEL_ROWS_COMP,
+                6,
                 push,
             )?,
         })
@@ -77,16 +71,16 @@ impl BinPixels {
         &self,
         device: &Arc<Device>,
         scene: &SceneBuffers,
-        state: &State,
         batch: &Batch,
-    ) -> Result<Buffers> {
+        rows: &FreshRows,
+    ) -> Result<Bound> {
         let hemicubes = batch.hemicubes();
         let tables = fixed_point_tables(hemicubes.face_size);
         let deltas = upload(device, "delta form factors", &tables, BufferUse::Storage)?;
         let bytes = 8 * u64::from(batch.slot_count) * u64::from(scene.element_count);
-        let form_factors = Buffer::new(device, "form factors", bytes, BufferUse::Storage)?;
-        Commands::run(device, "form factors", |cmd| {
-            cmd.fill(&form_factors, 0);
+        let sums = Buffer::new(device, "pixel sums", bytes, BufferUse::Storage)?;
+        Commands::run(device, "pixel sums", |cmd| {
+            cmd.fill(&sums, 0);
             Ok(())
         })?;
         let bin = self.bin.bind(
@@ -95,52 +89,51 @@ impl BinPixels {
                 Bind::Buffer(&batch.slots),
                 Bind::Buffer(&scene.sources),
                 Bind::Buffer(&deltas),
-                Bind::Buffer(&form_factors),
+                Bind::Buffer(&sums),
                 Bind::Buffer(&scene.planes),
                 Bind::Image(&hemicubes.items, &hemicubes.sampler),
             ],
         )?;
-        let apply = self.apply.bind(
-            "apply pixels",
-            &[
-                &batch.slots,
-                &scene.sources,
-                &form_factors,
-                &scene.areas,
-                &state.direct,
-                &state.direct_error,
-                &state.indirect,
-                &state.indirect_error,
-            ]
-            .map(Bind::Buffer),
-        )?;
-        Ok(Buffers {
-            deltas,
-            form_factors,
+        let to_rows = [
+            &batch.slots,
+            &scene.sources,
+            &sums,
+            &scene.areas,
+            &rows.plain,
+            &rows.occupied,
+        ];
+        let rows = self.rows.bind("pixel rows", &to_rows.map(Bind::Buffer))?;
+        Ok(Bound {
+            _deltas: deltas,
+            _sums: sums,
             bin,
-            apply,
+            rows,
         })
     }
 
-    pub fn record(&self, cmd: &Commands, buffers: &Buffers, scene: &SceneBuffers, batch: &Batch) {
+    /// After a barrier between earlier readers of the rows and transfers.
+    pub fn record(&self, cmd: &Commands, bound: &Bound, batch: &Batch, rows: &FreshRows) {
+        cmd.fill(&rows.occupied, 0);
+        cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
+        let element_count = rows.shape.plain_count;
         let hemicubes = batch.hemicubes();
         let pixels = pixel_count(hemicubes.face_size) as u32;
         let parameters = |second| Parameters {
-            element_count: scene.element_count,
+            element_count,
             second,
         };
         cmd.dispatch(
             &self.bin,
-            &buffers.bin,
+            &bound.bin,
             &parameters(hemicubes.face_size),
             [groups(pixels), batch.slot_count, 1],
         );
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         cmd.dispatch(
-            &self.apply,
-            &buffers.apply,
-            &parameters(batch.slot_count),
-            [groups(scene.element_count), 1, 1],
+            &self.rows,
+            &bound.rows,
+            &parameters(rows.shape.blocks()),
+            [groups(element_count), batch.slot_count, 1],
         );
     }
 }

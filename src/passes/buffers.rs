@@ -6,9 +6,8 @@ use bytemuck::Pod;
 use glam::Vec3;
 
 use super::receiver_blocks::receiver_blocks;
-use super::types::{Component, KeptRow, Meshlet, Progress, Source, Triangle, contour_corners};
+use super::types::{Component, Meshlet, Source, Triangle, contour_corners};
 use crate::charts::Connections;
-use crate::constants::NONE;
 use crate::elements::Elements;
 use crate::error::Result;
 use crate::meshlets;
@@ -179,19 +178,15 @@ fn components(elements: &Elements, connections: &Connections) -> Vec<Component> 
     components
 }
 
-/// The solution under way, `[element]` and `[source]`.
+/// The light gathered so far, `[element]`, W·m⁻², RGB; direct and indirect irradiance with the rounding
+/// errors of their last sums.
 pub struct State {
     pub direct: Buffer,
     pub direct_error: Buffer,
     pub indirect: Buffer,
     pub indirect_error: Buffer,
-    /// Pairs of shot and element that faced away from one another, each counted at one of the elements about it.
-    pub facing_away: Buffer,
-    pub shot: Buffer,
-    pub unshot: Buffer,
-    pub progress: Buffer,
-    /// Where the form factors of each source are kept.
-    pub kept_rows: Buffer,
+    /// Radiosity that each source reflects, as measured last, RGB, `[source]`.
+    pub reflected: Buffer,
 }
 
 impl State {
@@ -205,24 +200,8 @@ impl State {
             direct_error: zeroed("direct error", 12 * elements)?,
             indirect: zeroed("indirect", 12 * elements)?,
             indirect_error: zeroed("indirect error", 12 * elements)?,
-            facing_away: zeroed("facing away", 4 * elements)?,
-            shot: zeroed("shot", 16 * sources)?,
-            unshot: zeroed("unshot", 16 * sources)?,
-            progress: zeroed("progress", size_of::<Progress>() as u64)?,
-            kept_rows: filled(
-                device,
-                "kept rows",
-                size_of::<KeptRow>() as u64 * sources,
-                NONE,
-            )?,
+            reflected: zeroed("source reflected", 12 * sources)?,
         })
-    }
-}
-
-impl State {
-    /// Says where the form factors of the first sources lie.
-    pub fn keep_rows(&self, device: &Arc<Device>, rows: &[KeptRow]) -> Result<()> {
-        write(device, &self.kept_rows, rows)
     }
 }
 

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 
 use super::batch::{Batch, Sight};
-use super::buffers::{SceneBuffers, write};
-use super::factor_buffers::{FactorBuffers, ReceiverLists};
+use super::buffers::SceneBuffers;
+use super::fresh_rows::{FreshRows, ReceiverLists};
 use super::types::ReceiverList;
 use super::{groups, shaders};
 use crate::constants::{RECEIVE_KINDS, SORT_ELEMENTS, SORT_SLOTS};
@@ -30,20 +30,10 @@ pub enum SeenBy {
     ShadowRays,
 }
 
-/// How elements are counted that see nothing of a source, whatever stands between: it lies behind them or shows them its back.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FacingAway {
-    /// At one of a few neighbouring elements, over all batches.
-    ByElement,
-    /// By slot, of one batch.
-    BySlot,
-}
-
 /// How receivers are sorted.
 #[derive(Debug, Clone, Copy)]
 pub struct Sorting {
     pub seen_by: SeenBy,
-    pub facing_away: FacingAway,
     /// Whether blocks of elements that see nothing of a source are passed over as a whole. The lists are the same.
     pub culls: bool,
 }
@@ -123,8 +113,7 @@ impl FormFactors {
                 shaders::FORM_FACTORS_RELIEF_RAYS_COMP,
             ],
         };
-        let by_slot = sorting.facing_away == FacingAway::BySlot;
-        let sort_constants = [by_slot.into(), sorting.culls.into()];
+        let sort_constants = [sorting.culls.into()];
         let sort = ("sort receivers", sort);
         let plain = ("form factors", plain);
         let meso = ("form factors to relief", meso);
@@ -139,18 +128,12 @@ impl FormFactors {
         })
     }
 
-    /// Workgroups that sort the elements without and with relief.
-    pub fn sort_groups(&self, factors: &FactorBuffers) -> [u32; 2] {
-        [factors.plain_count, factors.meso_count].map(|count| groups(count.div_ceil(SORT_ELEMENTS)))
-    }
-
-    /// `facing_away` counts as [`FacingAway`] says; `meso` are the elements with a relief.
+    /// `meso`: the elements with a relief.
     pub fn bind(
         &self,
-        device: &Arc<Device>,
-        (scene, facing_away): (&SceneBuffers, &Buffer),
+        scene: &SceneBuffers,
         batch: &Batch,
-        factors: &FactorBuffers,
+        rows: &FreshRows,
         meso: Option<&Buffer>,
     ) -> Result<Sets> {
         let (seen, last) = match &batch.sight {
@@ -174,14 +157,14 @@ impl FormFactors {
                 .to_vec();
                 binds.push(seen);
                 let mut sort = binds.clone();
-                sort.extend([facing_away, &scene.receiver_blocks].map(Bind::Buffer));
+                sort.extend([&rows.facing_away, &scene.receiver_blocks].map(Bind::Buffer));
                 sort.extend(last);
                 let sort = self.sort.bind("sort receivers", &sort)?;
                 let rest = [
                     &scene.contours,
                     &scene.triangles,
                     &scene.parts,
-                    &factors.occupied,
+                    &rows.occupied,
                     fresh,
                 ];
                 binds.extend(rest.map(Bind::Buffer));
@@ -190,23 +173,21 @@ impl FormFactors {
                 let kinds = pipelines.iter().map(|p| p.bind("form factors", &binds));
                 Ok::<_, crate::error::Error>((sort, kinds.collect::<Result<Vec<_>>>()?))
             };
-        let commands = self.sort_groups(factors).map(ReceiverList::idle);
-        write(device, &batch.drawn_commands, &commands)?;
-        let (sort, kinds) = bind(&self.plain, &factors.plain_lists, &factors.fresh, None)?;
+        let (sort, kinds) = bind(&self.plain, &rows.plain_lists, &rows.plain, None)?;
         let plain = Range {
             first_element: 0,
-            element_count: factors.plain_count,
+            element_count: rows.shape.plain_count,
             first_block: 0,
             sort,
             kinds,
         };
         let meso = meso.map(|elements| {
-            let (lists, fresh) = (&factors.meso_lists, &factors.fresh_meso);
+            let (lists, fresh) = (&rows.meso_lists, &rows.meso);
             let (sort, kinds) = bind(&self.meso, lists, fresh, Some(elements))?;
             Ok::<_, crate::error::Error>(Range {
-                first_element: factors.plain_count,
-                element_count: factors.meso_count,
-                first_block: factors.plain_blocks(),
+                first_element: rows.shape.plain_count,
+                element_count: rows.shape.meso_count,
+                first_block: rows.shape.plain_blocks(),
                 sort,
                 kinds,
             })
@@ -217,20 +198,18 @@ impl FormFactors {
         })
     }
 
-    pub fn record(&self, cmd: &Commands, sets: &Sets, batch: &Batch, factors: &FactorBuffers) {
+    /// After a barrier between earlier readers of the rows and transfers.
+    pub fn record(&self, cmd: &Commands, sets: &Sets, batch: &Batch, rows: &FreshRows) {
         let meso = sets.meso.as_ref();
-        let of_meso = meso.map(|m| (m, &self.meso, &factors.meso_lists, &factors.fresh_meso));
-        let of_plain = (
-            &sets.plain,
-            &self.plain,
-            &factors.plain_lists,
-            &factors.fresh,
-        );
+        let of_meso = meso.map(|m| (m, &self.meso, &rows.meso_lists, &rows.meso));
+        let of_plain = (&sets.plain, &self.plain, &rows.plain_lists, &rows.plain);
         let ranges = || std::iter::once(of_plain).chain(of_meso);
         for (.., lists, fresh) in ranges() {
             cmd.copy(&lists.empty, 0, &lists.counts, 0, lists.empty.bytes());
             cmd.fill(fresh, 0);
         }
+        cmd.fill(&rows.occupied, 0);
+        cmd.fill(&rows.facing_away, 0);
         cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
         // Rays of one slot at a time.
         let (face_size, at_once) = match &batch.sight {
@@ -244,19 +223,18 @@ impl FormFactors {
             first_slot: slots.start,
             end_slot: slots.end,
             first_block: range.first_block,
-            block_count: factors.blocks(),
+            block_count: rows.shape.blocks(),
         };
         for first in (0..batch.slot_count).step_by(at_once as usize) {
-            for (i, (range, ..)) in ranges().enumerate() {
-                // A batch of replays alone sorts nothing.
-                let at = (size_of::<ReceiverList>() * i) as u64;
+            for (range, ..) in ranges() {
                 let slots = first..(first + at_once).min(batch.slot_count);
-                let push = parameters(range, slots);
-                cmd.dispatch_indirect(&self.sort, &range.sort, &push, (&batch.drawn_commands, at));
+                let size = [groups(range.element_count.div_ceil(SORT_ELEMENTS)), 1, 1];
+                if range.element_count > 0 {
+                    cmd.dispatch(&self.sort, &range.sort, &parameters(range, slots), size);
+                }
             }
-            // What faces away is counted by the next ones too.
-            cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         }
+        cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         // Every element is in one list of a slot at most.
         for (range, pipelines, lists, _) in ranges() {
             for slot in 0..batch.slot_count {

@@ -1,34 +1,37 @@
-//! Keeps the form factors of drawn sources, so that their further shots need no drawing. Shaders: `allocate.comp`, `keep.comp`;
-//! the codes' twin: [`crate::reference::kept`].
+//! Keeps the rows of a batch. Shaders: `allocate.comp`, `keep.comp`; the codes' twin:
+//! [`crate::reference::kept`].
 
 use std::sync::Arc;
 
-use super::batch::Batch;
-use super::buffers::State;
-use super::factor_buffers::FactorBuffers;
+use super::fresh_rows::FreshRows;
+use super::kept_rows::KeptRows;
 use super::shaders;
+use super::types::KeptRow;
 use crate::constants::KEEP_BLOCKS;
 use crate::error::Result;
-use crate::vk::{Bind, Binding, Commands, ComputePipeline, DescriptorSet, Device, Stage};
+use crate::vk::{
+    Bind, Binding, Buffer, BufferUse, Commands, ComputePipeline, DescriptorSet, Device, Stage,
+};
 
 pub struct Keep {
     allocate: ComputePipeline,
     keep: ComputePipeline,
 }
 
-/// Sets of [`Keep`].
-pub struct Sets {
+/// Where the rows of a batch have been put.
+pub struct Bound {
     allocate: DescriptorSet,
     keep: DescriptorSet,
+    /// [`KeptRow`], `[slot]`.
+    pub rows: Buffer,
+    slot_count: u32,
 }
 
 impl Keep {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
-        let make = |name, spirv, buffers, words: usize| {
-            ComputePipeline::storage(device, name, spirv, buffers, 4 * words)
-        };
+        let allocate = shaders::ALLOCATE_COMP;
         Ok(Self {
-            allocate: make("allocate", shaders::ALLOCATE_COMP, 6, 5)?,
+            allocate: ComputePipeline::storage(device, "allocate", allocate, 5, 4 * 6)?,
             keep: ComputePipeline::new(
                 device,
                 "keep",
@@ -41,47 +44,58 @@ impl Keep {
         })
     }
 
-    pub fn bind(&self, state: &State, batch: &Batch, factors: &FactorBuffers) -> Result<Sets> {
+    pub fn bind(
+        &self,
+        device: &Arc<Device>,
+        slots: &Buffer,
+        slot_count: u32,
+        fresh: &FreshRows,
+        kept: &KeptRows,
+    ) -> Result<Bound> {
+        let bytes = u64::from(slot_count) * size_of::<KeptRow>() as u64;
+        let rows = Buffer::new(device, "rows of a batch", bytes, BufferUse::Storage)?;
         let allocate = [
-            &batch.slots,
-            &factors.occupied,
-            &state.kept_rows,
-            &factors.table,
-            &factors.state,
-            &batch.loose_command,
+            slots,
+            &fresh.occupied,
+            &rows,
+            &kept.table,
+            &kept.state,
         ];
-        let keep = [
-            &batch.slots,
-            &state.kept_rows,
-            &factors.table,
-            &factors.fresh,
-            &factors.fresh_meso,
-        ];
-        Ok(Sets {
-            allocate: self
-                .allocate
-                .bind("allocate", &allocate.map(Bind::Buffer))?,
+        let keep = [slots, &rows, &kept.table, &fresh.plain, &fresh.meso];
+        Ok(Bound {
+            allocate: (self.allocate).bind("allocate", &allocate.map(Bind::Buffer))?,
             keep: self.keep.bind("keep", &keep.map(Bind::Buffer))?,
+            rows,
+            slot_count,
         })
     }
 
-    pub fn record(&self, cmd: &Commands, sets: &Sets, batch: &Batch, factors: &FactorBuffers) {
+    /// `scratch`: which of the [`super::kept_rows::SCRATCH`] chunks takes the rows without room.
+    pub fn record(
+        &self,
+        cmd: &Commands,
+        bound: &Bound,
+        kept: &KeptRows,
+        scratch: u32,
+    ) {
+        let shape = kept.shape;
         let allocate = [
-            batch.slot_count,
-            factors.blocks(),
-            factors.meso_blocks(),
-            factors.chunk_count(),
-            factors.chunk_words,
+            bound.slot_count,
+            shape.blocks(),
+            shape.meso_blocks(),
+            kept.chunk_count(),
+            kept.chunk_words,
+            kept.chunk_count() + scratch,
         ];
-        cmd.dispatch(&self.allocate, &sets.allocate, &allocate, [1, 1, 1]);
+        cmd.dispatch(&self.allocate, &bound.allocate, &allocate, [1, 1, 1]);
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         let keep = [
-            factors.plain_count,
-            factors.plain_blocks(),
-            factors.meso_count,
-            factors.blocks(),
+            shape.plain_count,
+            shape.plain_blocks(),
+            shape.meso_count,
+            shape.blocks(),
         ];
-        let size = [factors.blocks().div_ceil(KEEP_BLOCKS), batch.slot_count, 1];
-        cmd.dispatch(&self.keep, &sets.keep, &keep, size);
+        let size = [shape.blocks().div_ceil(KEEP_BLOCKS), bound.slot_count, 1];
+        cmd.dispatch(&self.keep, &bound.keep, &keep, size);
     }
 }

@@ -1,4 +1,4 @@
-//! Unshot power of every source. Shader: `measure.comp`; twin: [`crate::reference::measure`].
+//! Radiosity that every source reflects. Shader: `measure.comp`; twin: [`crate::reference::measure`].
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ pub struct Measure {
 impl Measure {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
         Ok(Self {
-            pipeline: ComputePipeline::storage(device, "measure", shaders::MEASURE_COMP, 7, 4)?,
+            pipeline: ComputePipeline::storage(device, "measure", shaders::MEASURE_COMP, 6, 4)?,
         })
     }
 
@@ -27,8 +27,7 @@ impl Measure {
                 &scene.areas,
                 &state.direct,
                 &state.indirect,
-                &state.shot,
-                &state.unshot,
+                &state.reflected,
             ]
             .map(Bind::Buffer),
         )

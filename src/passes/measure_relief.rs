@@ -1,4 +1,4 @@
-//! Unshot power of the sources with a relief, after [`super::measure`]. Shader: `measure_relief.comp`; its twin is
+//! Radiosity that the sources with a relief reflect, after [`super::measure`]. Shader: `measure_relief.comp`; its twin is
 //! [`crate::reference::measure`] with the reflected light for reflectance times irradiance.
 
 use std::sync::Arc;
@@ -20,7 +20,7 @@ impl MeasureRelief {
                 device,
                 "measure relief",
                 shaders::MEASURE_RELIEF_COMP,
-                5,
+                4,
                 12,
             )?,
         })
@@ -38,8 +38,7 @@ impl MeasureRelief {
                 &scene.sources,
                 &scene.areas,
                 &relief.reflected,
-                &state.shot,
-                &state.unshot,
+                &state.reflected,
             ]
             .map(Bind::Buffer),
         )

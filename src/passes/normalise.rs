@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::batch::Batch;
 use super::buffers::SceneBuffers;
-use super::factor_buffers::FactorBuffers;
+use super::fresh_rows::FreshRows;
 use super::shaders;
 use crate::error::Result;
 use crate::vk::{Bind, Commands, ComputePipeline, DescriptorSet, Device};
@@ -25,7 +25,7 @@ impl Normalise {
         &self,
         scene: &SceneBuffers,
         batch: &Batch,
-        factors: &FactorBuffers,
+        rows: &FreshRows,
     ) -> Result<DescriptorSet> {
         self.pipeline.bind(
             "normalise",
@@ -33,8 +33,8 @@ impl Normalise {
                 &batch.slots,
                 &scene.sources,
                 &scene.areas,
-                &factors.fresh,
-                &factors.fresh_meso,
+                &rows.plain,
+                &rows.meso,
             ]
             .map(Bind::Buffer),
         )
@@ -45,9 +45,9 @@ impl Normalise {
         cmd: &Commands,
         set: &DescriptorSet,
         batch: &Batch,
-        factors: &FactorBuffers,
+        rows: &FreshRows,
     ) {
-        let counts = [factors.plain_count, factors.meso_count];
+        let counts = [rows.shape.plain_count, rows.shape.meso_count];
         cmd.dispatch(&self.pipeline, set, &counts, [batch.slot_count, 1, 1]);
     }
 }

@@ -6,7 +6,7 @@ use bytemuck::Zeroable;
 use glam::Vec3;
 
 use super::buffers::upload;
-use super::types::{MesoElement, Reflected, Slot};
+use super::types::{MesoElement, Reflected};
 use crate::directions::Directions;
 use crate::elements::Elements;
 use crate::error::{Error, Result};
@@ -35,8 +35,8 @@ pub struct ReliefBuffers {
     pub source_count: u32,
     /// Most elements of a source.
     pub most_members: u32,
-    /// Some of its sources emit.
-    pub glows: bool,
+    /// Sources that send by direction at once, at most.
+    pub slots: u32,
     pub elements: Buffer,
     /// R, `[response][in][out][colour]`, vectors.
     pub matrices: Buffer,
@@ -55,8 +55,6 @@ pub struct ReliefBuffers {
     pub member_exits: Buffer,
     /// `[slot][emitted, reflected][direction]`.
     pub exits: Buffer,
-    /// All light that was shot evenly, as slots, `[source]`.
-    pub recalled: Buffer,
     /// Slots without light that were left out, `[relief source]`.
     pub dark_slots: Buffer,
     /// Whether elements reflect by the normal and albedo of each pixel; the rest is for that alone.
@@ -67,8 +65,13 @@ pub struct ReliefBuffers {
     pub outgoing: Buffer,
 }
 
+/// Memory for what the members of sources send, and the most sources of a dispatch: a software device
+/// ends a shader's loops after 65,535 turns of all together.
+const SENDING_BYTES: u64 = 32 << 20;
+const MOST_SENDING: u64 = 256;
+
 impl ReliefBuffers {
-    /// `by_pixel`: whether each pixel reflects by its own normal and albedo, as `pixel` estimator and `paper` transport do.
+    /// `by_pixel_slots`: slots of a batch of the `pixel` estimator. `by_pixel`: whether each pixel reflects by its own normal and albedo, as `pixel` estimator and `paper` transport do.
     ///
     /// # Errors
     /// More directional state than a buffer of the device may hold.
@@ -77,7 +80,7 @@ impl ReliefBuffers {
         elements: &Elements,
         relief: &Relief,
         sources: &Sources,
-        batch_slots: u32,
+        by_pixel_slots: Option<u32>,
         by_pixel: bool,
     ) -> Result<Self> {
         let k = relief.directions.count() as u64;
@@ -100,9 +103,13 @@ impl ReliefBuffers {
             .map(|s| s.element_count)
             .max()
             .unwrap_or(1);
-        let glows = sources.list[of_relief.clone()]
-            .iter()
-            .any(|s| s.emitted != Vec3::ZERO);
+        let batch_slots = match by_pixel_slots {
+            Some(slots) => slots,
+            None => {
+                let slot = 12 * k * u64::from(most_members);
+                (SENDING_BYTES / slot).clamp(1, MOST_SENDING) as u32
+            }
+        };
         let gpu_elements = meso_elements(elements, relief);
         let (texels, facets) = match &relief.texels {
             Some(on) if by_pixel => (on.elements[meso.clone()].to_vec(), on.facets.clone()),
@@ -141,7 +148,7 @@ impl ReliefBuffers {
             first_source: of_relief.start as u32,
             source_count: of_relief.len() as u32,
             most_members,
-            glows,
+            slots: batch_slots,
             elements: upload(device, "meso elements", &gpu_elements, BufferUse::Storage)?,
             matrices: upload(device, "relief matrices", &matrices, BufferUse::Storage)?,
             albedos: upload(device, "relief albedos", &albedos, BufferUse::Storage)?,
@@ -156,10 +163,6 @@ impl ReliefBuffers {
             shot_exits: zeroed("shot exits", 12 * k * of_relief.len() as u64)?,
             member_exits: storage("member exits", 12 * k * slots * u64::from(most_members))?,
             exits: storage("exits", 24 * k * slots)?,
-            recalled: storage(
-                "recalled",
-                (size_of::<Slot>() * sources.list.len().max(1)) as u64,
-            )?,
             dark_slots: zeroed("dark slots", 4 * of_relief.len() as u64)?,
             by_pixel,
             // No buffer is empty: a shader that does not read one binds it all the same.

@@ -1,14 +1,14 @@
 //! What the chosen sources with a relief send by direction: the paper's equation (3). Shader: `send_relief.comp`; twin:
 //! [`crate::reference::send_relief`].
 
+use std::ops::Range;
 use std::sync::Arc;
 
-use super::batch::Batch;
 use super::buffers::SceneBuffers;
 use super::relief_buffers::ReliefBuffers;
 use super::shaders;
 use crate::error::Result;
-use crate::vk::{Bind, Commands, ComputePipeline, DescriptorSet, Device};
+use crate::vk::{Bind, Buffer, Commands, ComputePipeline, DescriptorSet, Device};
 
 pub struct SendRelief {
     pipeline: ComputePipeline,
@@ -22,7 +22,7 @@ impl SendRelief {
                 "send relief",
                 shaders::SEND_RELIEF_COMP,
                 15,
-                28,
+                32,
             )?,
         })
     }
@@ -30,13 +30,13 @@ impl SendRelief {
     pub fn bind(
         &self,
         scene: &SceneBuffers,
-        batch: &Batch,
+        slots: &Buffer,
         relief: &ReliefBuffers,
     ) -> Result<DescriptorSet> {
         self.pipeline.bind(
             "send relief",
             &[
-                &batch.slots,
+                slots,
                 &scene.sources,
                 &scene.planes,
                 &scene.areas,
@@ -56,12 +56,13 @@ impl SendRelief {
         )
     }
 
+    /// For `slots`, no more than `relief.slots`; what they send is indexed from the first of them.
     pub fn record(
         &self,
         cmd: &Commands,
         set: &DescriptorSet,
         relief: &ReliefBuffers,
-        batch: &Batch,
+        slots: Range<u32>,
     ) {
         let [columns, rows] = relief.cells();
         let parameters = [
@@ -72,7 +73,9 @@ impl SendRelief {
             columns,
             rows,
             u32::from(relief.by_pixel),
+            slots.start,
         ];
-        cmd.dispatch(&self.pipeline, set, &parameters, [batch.all_slots(), 1, 1]);
+        let size = [slots.end - slots.start, 1, 1];
+        cmd.dispatch(&self.pipeline, set, &parameters, size);
     }
 }

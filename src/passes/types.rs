@@ -170,19 +170,7 @@ pub struct ReceiverList {
     pub count: u32,
 }
 
-impl ReceiverList {
-    /// Of as many workgroups once there is something to do.
-    pub fn idle(groups_x: u32) -> Self {
-        Self {
-            groups_x,
-            groups_y: 0,
-            groups_z: 1,
-            count: 0,
-        }
-    }
-}
-
-/// Where the kept form factors of a source start; `chunk` is `NONE` where they are not kept.
+/// Where the form factors of a source lie: word `first` of a chunk.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct KeptRow {
@@ -220,14 +208,16 @@ pub struct Draw {
     pub first_instance: u32,
 }
 
+/// A source as it receives: the words of a coupling row that belong to it.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
-pub struct Progress {
-    pub unshot_emitted: f32,
-    pub unshot_reflected: f32,
-    pub shots: u32,
-    pub selected: u32,
-    pub replayed: u32,
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct CouplingTarget {
+    pub first_element: u32,
+    pub element_count: u32,
+    pub first_word: u32,
+    /// 1 where all members have one reflectance, 3 otherwise.
+    pub word_count: u32,
+    pub inverse_area: f32,
 }
 
 /// An element with a relief.

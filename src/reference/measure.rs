@@ -1,4 +1,4 @@
-//! Twin of the measuring pass: unshot power of every source.
+//! Twin of the measuring pass: the radiosity that every source reflects.
 
 use glam::{DVec3, Vec3};
 
@@ -6,41 +6,20 @@ use crate::constants::KIND_POINT;
 use crate::elements::Elements;
 use crate::sources::Source;
 
-/// What a source has shot: reflected radiosity, and whether its emission went out.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Shot {
-    pub reflected: DVec3,
-    pub emission: bool,
-}
-
-/// Unshot reflected radiosity and unshot power (internal units, summed over the colours) of each source.
-pub fn measure(
-    elements: &Elements,
-    sources: &[Source],
-    irradiance: &[Vec3],
-    shot: &[Shot],
-) -> Vec<(DVec3, f64)> {
-    sources
-        .iter()
-        .zip(shot)
-        .map(|(source, shot)| {
-            let emitted = if shot.emission {
-                0.0
-            } else {
-                source.emitted_power()
-            };
-            if source.kind == KIND_POINT {
-                return (DVec3::ZERO, emitted);
-            }
-            let range = source.first_element as usize
-                ..(source.first_element + source.element_count) as usize;
-            let area: f64 = range.clone().map(|e| elements.area[e]).sum();
-            let reflected = range
-                .map(|e| (elements.reflectance[e] * irradiance[e]).as_dvec3() * elements.area[e])
-                .sum::<DVec3>()
-                / area;
-            let unshot = reflected - shot.reflected;
-            (unshot, emitted + source.area * unshot.abs().element_sum())
-        })
-        .collect()
+/// Mean by area over a source's members of reflectance times irradiance, RGB, `[source]`.
+pub fn measure(elements: &Elements, sources: &[Source], irradiance: &[Vec3]) -> Vec<DVec3> {
+    let of_source = |source: &Source| {
+        if source.kind == KIND_POINT {
+            return DVec3::ZERO;
+        }
+        let first = source.first_element as usize;
+        let range = first..first + source.element_count as usize;
+        let area: f64 = range.clone().map(|e| elements.area[e]).sum();
+        let reflected = |e: usize| elements.reflectance[e] * irradiance[e];
+        let sum: DVec3 = range
+            .map(|e| reflected(e).as_dvec3() * elements.area[e])
+            .sum();
+        sum / area
+    };
+    sources.iter().map(of_source).collect()
 }

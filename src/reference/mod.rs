@@ -1,6 +1,7 @@
 //! The slow, obviously right twin of each GPU pass, in f64 on the CPU.
 
 pub mod bin_pixels;
+pub mod couple;
 pub mod cull;
 pub mod disc;
 pub mod form_factors;
@@ -12,7 +13,7 @@ pub mod occluder_rays;
 pub mod pixels_relief;
 pub mod relief_rays;
 pub mod relief_visibility;
-pub mod select;
+
 pub mod send_relief;
 pub mod shade;
 pub mod shadow_rays;

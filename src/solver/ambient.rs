@@ -2,11 +2,9 @@
 
 use glam::{DVec3, Vec3};
 
-use super::Solver;
-use crate::constants::KIND_POINT;
+use super::{Method, Solver};
 use crate::elements::Elements;
 use crate::error::Result;
-use crate::passes::buffers::download;
 
 /// How unshot light would arrive if it were spread evenly over the whole scene.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -39,25 +37,11 @@ const LEAST_LOST: f64 = 1e-3;
 impl Solver {
     /// The estimate for what is unshot now: since the last [`Solver::run`].
     pub fn ambient(&self) -> Result<Ambient> {
-        let sources = &self.sources.list;
-        let shot: Vec<[f32; 4]> = download(&self.device, &self.state.shot, sources.len())?;
-        let unshot: Vec<[f32; 4]> = download(&self.device, &self.state.unshot, sources.len())?;
-        let power =
-            sources
-                .iter()
-                .zip(shot.iter().zip(unshot))
-                .map(|(source, (shot, [r, g, b, _]))| {
-                    let emitted = match shot[3] == 0.0 {
-                        true => source.emitted.as_dvec3(),
-                        false => DVec3::ZERO,
-                    };
-                    match source.kind {
-                        // Half of the sphere of directions.
-                        KIND_POINT => emitted * std::f64::consts::TAU,
-                        _ => (emitted + Vec3::new(r, g, b).as_dvec3()) * source.area,
-                    }
-                });
-        Ok(Ambient::new(power.sum(), &self.elements))
+        let unshot = match &self.method {
+            Method::Rows(spine) => spine.unshot_by_colour(),
+            Method::Shots(shots) => shots.unshot_by_colour(&self.state)?,
+        };
+        Ok(Ambient::new(unshot, &self.elements))
     }
 }
 

@@ -1,17 +1,10 @@
-//! Looks at single sources, for a person's eyes.
-
-use glam::Vec3;
+//! Pictures of what single sources see.
 
 use super::Solver;
+use super::drawing::Drawing;
 use crate::constants::{KIND_POINT, NONE};
 use crate::error::Result;
-use crate::hemicube::pixel_count;
-use crate::passes::batch::Batch;
-use crate::passes::buffers::write;
-use crate::passes::cull::Cull;
-use crate::passes::item_buffer::ItemBuffer;
-use crate::passes::types::Slot;
-use crate::vk::{Buffer, BufferUse, Commands, Stage};
+use crate::passes::batch::BatchSize;
 
 /// What one source sees.
 #[derive(Debug, Clone)]
@@ -49,33 +42,19 @@ impl Solver {
         );
         let (device, scene) = (&self.device, &self.scene);
         let face = self.settings.hemicube;
-        let item_buffer = ItemBuffer::new(device)?;
-        let batch = Batch::drawing(device, &item_buffer.pass, scene, (face, None), (1, 0))?;
-        let slot = Slot {
-            emitted: Vec3::ONE,
-            source,
-            reflected: Vec3::ZERO,
-            scale: 1.0,
+        let size = BatchSize {
+            slots: 1,
+            face,
+            list_room: None,
         };
-        write(device, &batch.slots, &[slot])?;
-        let cull = Cull::new(device, self.settings.culling)?;
-        let sets = (cull.bind(scene, &batch)?, item_buffer.bind(&batch)?);
-        let pixels = pixel_count(face);
-        let bytes = 4 * pixels as u64;
-        let readback = Buffer::new(device, "item picture", bytes, BufferUse::Readback)?;
-        Commands::run(device, "item picture", |cmd| {
-            item_buffer.record(cmd, &sets.1, (&cull, &sets.0), (scene, &batch), || {});
-            cmd.copy_shader_image_to_buffer(&batch.hemicubes().items, &readback);
-            cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
-            Ok(())
-        })?;
+        let (drawing, batch) = Drawing::new(device, scene, self.settings.culling, &size)?;
+        let drawn = drawing.draw(device, scene, &batch, source)?;
         let input = &self.elements.input_index;
-        let items: Vec<u32> = readback.read(0, pixels);
         let of_input = |item: u32| input.get(item as usize).copied().unwrap_or(NONE);
         Ok(ItemPicture {
             source,
             face,
-            items: items.into_iter().map(of_input).collect(),
+            items: drawn.into_iter().map(of_input).collect(),
         })
     }
 }

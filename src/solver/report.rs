@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::{BatchResult, Estimator, Settings};
+use super::rows::{Row, Stages};
+use super::{Estimator, Settings};
 use crate::elements::Elements;
 use crate::meso::{Class, Relief, Transport};
 use crate::passes::cull::Culling;
@@ -30,12 +31,16 @@ pub struct Seconds {
     /// Wall time of all batches.
     pub solve_wall: f64,
     // By GPU timestamps:
-    pub select: f64,
     pub cull: f64,
     pub item_buffer: f64,
     /// Form factors.
     pub bin: f64,
-    /// Irradiance from form factors, fresh and kept.
+    /// Coupling the sources, and keeping their form factors.
+    pub keep: f64,
+    // Wall time:
+    /// Solving among the sources.
+    pub solve: f64,
+    /// Bringing light to the elements.
     pub gather: f64,
 }
 
@@ -56,7 +61,7 @@ pub struct Skipped {
     pub triangles_culled: u64,
     /// Pairs of shot and element that faced away from one another.
     pub receivers_facing_away: u64,
-    /// Slots that held no light when their element was to send by direction.
+    /// Directions without light that were left out when their element was to send.
     pub dark_slots: u64,
 }
 
@@ -78,10 +83,17 @@ pub struct Report {
     /// Strong emitters for which shadow rays found what they see, in place of a hemicube.
     pub emitters_by_rays: u64,
     pub triangles_drawn: u64,
-    /// Sources whose form factors are kept: they were drawn once.
+    /// Sources whose rows are kept.
     pub kept_sources: u64,
-    /// Shots from kept form factors, without drawing.
-    pub replayed: u64,
+    /// Rows that were drawn again, since they had found no room.
+    pub drawn_again: u64,
+    /// Rows that light was gathered by, each time that it was.
+    pub gathered_rows: u64,
+    /// Gauss–Seidel sweeps among the sources.
+    pub sweeps: u64,
+    /// Bytes of the coupling between the sources.
+    pub coupling_bytes: u64,
+    /// Sources drawn, again or not.
     pub shots: u32,
     pub unshot_share: f64,
     /// Null where a reflectance is 1: nothing bounds what is left then.
@@ -144,7 +156,10 @@ impl Report {
             emitters_by_rays: 0,
             triangles_drawn: 0,
             kept_sources: 0,
-            replayed: 0,
+            drawn_again: 0,
+            gathered_rows: 0,
+            sweeps: 0,
+            coupling_bytes: 0,
             shots: 0,
             unshot_share: 1.0,
             error_bound: None,
@@ -164,23 +179,30 @@ impl Report {
         self.meshlets = u64::from(meshlets);
     }
 
-    pub(super) fn add(&mut self, batch: &BatchResult, of_emitters: bool) {
-        let selected = u64::from(batch.progress.selected);
-        let faces = batch.progress.selected as usize * crate::constants::FACES as usize;
-        // Rays draw nothing.
-        if batch.counts.is_empty() {
-            self.emitters_by_rays += selected;
+    pub(super) fn add_stages(&mut self, stages: Stages) {
+        self.seconds.cull += stages.cull;
+        self.seconds.item_buffer += stages.item_buffer;
+        self.seconds.bin += stages.bin;
+        self.seconds.keep += stages.keep;
+    }
+
+    /// Counts a row: of a strong emitter or not, drawn before or not.
+    pub(super) fn add(&mut self, row: &Row, strong: bool, again: bool) {
+        self.add_drawn(&row.counts, strong);
+        self.drawn_again += u64::from(again);
+        self.skipped.receivers_facing_away += u64::from(row.facing_away);
+    }
+
+    /// Counts a source: `[face]` meshlets kept, triangles tested, triangles drawn; none by rays.
+    pub(super) fn add_drawn(&mut self, counts: &[[u32; 3]], strong: bool) {
+        self.shots += 1;
+        if counts.is_empty() {
+            self.emitters_by_rays += 1;
         } else {
-            self.hemicubes += selected;
-            self.emitter_hemicubes += u64::from(of_emitters) * selected;
+            self.hemicubes += 1;
+            self.emitter_hemicubes += u64::from(strong);
         }
-        self.seconds.select += batch.stages.select;
-        self.seconds.cull += batch.stages.cull;
-        self.seconds.item_buffer += batch.stages.item_buffer;
-        self.seconds.bin += batch.stages.bin;
-        self.seconds.gather += batch.stages.gather;
-        self.replayed += u64::from(batch.progress.replayed);
-        for &counts in batch.counts.iter().take(faces) {
+        for counts in counts {
             let [kept, tested, drawn] = counts.map(u64::from);
             self.triangles_drawn += drawn;
             self.skipped.empty_faces += u64::from(drawn == 0);

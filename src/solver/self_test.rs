@@ -5,15 +5,15 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::Settings;
+use super::drawing::Drawing;
 use crate::elements::Elements;
 use crate::error::{Error, Result};
 use crate::occluders::Occluders;
-use crate::passes::batch::Batch;
-use crate::passes::buffers::{SceneBuffers, State};
-use crate::passes::item_buffer::ItemBuffer;
+use crate::passes::batch::BatchSize;
+use crate::passes::buffers::SceneBuffers;
 use crate::scene::{Material, Scene, Triangle};
 use crate::sources;
-use crate::vk::{Buffer, BufferUse, Candidate, Commands, Device, Instance, Stage};
+use crate::vk::{Candidate, Device, Instance};
 
 /// Opens the device asked for, by index or part of its name, or else the best one that can run this program.
 pub fn open_device(wanted: Option<&str>, validation: bool) -> Result<Arc<Device>> {
@@ -78,46 +78,17 @@ pub fn ids_come_back_right(device: &Arc<Device>) -> Result<bool> {
     let (sources, connections) = sources::build(&mut elements, &[], &settings.grouping, 0);
     let occluders = Occluders::elements(&elements);
     let scene = SceneBuffers::new(device, &elements, &sources, &connections, &occluders)?;
-    let state = State::new(device, &scene)?;
-    let item_buffer = ItemBuffer::new(device)?;
-    let batch = Batch::drawing(device, &item_buffer.pass, &scene, (SIZE, None), (1, 0))?;
-    let measure = crate::passes::measure::Measure::new(device)?;
-    let select = crate::passes::select::Select::new(device)?;
-    let cull = crate::passes::cull::Cull::new(device, settings.culling)?;
-    let sets = (
-        measure.bind(&scene, &state)?,
-        select.bind(&scene, &state, &batch)?,
-        cull.bind(&scene, &batch)?,
-        item_buffer.bind(&batch)?,
-    );
-    let pixels = crate::hemicube::pixel_count(SIZE);
-    let readback = Buffer::new(device, "self-test", 4 * pixels as u64, BufferUse::Readback)?;
-    Commands::run(device, "self-test", |cmd| {
-        let then = || cmd.barrier(&[Stage::Compute], &[Stage::Compute, Stage::Draw]);
-        measure.record(cmd, &sets.0, scene.source_count);
-        then();
-        let parameters = crate::passes::select::Parameters {
-            source_count: scene.source_count,
-            fresh_slots: 1,
-            replay_slots: 0,
-            shot_limit: 1,
-            stop_power: 0.0,
-            least_emitted: 0.0,
-        };
-        select.record(cmd, &sets.1, &parameters);
-        then();
-        item_buffer.record(cmd, &sets.3, (&cull, &sets.2), (&scene, &batch), || {});
-        cmd.copy_shader_image_to_buffer(&batch.hemicubes().items, &readback);
-        cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
-        Ok(())
-    })?;
-    let drawn: Vec<u32> = readback.read(0, pixels);
-    // The source chosen is the only one that emits.
-    let emitter = sources
-        .list
-        .iter()
-        .find(|s| s.emitted.max_element() > 0.0)
+    let size = BatchSize {
+        slots: 1,
+        face: SIZE,
+        list_room: None,
+    };
+    let (drawing, batch) = Drawing::new(device, &scene, settings.culling, &size)?;
+    // Only one source emits.
+    let (index, emitter) = (sources.list.iter().enumerate())
+        .find(|(_, s)| s.emitted.max_element() > 0.0)
         .expect("the test scene has a light");
+    let drawn = drawing.draw(device, &scene, &batch, index as u32)?;
     Ok(crate::reference::item_buffer::disagreements(
         &elements,
         &connections,

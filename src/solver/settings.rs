@@ -60,9 +60,13 @@ pub struct Settings {
     /// Triangles that are listed at once for a face of a hemicube, at most; what is left is drawn after them. None: as many as fit
     /// the device's largest buffer. The light is the same.
     pub list_room: Option<u32>,
-    /// Bytes on the device for form factors of sources that have been drawn, so that their further shots need no drawing. None:
-    /// [`VISIBILITY_MEMORY`], or a third of the device's memory if that is less. The `pixel` estimator keeps none.
+    /// Bytes on the device for the rows of sources that have been drawn. Sources whose rows find no room
+    /// are drawn once more. None: [`VISIBILITY_MEMORY`], or a third of the device's memory if that is
+    /// less.
     pub visibility_memory: Option<u64>,
+    /// Bytes in the host's memory for the coupling between sources. What the sources beyond it send is
+    /// found by gathering and measuring, again and again.
+    pub coupling_memory: u64,
     /// How relief takes part; see [`crate::bake::elements`].
     pub relief: meso::Options,
 }
@@ -83,12 +87,16 @@ impl Default for Settings {
             batch: 16,
             list_room: None,
             visibility_memory: None,
+            coupling_memory: COUPLING_MEMORY,
             relief: meso::Options::default(),
         }
     }
 }
 
-/// Bytes for kept form factors, unless told otherwise.
+/// Bytes for the coupling between sources, unless asked otherwise: that of 10,000 and more.
+pub const COUPLING_MEMORY: u64 = 256 << 20;
+
+/// Bytes for kept rows, unless asked otherwise.
 pub const VISIBILITY_MEMORY: u64 = 768 << 20;
 
 /// Smallest and largest hemicube.

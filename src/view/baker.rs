@@ -17,7 +17,7 @@ use crate::elements::Elements;
 use crate::error::{Error, Result};
 use crate::meso::Transport;
 use crate::scene::{Material, Scene};
-use crate::solver::{ItemPicture, Settings, Solver, StopReason, Update, Visibility};
+use crate::solver::{ItemPicture, Settings, Solver, Update, Visibility};
 
 /// What the window asks for.
 pub enum Order {
@@ -397,10 +397,6 @@ impl Work {
         // The budget is that of the bake, not of a slice.
         let stop = solving.solver.report().stop;
         solving.done = is_done(stop) || start.elapsed() >= budget;
-        if solving.done && stop != StopReason::Residual {
-            // Elements with a relief have the directions of what has come.
-            solving.solver.run(|_| false)?;
-        }
         let report = solving.solver.report();
         let progress = Progress {
             update: Update {
@@ -420,6 +416,7 @@ impl Work {
             return Ok(());
         }
         let solved = Instant::now();
+        solving.solver.gather()?;
         let (scene, solver) = (&solving.scene, &solving.solver);
         let snapshot = Snapshot::of_solver(epoch, scene, solver, progress)?;
         let cost = solved.elapsed();

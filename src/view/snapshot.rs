@@ -79,14 +79,9 @@ impl Snapshot {
         let Solution {
             irradiance,
             irradiance_direct,
-            mut relief,
+            relief,
             ..
         } = Solution::new(scene, &solver.elements, &solver.light()?, report);
-        if let (Some(relief), true) = (&mut relief, solver.lacks_directions()) {
-            let elements = &solver.elements;
-            let reflectance = elements.to_input_order(&elements.reflectance);
-            spread(relief, &irradiance, &irradiance_direct, &reflectance);
-        }
         let light = (irradiance, irradiance_direct);
         Ok(Self::new(epoch, scene, light, relief, ambient, progress))
     }
@@ -123,31 +118,6 @@ impl Snapshot {
             ..Lighting::from(irradiance)
         }
     }
-}
-
-/// Spreads the light of each element with a relief evenly over its directions, as long as these are not known; values
-/// `[triangle]` of the input.
-fn spread(
-    relief: &mut DirectionalLight,
-    irradiance: &[Vec3],
-    direct: &[Vec3],
-    reflectance: &[Vec3],
-) {
-    let sky = even_moments(&relief.directions);
-    let moments = |light: &[Vec3]| -> Vec<[Vec3; 3]> {
-        let of = |&e: &u32| {
-            sky.iter()
-                .map(move |m| light[e as usize].to_array().map(|c| *m * c))
-        };
-        relief.elements.iter().flat_map(of).collect()
-    };
-    (relief.incident_moment, relief.incident_moment_direct) =
-        (moments(irradiance), moments(direct));
-    let sent = |&e: &u32| {
-        let e = e as usize;
-        std::iter::repeat_n(reflectance[e] * irradiance[e], sky.len())
-    };
-    relief.exitant = relief.elements.iter().flat_map(sent).collect();
 }
 
 /// ∫ L ω dω over each slot of a sky whose irradiance is 1, the directions of a slot taken as one; L = 1/π.

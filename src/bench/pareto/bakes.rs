@@ -147,7 +147,7 @@ impl Try {
         loop {
             let until = look.min(grid.limit.max(taken));
             let (turn, before) = (Instant::now(), taken);
-            solver.turn(|_| before + turn.elapsed() < until && go_on())?;
+            solver.run(|_| before + turn.elapsed() < until && go_on())?;
             taken += turn.elapsed();
             let report = solver.report();
             let finished = report.stop != StopReason::Interrupted;

@@ -1,0 +1,141 @@
+//! Kept rows on the device: the form factors of a source in 16 bits an element (48 with relief),
+//! without the blocks of GROUP elements that see nothing of it.
+
+use std::cmp::Ordering;
+use std::sync::Arc;
+
+use super::buffers::{download, filled, upload, write};
+use super::fresh_rows::RowShape;
+use super::types::KeptState;
+use crate::constants::GROUP;
+use crate::error::Result;
+use crate::vk::{Buffer, BufferUse, Device};
+
+/// Chunks of device memory with rows, and how far they are filled.
+pub struct KeptRows {
+    pub shape: RowShape,
+    /// Addresses of the chunks; the last [`SCRATCH`] are for rows that find no room.
+    pub table: Buffer,
+    pub state: Buffer,
+    pub chunk_words: u32,
+    chunks: Vec<Buffer>,
+    /// Bound by their addresses alone.
+    _scratch: Vec<Buffer>,
+}
+
+/// Batches under way at once, each with a chunk of its own for rows that find no room.
+pub const SCRATCH: u32 = 2;
+
+/// Bytes of a chunk, at most.
+const CHUNK: u64 = 256 << 20;
+
+/// What the chunks are made for.
+#[derive(Debug, Clone, Copy)]
+pub struct KeptSize {
+    /// Bytes, at most.
+    pub memory: u64,
+    /// Sources of the scene, and of a batch.
+    pub sources: u32,
+    pub slots: u32,
+}
+
+/// Chunks that are to be restored.
+#[derive(Debug, Clone, Copy)]
+pub struct RestoredSize {
+    pub chunk_words: u32,
+    pub chunks: usize,
+}
+
+impl KeptRows {
+    /// Room for the rows of all sources, in `size.memory` bytes at most. A device that has less keeps
+    /// fewer. Chunks that are to be restored are made whatever the memory.
+    ///
+    /// # Errors
+    /// A device without the memory for the rows of a batch, or for those that are to be restored.
+    pub fn new(
+        device: &Arc<Device>,
+        shape: RowShape,
+        size: KeptSize,
+        restored: Option<RestoredSize>,
+    ) -> Result<Self> {
+        let row = row_bytes(shape);
+        let most = size.memory.min(row * u64::from(size.sources));
+        // A row lies in one chunk, so that a chunk may end with most of a row unused.
+        let chunk = match restored {
+            Some(restored) => 4 * u64::from(restored.chunk_words),
+            None => most.min(CHUNK).next_multiple_of(4),
+        };
+        let count = if row > chunk { 0 } else { most.div_ceil(chunk) };
+        let least = restored.map_or(0, |restored| restored.chunks as u64);
+        let mut chunks = Vec::new();
+        for _ in 0..count.max(least) {
+            match Buffer::new(device, "kept form factors", chunk, BufferUse::Addressed) {
+                Ok(buffer) => chunks.push(buffer),
+                Err(e) if (chunks.len() as u64) < least => return Err(e),
+                Err(e) => {
+                    tracing::warn!("{e}: keeping fewer form factors");
+                    break;
+                }
+            }
+        }
+        let bytes = row * u64::from(size.slots);
+        let scratch = (0..SCRATCH)
+            .map(|_| Buffer::new(device, "rows without room", bytes, BufferUse::Addressed))
+            .collect::<Result<Vec<_>>>()?;
+        let addresses: Vec<u64> = chunks.iter().chain(&scratch).map(Buffer::address).collect();
+        let storage = BufferUse::Storage;
+        Ok(Self {
+            shape,
+            table: upload(device, "chunks of form factors", &addresses, storage)?,
+            state: filled(device, "kept state", size_of::<KeptState>() as u64, 0)?,
+            chunk_words: (chunk / 4) as u32,
+            chunks,
+            _scratch: scratch,
+        })
+    }
+
+    /// How far the chunks are filled, and what they hold.
+    pub fn download(&self, device: &Arc<Device>) -> Result<(KeptState, Vec<Vec<u32>>)> {
+        let state = download::<KeptState>(device, &self.state, 1)?[0];
+        let full = self.chunks.iter().enumerate().map(|(i, chunk)| {
+            let words = match (i as u32).cmp(&state.chunk) {
+                Ordering::Less => self.chunk_words,
+                Ordering::Equal => state.used,
+                Ordering::Greater => 0,
+            };
+            download(device, chunk, words as usize)
+        });
+        Ok((state, full.collect::<Result<_>>()?))
+    }
+
+    /// The inverse of [`Self::download`].
+    pub fn restore(
+        &self,
+        device: &Arc<Device>,
+        state: KeptState,
+        chunks: &[Vec<u32>],
+    ) -> Result<()> {
+        write(device, &self.state, &[state])?;
+        for (buffer, words) in self.chunks.iter().zip(chunks) {
+            write(device, buffer, words)?;
+        }
+        Ok(())
+    }
+
+    /// Whether anything can be kept.
+    pub fn keeps(&self) -> bool {
+        !self.chunks.is_empty()
+    }
+
+    /// Chunks whose rows last.
+    pub fn chunk_count(&self) -> u32 {
+        self.chunks.len() as u32
+    }
+}
+
+/// Bytes of a row that all elements see.
+fn row_bytes(shape: RowShape) -> u64 {
+    let (plain, meso) = (shape.plain_blocks(), shape.meso_blocks());
+    let table = 4 * u64::from(shape.blocks());
+    table + u64::from(GROUP) * (2 * u64::from(plain) + 6 * u64::from(meso))
+}

@@ -1,0 +1,140 @@
+//! How far a solution has come, and when it stops.
+
+use std::time::{Duration, Instant};
+
+use super::{Settings, StopReason};
+use crate::elements::Elements;
+
+/// How far a solution has come.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Update {
+    /// Sources drawn so far.
+    pub shots: u32,
+    pub sources: u32,
+    /// Unshot power as a share of all that was emitted.
+    pub unshot_share: f64,
+    /// Power that can still be missing, as a share of all that was emitted; none where a reflectance
+    /// is 1.
+    pub error_bound: Option<f64>,
+    /// Since the start of the solution.
+    pub elapsed: Duration,
+    /// An estimate, from how fast the bound has fallen lately.
+    pub left: Option<Duration>,
+}
+
+/// Bounds the light that is missing by what is unshot.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bound {
+    /// 1/(1 − ρ) for the largest reflectance ρ; none at ρ = 1.
+    factor: Option<f64>,
+    /// Emitted power, internal units.
+    emitted: f64,
+}
+
+impl Bound {
+    pub fn new(elements: &Elements, emitted: f64) -> Self {
+        let rho = f64::from(elements.max_reflectance());
+        Self {
+            factor: (rho < 1.0).then(|| 1.0 / (1.0 - rho)),
+            emitted,
+        }
+    }
+
+    /// Unshot power as a share of what is emitted.
+    pub fn share(&self, unshot: f64) -> f64 {
+        match self.emitted > 0.0 {
+            true => unshot / self.emitted,
+            false => 0.0,
+        }
+    }
+
+    /// Power that is missing at the elements, as a share of what is emitted: what is unshot arrives and
+    /// is reflected again, 1 + ρ + ρ² + … = 1/(1 − ρ) times; and a sum in f32 may lose half a step of
+    /// what arrives, which lacks as many bounces.
+    pub fn of(&self, unshot_share: f64) -> Option<f64> {
+        let rounding = f64::from(f32::EPSILON) / 2.0;
+        (self.factor).map(|factor| (unshot_share + rounding * factor) * factor)
+    }
+
+    /// Unshot power at which the bound is `residual`; at a reflectance of 1 as at 0.999.
+    pub fn stop_power(&self, residual: f64) -> f64 {
+        residual * self.emitted / self.factor.unwrap_or(1e3)
+    }
+
+    fn stop_share(&self, residual: f64) -> f64 {
+        residual / self.factor.unwrap_or(1e3)
+    }
+}
+
+/// Asks after every batch whether to go on.
+pub(super) struct Watch<'a> {
+    start: Instant,
+    budget: Duration,
+    bound: Bound,
+    stop_share: f64,
+    sources: u32,
+    history: Vec<(f64, f64)>,
+    go_on: &'a mut dyn FnMut(&Update) -> bool,
+    /// Why to stop, once it is to stop.
+    pub stop: Option<StopReason>,
+}
+
+impl<'a> Watch<'a> {
+    pub fn new(
+        settings: &Settings,
+        bound: Bound,
+        sources: u32,
+        go_on: &'a mut dyn FnMut(&Update) -> bool,
+    ) -> Self {
+        Self {
+            start: Instant::now(),
+            budget: settings.budget.unwrap_or(Duration::MAX),
+            bound,
+            stop_share: bound.stop_share(settings.residual),
+            sources,
+            history: Vec::new(),
+            go_on,
+            stop: None,
+        }
+    }
+
+    /// Whether to go on with so much drawn and unshot.
+    pub fn look(&mut self, shots: u32, unshot_share: f64) -> bool {
+        if self.stop.is_some() {
+            return false;
+        }
+        let elapsed = self.start.elapsed();
+        self.history.push((elapsed.as_secs_f64(), unshot_share));
+        let update = Update {
+            shots,
+            sources: self.sources,
+            unshot_share,
+            error_bound: self.bound.of(unshot_share),
+            elapsed,
+            left: time_left(&self.history, self.stop_share),
+        };
+        if !(self.go_on)(&update) {
+            self.stop = Some(StopReason::Interrupted);
+        } else if elapsed >= self.budget {
+            self.stop = Some(StopReason::Budget);
+        }
+        self.stop.is_none()
+    }
+
+    /// Unshot power as a share of what is emitted.
+    pub fn share(&self, unshot: f64) -> f64 {
+        self.bound.share(unshot)
+    }
+}
+
+/// Time until the unshot share falls to `target`, if it goes on falling as over the last half of the run.
+fn time_left(history: &[(f64, f64)], target: f64) -> Option<Duration> {
+    let &(now, share) = history.last()?;
+    let &(then, share_then) = history.get(history.len() / 2)?;
+    if share <= 0.0 || share >= share_then || now <= then {
+        return None;
+    }
+    let rate = (share_then / share).ln() / (now - then);
+    let left = ((share / target).ln() / rate).max(0.0);
+    (left.is_finite() && left < 1e6).then(|| Duration::from_secs_f64(left))
+}

@@ -1,0 +1,379 @@
+//! Makes rows: what a source gives each element, drawn, evaluated, normalised and coupled. Any device
+//! that holds the scene can, whatever the light.
+
+use std::collections::VecDeque;
+use std::ops::AddAssign;
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use super::drawing::{Drawing, read_items};
+use super::estimate::{Evaluate, Evaluated};
+use super::{EmitterShadows, Settings};
+use crate::constants::{FACES, NONE};
+use crate::error::Result;
+use crate::passes::batch::{Batch, Sight};
+use crate::passes::buffers::SceneBuffers;
+use crate::passes::couple::{self, Couple};
+use crate::passes::fresh_rows::FreshRows;
+use crate::passes::keep::{self, Keep};
+use crate::passes::kept_rows::KeptRows;
+use crate::passes::occluder_tree::OccluderTree;
+use crate::passes::types::{CouplingTarget, KeptRow, ShadowOccluder, Slot};
+use crate::vk::{Buffer, BufferUse, Commands, Device, Stage, Timestamps};
+
+/// The row of one source, and what was counted while it was made.
+pub(super) struct Row {
+    pub source: u32,
+    /// Of all form factors.
+    pub scale: f32,
+    /// Words of the coupling row, not scaled.
+    pub coupling: Vec<f32>,
+    pub factors: Factors,
+    /// `[face]`: meshlets kept, triangles tested, triangles drawn. Empty where rays found what is seen.
+    pub counts: Vec<[u32; 3]>,
+    /// Elements that see nothing of the source, whatever stands between.
+    pub facing_away: u32,
+}
+
+/// Where the form factors of a row are.
+pub(super) enum Factors {
+    /// On the device that made them.
+    Kept(KeptRow),
+    /// In the host's memory.
+    Host(FactorWords),
+}
+
+/// Form factors as they lie on the device before they are kept.
+pub(super) struct FactorWords {
+    pub plain: Vec<u32>,
+    pub meso: Vec<u32>,
+    pub occupied: Vec<u32>,
+}
+
+/// Seconds of each stage of a batch, by GPU timestamps.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Stages {
+    pub cull: f64,
+    pub item_buffer: f64,
+    /// Form factors, normalised.
+    pub bin: f64,
+    /// Coupling the sources, and keeping the form factors.
+    pub keep: f64,
+}
+
+/// One more than the stages.
+const STAMPS: u32 = 5;
+
+impl AddAssign for Stages {
+    fn add_assign(&mut self, other: Self) {
+        self.cull += other.cull;
+        self.item_buffer += other.item_buffer;
+        self.bin += other.bin;
+        self.keep += other.keep;
+    }
+}
+
+/// A batch of rows.
+pub(super) struct Made {
+    pub rows: Vec<Row>,
+    pub stages: Stages,
+}
+
+/// What row makers of one device share.
+pub(super) struct RowParts<'a> {
+    pub settings: &'a Settings,
+    pub scene: &'a SceneBuffers,
+    pub targets: &'a [CouplingTarget],
+    /// Elements with a relief.
+    pub meso: Option<&'a Buffer>,
+    pub fresh: &'a FreshRows,
+    /// Where rows are kept; without it they come to the host.
+    pub kept: Option<&'a KeptRows>,
+}
+
+/// How a row maker finds what its sources see.
+pub(super) enum Looks {
+    /// Hemicubes of so many pixels a side.
+    Hemicubes(u32),
+    Rays(Vec<ShadowOccluder>),
+}
+
+/// Makes rows of the sources that it is asked for, two batches at a time.
+pub(super) struct RowMaker {
+    commands: [Commands; SETS],
+    wanted: [Buffer; SETS],
+    readback: [Buffer; SETS],
+    timestamps: [Timestamps; SETS],
+    /// The sources of the batches under way, oldest first.
+    asked: VecDeque<Vec<u32>>,
+    /// Which of the sets is submitted next.
+    next: usize,
+    layout: Layout,
+    device: Arc<Device>,
+    batch: Batch,
+    _drawing: Option<Drawing>,
+    _evaluate: (Evaluate, Evaluated),
+    _couple: (Couple, couple::Bound),
+    _keep: Option<(Keep, keep::Bound)>,
+}
+
+/// Batches under way at once: as many as there is room for rows without room.
+const SETS: usize = crate::passes::kept_rows::SCRATCH as usize;
+
+impl RowMaker {
+    pub fn new(device: &Arc<Device>, parts: &RowParts<'_>, looks: Looks) -> Result<Self> {
+        let RowParts {
+            settings,
+            scene,
+            fresh,
+            ..
+        } = *parts;
+        let (drawing, batch) = match looks {
+            Looks::Hemicubes(face) => {
+                let slots = fresh.slot_count;
+                let size = Drawing::fitting(device, scene, settings, slots, face);
+                let (drawing, batch) = Drawing::new(device, scene, settings.culling, &size)?;
+                (Some(drawing), batch)
+            }
+            Looks::Rays(occluders) => {
+                let tree = OccluderTree::new(device, occluders)?;
+                (None, Batch::new(device, fresh.slot_count, Sight::Rays(tree))?)
+            }
+        };
+        let evaluate = Evaluate::new(device, settings, scene, parts.meso, &batch)?;
+        let evaluated = evaluate.bind(device, scene, &batch, fresh, parts.meso)?;
+        let couple = Couple::new(device)?;
+        let coupled = couple.bind(device, scene, &batch, fresh, parts.targets)?;
+        let keep = match parts.kept {
+            Some(kept) => {
+                let keep = Keep::new(device)?;
+                let bound = keep.bind(device, &batch.slots, batch.slot_count, fresh, kept)?;
+                Some((keep, bound))
+            }
+            None => None,
+        };
+        let layout = Layout::new(&batch, &coupled, parts);
+        let make = |name, bytes, usage| {
+            let buffer = || Buffer::new(device, name, bytes, usage);
+            Ok::<_, crate::error::Error>([buffer()?, buffer()?])
+        };
+        let slot_bytes = u64::from(batch.slot_count) * size_of::<Slot>() as u64;
+        let wanted = make("wanted sources", slot_bytes, BufferUse::Upload)?;
+        let readback = make("made rows", layout.bytes, BufferUse::Readback)?;
+        let stamps = || Timestamps::new(device, "row timestamps", STAMPS);
+        let timestamps = [stamps()?, stamps()?];
+        let record = |i: usize| {
+            Commands::record(device, "make rows", |cmd| {
+                let stamps = &timestamps[i];
+                let used = [Stage::Compute, Stage::Draw, Stage::Transfer];
+                cmd.reset_timestamps(stamps);
+                cmd.barrier(&used, &[Stage::Transfer]);
+                cmd.copy(&wanted[i], 0, &batch.slots, 0, slot_bytes);
+                cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
+                cmd.timestamp(stamps, 0);
+                match &drawing {
+                    Some(drawing) => {
+                        drawing.record(cmd, scene, &batch, || cmd.timestamp(stamps, 1));
+                    }
+                    None => cmd.timestamp(stamps, 1),
+                }
+                cmd.timestamp(stamps, 2);
+                evaluate.record(cmd, &evaluated, &batch, fresh);
+                cmd.timestamp(stamps, 3);
+                couple.record(cmd, &coupled, &batch, fresh);
+                if let (Some((keep, bound)), Some(kept)) = (&keep, parts.kept) {
+                    keep.record(cmd, bound, kept, i as u32);
+                }
+                cmd.timestamp(stamps, 4);
+                cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
+                let rows = keep.as_ref().map(|(_, bound)| &bound.rows);
+                layout.record(cmd, &batch, fresh, &coupled, rows, &readback[i]);
+                cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
+                Ok(())
+            })
+        };
+        Ok(Self {
+            commands: [record(0)?, record(1)?],
+            wanted,
+            readback,
+            timestamps,
+            asked: VecDeque::new(),
+            next: 0,
+            layout,
+            device: Arc::clone(device),
+            batch,
+            _drawing: drawing,
+            _evaluate: (evaluate, evaluated),
+            _couple: (couple, coupled),
+            _keep: keep,
+        })
+    }
+
+    /// Sources of a batch, at most.
+    pub fn slots(&self) -> usize {
+        self.batch.slot_count as usize
+    }
+
+    /// Begins a batch; two may be under way.
+    pub fn submit(&mut self, sources: &[u32]) -> Result<()> {
+        assert!(sources.len() <= self.slots() && self.asked.len() < SETS);
+        let slot = |i: usize| Slot {
+            emitted: Vec3::ZERO,
+            source: sources.get(i).copied().unwrap_or(NONE),
+            reflected: Vec3::ZERO,
+            scale: 1.0,
+        };
+        let slots: Vec<Slot> = (0..self.slots()).map(slot).collect();
+        self.wanted[self.next].write(0, &slots);
+        self.commands[self.next].submit()?;
+        self.asked.push_back(sources.to_vec());
+        self.next = (self.next + 1) % SETS;
+        Ok(())
+    }
+
+    /// Waits for the oldest batch under way; none if there is none.
+    pub fn take(&mut self) -> Result<Option<Made>> {
+        let Some(sources) = self.asked.pop_front() else {
+            return Ok(None);
+        };
+        let i = (self.next + SETS - self.asked.len() - 1) % SETS;
+        self.commands[i].wait()?;
+        let row = |(slot, &source)| self.layout.read(slot, source, &self.readback[i]);
+        let rows = (0..).zip(&sources).map(row).collect();
+        let [cull, item_buffer, bin, keep] = self.timestamps[i].intervals()?[..] else {
+            unreachable!("a batch has {STAMPS} timestamps");
+        };
+        let stages = Stages {
+            cull,
+            item_buffer,
+            bin,
+            keep,
+        };
+        Ok(Some(Made { rows, stages }))
+    }
+
+    /// The item buffers of the last batch, `[row][slot][column]`.
+    pub fn items(&self) -> Result<Vec<u32>> {
+        read_items(&self.device, &self.batch)
+    }
+}
+
+/// What strong emitters are looked at with, if not as all others are.
+pub(super) fn emitter_looks(
+    device: &Device,
+    settings: &Settings,
+    occluders: impl FnOnce() -> Vec<ShadowOccluder>,
+) -> Option<Looks> {
+    match settings.emitter_shadows() {
+        EmitterShadows::Rays => Some(Looks::Rays(occluders())),
+        EmitterShadows::Hemicubes(face) => {
+            let face = face.min(device.limits().max_image_side / 6 * 2);
+            (face > settings.hemicube).then_some(Looks::Hemicubes(face))
+        }
+    }
+}
+
+/// Where the parts of rows lie in a readback buffer: each part of all slots before the next.
+#[derive(Default)]
+struct Layout {
+    slots: u64,
+    /// Bytes of each part of a slot, and where the part begins.
+    parts: [(u64, u64); PARTS],
+    bytes: u64,
+    kept: bool,
+    drawn: bool,
+}
+
+const PARTS: usize = 8;
+const SLOT: usize = 0;
+const ROW: usize = 1;
+const COUPLING: usize = 2;
+const COUNTS: usize = 3;
+const AWAY: usize = 4;
+const PLAIN: usize = 5;
+const MESO: usize = 6;
+const OCCUPIED: usize = 7;
+
+impl Layout {
+    fn new(batch: &Batch, coupled: &couple::Bound, parts: &RowParts<'_>) -> Self {
+        let kept = parts.kept.is_some();
+        let drawn = matches!(batch.sight, Sight::Hemicubes(_));
+        let shape = parts.fresh.shape;
+        let only = |wanted: bool, bytes: u64| if wanted { bytes } else { 0 };
+        let sizes = [
+            size_of::<Slot>() as u64,
+            only(kept, size_of::<KeptRow>() as u64),
+            4 * u64::from(coupled.word_count),
+            only(drawn, u64::from(FACES) * size_of::<[u32; 3]>() as u64),
+            4,
+            only(!kept, 4 * u64::from(shape.plain_count)),
+            only(!kept, 12 * u64::from(shape.meso_count)),
+            only(!kept, 4 * u64::from(shape.blocks())),
+        ];
+        let slots = u64::from(batch.slot_count);
+        let mut layout = Self {
+            slots,
+            kept,
+            drawn,
+            ..Self::default()
+        };
+        for (part, size) in layout.parts.iter_mut().zip(sizes) {
+            *part = (size, layout.bytes);
+            layout.bytes += size * slots;
+        }
+        layout
+    }
+
+    fn record(
+        &self,
+        cmd: &Commands,
+        batch: &Batch,
+        fresh: &FreshRows,
+        coupled: &couple::Bound,
+        rows: Option<&Buffer>,
+        to: &Buffer,
+    ) {
+        let copy = |part: usize, from: &Buffer| {
+            let (size, at) = self.parts[part];
+            cmd.copy(from, 0, to, at, size * self.slots);
+        };
+        copy(SLOT, &batch.slots);
+        if let Some(rows) = rows {
+            copy(ROW, rows);
+        }
+        copy(COUPLING, &coupled.coupling);
+        if let Sight::Hemicubes(hemicubes) = &batch.sight {
+            copy(COUNTS, &hemicubes.counts);
+        }
+        copy(AWAY, &fresh.facing_away);
+        copy(PLAIN, &fresh.plain);
+        copy(MESO, &fresh.meso);
+        copy(OCCUPIED, &fresh.occupied);
+    }
+
+    fn read(&self, slot: u64, source: u32, from: &Buffer) -> Row {
+        let at = |part: usize| self.parts[part].1 + slot * self.parts[part].0;
+        let words = |part: usize| from.read(at(part), self.parts[part].0 as usize / 4);
+        let drawn: Slot = from.read(at(SLOT), 1)[0];
+        assert_eq!(drawn.source, source, "a slot holds what was asked for");
+        Row {
+            source,
+            scale: drawn.scale,
+            coupling: from.read(at(COUPLING), self.parts[COUPLING].0 as usize / 4),
+            factors: match self.kept {
+                true => Factors::Kept(from.read::<KeptRow>(at(ROW), 1)[0]),
+                false => Factors::Host(FactorWords {
+                    plain: words(PLAIN),
+                    meso: words(MESO),
+                    occupied: words(OCCUPIED),
+                }),
+            },
+            counts: match self.drawn {
+                true => from.read(at(COUNTS), FACES as usize),
+                false => Vec::new(),
+            },
+            facing_away: from.read(at(AWAY), 1)[0],
+        }
+    }
+}

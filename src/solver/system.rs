@@ -1,0 +1,252 @@
+//! Radiosity of the sources: B_t = M_t + Σ_s G[s,t] B_s, solved by Gauss–Seidel in f64 among the
+//! sources whose coupling is known.
+//!
+//! The iteration is kept in its shooting form (Gortler et al. 1994): each source has shot part of its
+//! radiosity through its row, and what it has not shot is the residual of its equation. So rows can
+//! join at any time, and the sum of what is unshot bounds what is missing.
+
+use glam::DVec3;
+
+use super::coupling::{Arrived, CouplingRow, Targets};
+use crate::constants::KIND_POINT;
+use crate::sources::Source;
+
+/// The sources of a scene as unknowns.
+pub(super) struct System {
+    pub targets: Targets,
+    sources: Vec<Unknown>,
+    arrived: Arrived,
+    /// Bytes that coupling rows may take, and take.
+    memory: u64,
+    bytes: u64,
+    /// Gauss–Seidel sweeps so far.
+    pub sweeps: u64,
+}
+
+struct Unknown {
+    emitted: DVec3,
+    /// That radiosity is multiplied by for power: a surface's area, half the sphere of a point light.
+    area: f64,
+    drawn: bool,
+    row: Option<CouplingRow>,
+    emission_shot: bool,
+    /// Reflected radiosity that has been shot.
+    shot: DVec3,
+    /// Reflected radiosity that has not arrived by coupling, but was measured.
+    measured: DVec3,
+}
+
+/// Sums of unshot power, internal units, over the colours.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Unshot {
+    /// Emitted by sources that are not drawn.
+    pub emitted: f64,
+    /// Of the sources that are not drawn, emission included.
+    pub undrawn: f64,
+    /// Of all sources: the residual of the system.
+    pub all: f64,
+}
+
+impl System {
+    pub fn new(targets: Targets, sources: &[Source], memory: u64) -> Self {
+        let unknown = |source: &Source| Unknown {
+            emitted: source.emitted.as_dvec3(),
+            area: match source.kind {
+                KIND_POINT => std::f64::consts::TAU,
+                _ => source.area,
+            },
+            drawn: false,
+            row: None,
+            emission_shot: false,
+            shot: DVec3::ZERO,
+            measured: DVec3::ZERO,
+        };
+        Self {
+            arrived: Arrived::none(&targets),
+            targets,
+            sources: sources.iter().map(unknown).collect(),
+            memory,
+            bytes: 0,
+            sweeps: 0,
+        }
+    }
+
+    pub fn is_drawn(&self, s: usize) -> bool {
+        self.sources[s].drawn
+    }
+
+    pub fn emitted(&self, s: usize) -> DVec3 {
+        self.sources[s].emitted
+    }
+
+    /// What radiosity is multiplied by for power: a surface's area, half the sphere of a point light.
+    pub fn area(&self, s: usize) -> f64 {
+        self.sources[s].area
+    }
+
+    /// Radiosity that a source reflects, as far as it is known.
+    pub fn reflected(&self, s: usize) -> DVec3 {
+        self.sources[s].measured + self.arrived.reflected(&self.targets, s)
+    }
+
+    /// Unshot power of a source, and of it what is emitted.
+    pub fn unshot_power(&self, s: usize) -> (f64, f64) {
+        let source = &self.sources[s];
+        let emitted = match source.emission_shot {
+            true => 0.0,
+            false => source.emitted.element_sum() * source.area,
+        };
+        let reflected = (self.reflected(s) - source.shot).abs().element_sum() * source.area;
+        (emitted + reflected, emitted)
+    }
+
+    pub fn unshot(&self) -> Unshot {
+        let mut sums = Unshot::default();
+        for s in 0..self.sources.len() {
+            let (power, emitted) = self.unshot_power(s);
+            sums.all += power;
+            if !self.sources[s].drawn {
+                sums.undrawn += power;
+                sums.emitted += emitted;
+            }
+        }
+        sums
+    }
+
+    /// Takes in the row of a source that has been drawn, and shoots all that it has. What a source
+    /// without a row sends is found by measuring.
+    pub fn draw(&mut self, s: usize, row: Option<CouplingRow>) {
+        self.sources[s].drawn = true;
+        let emitted = match std::mem::replace(&mut self.sources[s].emission_shot, true) {
+            true => DVec3::ZERO,
+            false => self.sources[s].emitted,
+        };
+        let reflected = self.reflected(s) - self.sources[s].shot;
+        self.sources[s].shot += reflected;
+        let Some(row) = row else { return };
+        self.arrived.add(&row, emitted + reflected);
+        // Without room the row is forgotten.
+        if self.bytes + row.bytes() <= self.memory {
+            self.bytes += row.bytes();
+            self.sources[s].row = Some(row);
+        }
+    }
+
+    /// Rows that are known, `[source]`.
+    pub fn rows(&self) -> impl Iterator<Item = Option<&CouplingRow>> {
+        self.sources.iter().map(|source| source.row.as_ref())
+    }
+
+    /// Bytes of the coupling rows.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Whether every drawn source has its row.
+    pub fn is_whole(&self) -> bool {
+        (self.sources.iter()).all(|source| !source.drawn || source.row.is_some())
+    }
+
+    /// Sweeps until the sources with rows have no more than `most` unshot together, internal units.
+    /// Whether they have.
+    pub fn solve(&mut self, most: f64) -> bool {
+        let mut left = self.left();
+        for _ in 0..MOST_SWEEPS {
+            if left <= most {
+                return true;
+            }
+            let before = left;
+            self.sweep(most / self.sources.len() as f64);
+            left = self.left();
+            if left > SLOW * before {
+                self.shift();
+                left = self.left();
+            }
+        }
+        left <= most
+    }
+
+    /// Unshot power of the sources with rows.
+    fn left(&self) -> f64 {
+        (0..self.sources.len())
+            .filter(|&s| self.sources[s].row.is_some())
+            .map(|s| self.unshot_power(s).0)
+            .sum()
+    }
+
+    /// Every source with a row shoots what it has, unless that is less than `least`.
+    fn sweep(&mut self, least: f64) {
+        self.sweeps += 1;
+        for s in 0..self.sources.len() {
+            let reflected = self.reflected(s);
+            let source = &mut self.sources[s];
+            let Some(row) = &source.row else { continue };
+            let unshot = reflected - source.shot;
+            if unshot.abs().element_sum() * source.area > 0.5 * least {
+                source.shot = reflected;
+                self.arrived.add(row, unshot);
+            }
+        }
+    }
+
+    /// Scales what the sources with rows have shot, by colour, so that what they have left sums to
+    /// none: where little is lost at a bounce, that is the error which sweeps are slow to remove.
+    fn shift(&mut self) {
+        let mut through = Arrived::none(&self.targets);
+        for source in &self.sources {
+            if let Some(row) = &source.row {
+                through.add(row, source.shot);
+            }
+        }
+        let (mut shot, mut unshot, mut lost) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
+        for s in 0..self.sources.len() {
+            let source = &self.sources[s];
+            if source.row.is_some() {
+                shot += source.shot * source.area;
+                unshot += (self.reflected(s) - source.shot) * source.area;
+                lost += (source.shot - through.reflected(&self.targets, s)) * source.area;
+            }
+        }
+        let share = |c: usize| match lost[c] > LEAST_LOST * shot[c].abs() {
+            true => unshot[c] / lost[c],
+            false => 0.0,
+        };
+        let share = DVec3::new(share(0), share(1), share(2));
+        self.arrived.add_scaled(&through, share);
+        for source in &mut self.sources {
+            if source.row.is_some() {
+                source.shot += source.shot * share;
+            }
+        }
+    }
+
+    /// Goes on from light that was gathered: what each source reflects of it, and what it has sent.
+    pub fn measured(&mut self, reflected: &[DVec3], sent: &[DVec3]) {
+        self.arrived = Arrived::none(&self.targets);
+        for (source, (&reflected, &sent)) in
+            (self.sources.iter_mut()).zip(reflected.iter().zip(sent))
+        {
+            source.measured = reflected;
+            source.shot = sent;
+        }
+    }
+
+    /// Reflected radiosity that a source has shot.
+    pub fn shot(&self, s: usize) -> DVec3 {
+        self.sources[s].shot
+    }
+
+    /// Whether a source has shot its emission.
+    pub fn emission_is_shot(&self, s: usize) -> bool {
+        self.sources[s].emission_shot
+    }
+}
+
+/// Sweeps of one [`System::solve`], at most.
+const MOST_SWEEPS: usize = 1000;
+
+/// A sweep that leaves more than this share is followed by a shift.
+const SLOW: f64 = 0.3;
+
+/// Where a smaller share than this is lost at a bounce, rounding says how much: nothing is shifted.
+const LEAST_LOST: f64 = 1e-6;
