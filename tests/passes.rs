@@ -99,25 +99,19 @@ fn item_buffers_equal_rays_and_culling_changes_nothing() {
     let mut first: Option<Vec<u32>> = None;
     for culling in [Culling::Off, Culling::Meshlets, Culling::Triangles] {
         let mut solver = solver(&scene(), Estimator::Receiver, culling, 200);
-        let mut drawn = Vec::new();
         let mut buffers = Vec::new();
-        for _ in 0..8 {
-            solver
-                .run_batches(1, |batch| drawn = batch.counts.clone())
-                .expect("a batch runs");
-            let (items, sources) = solver.item_buffers().expect("the item buffers come back");
-            for (slot, (column, &source)) in columns(&items, sources.len())
-                .iter()
-                .zip(&sources)
-                .enumerate()
-            {
-                if source == NONE {
+        let count = solver.sources.list.len() as u32;
+        for first in (0..count.min(48)).step_by(6) {
+            let sources: Vec<u32> = (first..count.min(first + 6)).collect();
+            let drawn = solver.draw(&sources).expect("a batch is drawn");
+            for (slot, column) in (columns(&drawn.items, drawn.slots as usize).iter()).enumerate() {
+                let Some(&source) = sources.get(slot) else {
                     assert!(
                         column.iter().all(|&i| i == NONE),
                         "an empty slot draws nothing"
                     );
                     continue;
-                }
+                };
                 let source = &solver.sources.list[source as usize];
                 let wrong = reference::item_buffer::disagreements(
                     &solver.elements,
@@ -133,14 +127,14 @@ fn item_buffers_equal_rays_and_culling_changes_nothing() {
                 );
                 if culling == Culling::Off {
                     let all = drawn_without_culling(&solver, source);
-                    let of_slot = &drawn[5 * slot..5 * (slot + 1)];
+                    let of_slot = &drawn.counts[slot];
                     assert!(
                         of_slot.iter().all(|&[_, _, d]| d as usize == all),
                         "{all} are to be drawn: {of_slot:?}"
                     );
                 }
             }
-            buffers.extend(items);
+            buffers.extend(drawn.items);
         }
         assert!(buffers.iter().any(|&i| i != NONE));
         match &first {
@@ -229,21 +223,9 @@ fn light_does_not_depend_on_lists_nor_on_blocks() {
 #[test]
 fn culling_keeps_every_element_that_owns_a_pixel() {
     let mut solver = solver(&scene(), Estimator::Receiver, Culling::Triangles, 6);
-    let mut counts = Vec::new();
-    solver
-        .run_batches(1, |batch| {
-            if batch.progress.selected > 0 {
-                counts = batch.counts.clone();
-            }
-        })
-        .expect("a batch runs");
-    // The second batch found the shots used up: sources come from the twin of the selection.
-    let irradiance = vec![Vec3::ZERO; solver.elements.len()];
-    let shot = vec![reference::measure::Shot::default(); solver.sources.list.len()];
-    let unshot =
-        reference::measure::measure(&solver.elements, &solver.sources.list, &irradiance, &shot);
-    let powers: Vec<f32> = unshot.iter().map(|u| u.1 as f32).collect();
-    for (slot, &source) in reference::select::select(&powers, 6).iter().enumerate() {
+    let sources = strongest(&solver, 6);
+    let counts = solver.draw(&sources).expect("a batch is drawn").counts;
+    for (slot, &source) in sources.iter().enumerate() {
         let source = &solver.sources.list[source as usize];
         for face in 0..5 {
             let shown: BTreeSet<u32> = reference::cull::shown(
@@ -254,7 +236,7 @@ fn culling_keeps_every_element_that_owns_a_pixel() {
                 face,
                 FACE,
             );
-            let [_, _, drawn] = counts[slot * 5 + face as usize];
+            let [_, _, drawn] = counts[slot][face as usize];
             assert!(
                 drawn as usize >= shown.len(),
                 "slot {slot}, face {face}: {drawn} drawn, {} shown",
@@ -272,6 +254,66 @@ fn culling_keeps_every_element_that_owns_a_pixel() {
 /// How surely a ray must find what it finds, see [`reference::occluder_rays::hidden`].
 const DOUBT: f64 = 1e-4;
 
+/// The sources with the most emitted power, ties to the lower index.
+fn strongest(solver: &Solver, count: usize) -> Vec<u32> {
+    let power = |s: &u32| solver.sources.list[*s as usize].emitted_power();
+    let mut order: Vec<u32> = (0..solver.sources.list.len() as u32).collect();
+    order.retain(|s| power(s) > 0.0);
+    order.sort_by(|a, b| power(b).total_cmp(&power(a)).then(a.cmp(b)));
+    order.truncate(count);
+    order
+}
+
+/// The coupling of a source to all others, by the GPU and by the twin from the source's own row.
+#[test]
+fn coupling_equals_its_twin() {
+    // Sums of some tens of terms in f32.
+    const ROUNDING: f64 = 2e-6;
+    let mut coloured = 0;
+    for build in [scene(), textured()] {
+        let mut solver = solve_so(
+            &build,
+            &Settings {
+                shots: Some(1),
+                ..settings()
+            },
+        );
+        solver.run(|_| true).expect("one source is drawn");
+        let light = solver.light().expect("the light comes back");
+        let source = strongest(&solver, 1)[0];
+        let emitted = solver.sources.list[source as usize].emitted.x;
+        let row: Vec<f32> = (light.irradiance_direct.iter()).map(|e| e.x / emitted).collect();
+        let found = &solver.draw(&[source]).expect("it is drawn").coupling[0];
+        let elements = &solver.elements;
+        let even = elements.even_reflectance();
+        let targets = solver.coupling_targets();
+        coloured += targets.iter().filter(|t| t.word_count == 3).count();
+        let expected = reference::couple::couple(elements, &even, targets, &row);
+        assert_eq!(found.len(), expected.len());
+        let largest = expected.iter().copied().fold(0.0, f64::max);
+        let apart = (found.iter().zip(&expected))
+            .map(|(&f, &e)| (f64::from(f) - e).abs())
+            .fold(0.0, f64::max);
+        println!("{} words: {:.1e} of the largest apart", found.len(), apart / largest);
+        assert!(largest > 0.0 && apart <= ROUNDING * largest);
+    }
+    assert!(coloured > 0, "some targets have several reflectances");
+    assert_silent();
+}
+
+/// A room whose elements are white and red in turns, so that sources have members of both.
+fn textured() -> Build {
+    let mut build = scene();
+    let red = build.material(0.5, 0.0);
+    build.scene.materials[red as usize].kd = [0.8, 0.1, 0.2];
+    for (i, triangle) in build.scene.triangles.iter_mut().enumerate() {
+        if i % 2 == 1 && triangle.material == 0 {
+            triangle.material = red;
+        }
+    }
+    build
+}
+
 /// One batch of emission: irradiance by the GPU and by the twin from the GPU's own item buffers.
 #[test]
 fn estimators_equal_their_twins() {
@@ -284,7 +326,6 @@ fn estimators_equal_their_twins() {
         (Estimator::Pixel, 0, scene()),
     ] {
         let by_rays = strong > 0;
-        // One batch of sources exactly; the batch after it shoots nothing, so the item buffers are drawn again.
         // By rays, all emitters that are strong.
         let (emitter_hemicube, shots) = match by_rays {
             false => (settings().emitter_hemicube, 6),
@@ -300,11 +341,7 @@ fn estimators_equal_their_twins() {
         solver.run(|_| true).expect("the batch runs");
         let light = solver.light().expect("the light comes back");
         let elements = &solver.elements;
-        let shot = vec![reference::measure::Shot::default(); solver.sources.list.len()];
-        let zero = vec![Vec3::ZERO; elements.len()];
-        let unshot = reference::measure::measure(elements, &solver.sources.list, &zero, &shot);
-        let powers: Vec<f32> = unshot.iter().map(|u| u.1 as f32).collect();
-        let chosen = reference::select::select(&powers, shots as usize);
+        let chosen = strongest(&solver, shots as usize);
         let mut expected = vec![0.0; elements.len()];
         let occluders = shadow_occluders(elements, &solver.connections, &solver.occluders);
         // Where a ray passes so close to an edge that rounding decides.
@@ -357,7 +394,7 @@ fn estimators_equal_their_twins() {
         // Pixels on the edge of two triangles may go to either, which moves a pixel's worth of light between neighbours:
         // nearly all elements must agree to rounding (far sources: 0.07 %), the sum of all to less.
         let agree = |e: usize| {
-            (f64::from(light.irradiance[e].x) - expected[e]).abs()
+            (f64::from(light.irradiance_direct[e].x) - expected[e]).abs()
                 <= 1.5e-3 * expected[e] + 1e-5 * scale
         };
         let wrong = (0..elements.len()).filter(|&e| !agree(e) && !doubtful[e].get());
@@ -378,7 +415,7 @@ fn estimators_equal_their_twins() {
                 .sum::<f64>()
         };
         let (got, want) = (
-            power(&|e| f64::from(light.irradiance[e].x)),
+            power(&|e| f64::from(light.irradiance_direct[e].x)),
             power(&|e| expected[e]),
         );
         assert!(

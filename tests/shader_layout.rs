@@ -128,7 +128,7 @@ fn rust_and_glsl_agree() {
     // These are loaded word by word: their order is told by the forms of load_triangle and met.
     check!(false, Triangle: a area b height c unused_c normal unused);
     check!(false, ShadowOccluder: a component b closed c height normal unused);
-    // Progress and KeptState stand alone in their buffers, not in an array.
-    check!(false, Progress: unshot_emitted unshot_reflected shots selected replayed);
+    check!(true, CouplingTarget: first_element element_count first_word word_count inverse_area);
+    // KeptState stands alone in its buffer, not in an array.
     check!(false, KeptState: chunk used rows);
 }

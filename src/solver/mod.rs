@@ -39,7 +39,7 @@ use crate::occluders::Occluders;
 use crate::passes::batch::Hemicubes;
 use crate::passes::buffers::{SceneBuffers, State, download};
 use crate::passes::relief_buffers::ReliefBuffers;
-use crate::passes::types::{Reflected, Slot};
+use crate::passes::types::{CouplingTarget, Reflected, Slot};
 use crate::scene::{PointLight, Scene};
 use crate::sources::{self, Sources};
 use crate::vk::Device;
@@ -351,6 +351,23 @@ impl Solver {
         }
     }
 
+    /// Item buffers of the last shots of the `pixel` estimator in a scene with relief, `[row][slot][column]`;
+    /// none otherwise.
+    pub fn shot_items(&self) -> Result<Option<Vec<u32>>> {
+        match &self.method {
+            Method::Rows(_) => Ok(None),
+            Method::Shots(shots) => shots.items().map(Some),
+        }
+    }
+
+    /// The sources as they receive, in the order of the words of [`DrawnBatch::coupling`].
+    pub fn coupling_targets(&self) -> &[CouplingTarget] {
+        match &self.method {
+            Method::Rows(spine) => &spine.system.targets.list,
+            Method::Shots(_) => &[],
+        }
+    }
+
     pub fn report(&self) -> &Report {
         &self.report
     }
@@ -358,12 +375,16 @@ impl Solver {
     /// The last sources that were gathered and what each sent, with what those with a relief sent by
     /// direction; for comparison with the pass's twin. None without relief.
     pub fn relief_exits(&self, count: usize) -> Result<Option<ReliefExits>> {
-        let (Some(relief), Method::Rows(spine)) = (&self.relief, &self.method) else {
+        let Some(relief) = &self.relief else {
             return Ok(None);
         };
         let k = relief.directions.count();
+        let slots = match &self.method {
+            Method::Rows(spine) => spine.gathered_slots(count)?,
+            Method::Shots(shots) => shots.slots(count)?,
+        };
         Ok(Some(ReliefExits {
-            slots: spine.gathered_slots(count)?,
+            slots,
             exits: download(&self.device, &relief.exits, 2 * k * count)?,
             kept: download(
                 &self.device,
@@ -386,6 +407,8 @@ pub struct DrawnBatch {
     pub slots: u32,
     /// Elements that see nothing of each source, whatever stands between.
     pub facing_away: Vec<u32>,
+    /// `[source][word]`; see [`Solver::coupling_targets`].
+    pub coupling: Vec<Vec<f32>>,
 }
 
 /// Groups the elements into sources: as they were when `kept` was made, if it is given.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use super::drawing::Drawing;
+use super::drawing::{Drawing, read_items};
 use super::progress::Watch;
 use super::rows::{Looks, Stages, emitter_looks};
 use super::spine::On;
@@ -195,6 +195,17 @@ impl Shots {
         Ok(self.sources.iter().zip(reflected).map(left).sum())
     }
 
+}
+
+impl Shots {
+    /// The last slots that were shot by hemicubes of the common size, and their item buffers.
+    pub fn slots(&self, count: usize) -> Result<Vec<Slot>> {
+        download(&self.device, &self.all.batch.slots, count)
+    }
+
+    pub fn items(&self) -> Result<Vec<u32>> {
+        read_items(&self.device, &self.all.batch)
+    }
 }
 
 impl Shot {

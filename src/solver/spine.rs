@@ -481,7 +481,10 @@ impl Spine {
         Ok(DrawnBatch {
             stages: made.stages,
             facing_away: made.rows.iter().map(|row| row.facing_away).collect(),
-            counts: made.rows.into_iter().map(|row| row.counts).collect(),
+            counts: made.rows.iter().map(|row| row.counts.clone()).collect(),
+            coupling: (made.rows.into_iter())
+                .map(|row| row.coupling.iter().map(|word| word * row.scale).collect())
+                .collect(),
             items: team.items()?,
             slots: team.slots(false) as u32,
         })
