@@ -24,6 +24,7 @@
 //! | hemicubes | [`hemicube`], [`passes::item_buffer`] |
 //!
 //! [`bake::bake`] is the main road; [`solver::Solver`] gives each step.
+#![deny(unsafe_code)]
 
 pub mod atomic_file;
 pub mod bake;

@@ -13,6 +13,7 @@ use mesolux::error::{Error, Result};
 use mesolux::solution::Bake;
 use mesolux::solver::Visibility;
 use mesolux::view::{self, DeviceChoice, Step};
+use mesolux::vk;
 
 /// Show a scene in a window while it bakes, or a bake
 ///
@@ -118,9 +119,9 @@ pub fn run(options: &Options, start: Instant) -> Result<()> {
     for line in lines {
         tracing::info!("{line}");
     }
-    match mesolux::vk::left() {
+    match vk::left() {
         None => tracing::info!("closed: nothing is left on the devices"),
-        Some((devices, bytes)) => {
+        Some(vk::Left { devices, bytes }) => {
             return Err(Error::Device(format!(
                 "{devices} devices and {bytes} bytes in buffers and images were not freed"
             )));

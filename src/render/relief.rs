@@ -21,7 +21,6 @@ pub struct Relief {
     /// One for each range of the mesh.
     sets: Vec<DescriptorSet>,
     shading: u32,
-    _sampler: Sampler,
 }
 
 impl Relief {
@@ -58,7 +57,6 @@ impl Relief {
             mesh,
             sets,
             shading,
-            _sampler: sampler,
         }))
     }
 

@@ -30,8 +30,6 @@ struct Texture {
     set: DescriptorSet,
     /// What the image holds: egui changes parts of it.
     pixels: ColorImage,
-    /// None of a picture that another owns.
-    _image: Option<Image>,
 }
 
 /// The picture that lies under everything.
@@ -54,7 +52,8 @@ pub struct Prepared {
     size: [f32; 2],
 }
 
-/// Bytes of a new buffer for so many: some spare, so that a panel that grows does not make one each frame.
+/// The size of a new buffer for `bytes` bytes: some spare, so that a panel that grows does not
+/// create one each frame.
 fn roomy(bytes: u64) -> u64 {
     (bytes * 3 / 2).max(1 << 16)
 }
@@ -119,16 +118,11 @@ impl PanelPass {
         let image = upload(&self.device, "panel texture", size, &pixels.pixels)?;
         let bind = [Bind::Image(&image, &self.sampler)];
         let set = self.pipeline.bind("panel texture", &bind)?;
-        let texture = Texture {
-            set,
-            pixels,
-            _image: Some(image),
-        };
-        self.textures.insert(id, texture);
+        self.textures.insert(id, Texture { set, pixels });
         Ok(())
     }
 
-    /// Takes the picture that [`Self::record_picture`] draws, from the left top of an image; it must live until the next one is taken.
+    /// Takes the picture that [`Self::record_picture`] draws, from the left top of an image.
     ///
     /// # Errors
     /// A device without the memory.
@@ -138,7 +132,6 @@ impl PanelPass {
         let texture = Texture {
             set: self.pipeline.bind("detailed picture", &bind)?,
             pixels: ColorImage::default(),
-            _image: None,
         };
         self.textures.insert(PICTURE, texture);
         Ok(())

@@ -28,7 +28,6 @@ pub struct Screen {
 struct Target {
     framebuffer: Framebuffer,
     colour: Image,
-    _depth: Image,
 }
 
 /// A frame that was read back: 8-bit sRGB codes, `[row][column][channel]`.
@@ -39,7 +38,8 @@ pub struct Captured {
 
 impl Screen {
     /// # Errors
-    /// A display without a Vulkan surface; a device that is not there, or cannot show pictures on this display.
+    /// A display without a Vulkan surface; a device that is absent, or cannot show pictures on
+    /// this display.
     pub fn new(window: &Arc<Window>, size: (u32, u32), choice: &DeviceChoice) -> Result<Self> {
         let instance = Instance::for_display(choice.validation, window.as_ref())?;
         let surface = Arc::new(Surface::new(&instance, window)?);
@@ -93,11 +93,12 @@ impl Screen {
         self.surface = None;
     }
 
-    /// Makes images of the window's size where there are none; returns their size, none while the window has no area.
+    /// Makes images of the window's size where there are none, and with `remake` replaces them.
+    /// Returns their size; none while the window has no area.
     ///
     /// # Errors
     /// A device or a display that fails.
-    pub fn fit(&mut self, size: (u32, u32), anew: bool) -> Result<Option<(u32, u32)>> {
+    pub fn fit(&mut self, size: (u32, u32), remake: bool) -> Result<Option<(u32, u32)>> {
         if size.0 == 0 || size.1 == 0 {
             return Ok(None);
         }
@@ -106,7 +107,7 @@ impl Screen {
             self.surface = Some(Arc::new(Surface::new(&self.instance, &self.window)?));
         }
         if let Some(surface) = &self.surface
-            && (anew || self.swapchain.is_none())
+            && (remake || self.swapchain.is_none())
         {
             let before = self.swapchain.take();
             self.swapchain = Swapchain::new(&self.device, surface, size, before)?;
@@ -127,8 +128,8 @@ impl Screen {
         Ok(Some(size))
     }
 
-    /// Draws a frame by what `record` draws within the render pass, and shows it; with `capture`, reads it back. To be called
-    /// when [`Self::fit`] has given a size.
+    /// Shows a frame: what `record` draws within the render pass. With `capture`, reads it back. To
+    /// be called when [`Self::fit`] has returned a size.
     ///
     /// # Errors
     /// A device that fails.
@@ -199,7 +200,6 @@ impl Target {
         Ok(Self {
             framebuffer: Framebuffer::new(device, "window frame", pass, &colour, &depth)?,
             colour,
-            _depth: depth,
         })
     }
 }

@@ -1,11 +1,13 @@
-//! One small table of the stages that meet, with what each reads and writes.
+//! The table of pipeline stages between which barriers stand, with what each reads and writes.
 
 use ash::vk;
 
-/// A kind of work on the device. A barrier orders everything of one kind before everything of another.
+/// A kind of work on the device. A barrier orders everything of one kind before everything of
+/// another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
-    /// Compute shaders reading and writing buffers and images, and fetching how many they are.
+    /// Compute shaders reading and writing buffers and images, and fetches of indirect
+    /// dispatches.
     Compute,
     /// Fetching draw commands, indices and vertices, and shaders of a draw reading buffers.
     Draw,

@@ -1,144 +1,155 @@
 //! Buffers with their memory.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, RwLock};
 
 use ash::vk;
 use bytemuck::Pod;
 use gpu_allocator::MemoryLocation;
-use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
+use gpu_allocator::vulkan::Allocation;
 
-use super::Device;
+use super::device::MemoryRequest;
+use super::held::Held;
+use super::{Device, lock};
 use crate::error::{Error, Result};
 
-/// What a buffer is for, beside being a storage buffer and a source or target of copies.
+/// What a buffer is for, besides being a storage buffer and a source or target of copies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BufferUse {
     /// Device memory, read and written by shaders.
     Storage,
     /// Device memory that also feeds vertices, indices or draw commands.
     Geometry,
-    /// Device memory that shaders reach by its address: no larger limit than the device's memory.
+    /// Device memory that shaders reach by its address: only the device's memory limits its size.
     Addressed,
     /// Memory that the CPU writes once and the device copies from.
     Upload,
-    /// Memory that the CPU writes again and again, and that shaders read or that feeds vertices and indices.
+    /// Memory that the CPU writes repeatedly, and that shaders read or that feeds vertices and
+    /// indices.
     Stream,
     /// Memory that the device writes and the CPU reads.
     Readback,
 }
 
+/// A buffer with its memory. A clone is another handle to the same buffer.
+///
+/// Descriptor sets that bind it and commands that record it keep it alive.
+#[derive(Clone)]
 pub struct Buffer {
+    pub(super) owner: Arc<BufferOwner>,
+}
+
+pub(super) struct BufferOwner {
     pub(super) raw: vk::Buffer,
-    allocation: Option<Allocation>,
     bytes: u64,
+    usage: BufferUse,
+    /// Locked by the CPU's accesses, which several handles may attempt at once.
+    allocation: RwLock<Option<Allocation>>,
+    /// The buffers whose addresses this one contains.
+    referred: Mutex<Held>,
     device: Arc<Device>,
 }
 
+/// Bytes that are allocated at least, so that an empty list still has a buffer to bind.
+const LEAST_BYTES: u64 = 16;
+
 impl Buffer {
-    /// At least one byte is always allocated, so that an empty list still has a buffer to bind.
+    /// # Errors
+    /// A buffer that exceeds the device's memory, or its largest storage buffer.
     pub fn new(device: &Arc<Device>, name: &str, bytes: u64, usage: BufferUse) -> Result<Self> {
-        let bytes = bytes.max(16);
-        let mut flags = vk::BufferUsageFlags::STORAGE_BUFFER
-            | vk::BufferUsageFlags::TRANSFER_SRC
-            | vk::BufferUsageFlags::TRANSFER_DST;
-        if usage == BufferUse::Geometry {
-            flags |= vk::BufferUsageFlags::VERTEX_BUFFER
-                | vk::BufferUsageFlags::INDEX_BUFFER
-                | vk::BufferUsageFlags::INDIRECT_BUFFER;
-        }
-        if usage == BufferUse::Stream {
-            flags |= vk::BufferUsageFlags::VERTEX_BUFFER | vk::BufferUsageFlags::INDEX_BUFFER;
-        }
-        if usage == BufferUse::Addressed {
-            flags |= vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS;
-        }
-        if bytes > device.limits().max_storage_buffer_range
-            && matches!(
-                usage,
-                BufferUse::Storage | BufferUse::Geometry | BufferUse::Stream
-            )
-        {
+        let bytes = bytes.max(LEAST_BYTES);
+        if bytes > device.limits().max_storage_buffer_range && usage.is_bound_by_sets() {
             return Err(Error::DeviceMemory {
                 device: device.name().to_owned(),
                 what: format!("{name}, above the device's largest storage buffer"),
                 bytes,
             });
         }
-        let info = vk::BufferCreateInfo::default().size(bytes).usage(flags);
+        let info = vk::BufferCreateInfo::default()
+            .size(bytes)
+            .usage(usage.flags());
         // SAFETY: a plain creation on a live device.
         let raw = unsafe { device.raw.create_buffer(&info, None) }
             .map_err(device.error("creating a buffer"))?;
-        let mut buffer = Self {
+        let mut owner = BufferOwner {
             raw,
-            allocation: None,
             bytes,
+            usage,
+            allocation: RwLock::default(),
+            referred: Mutex::default(),
             device: Arc::clone(device),
         };
         device.set_name(raw, name);
-        // SAFETY: the buffer is of this device.
-        let requirements = unsafe { device.raw.get_buffer_memory_requirements(raw) };
-        let allocation = device
-            .allocator()
-            .allocate(&AllocationCreateDesc {
-                name,
-                requirements,
-                location: match usage {
-                    BufferUse::Storage | BufferUse::Geometry | BufferUse::Addressed => {
-                        MemoryLocation::GpuOnly
-                    }
-                    BufferUse::Upload | BufferUse::Stream => MemoryLocation::CpuToGpu,
-                    BufferUse::Readback => MemoryLocation::GpuToCpu,
-                },
-                linear: true,
-                allocation_scheme: AllocationScheme::GpuAllocatorManaged,
-            })
-            .map_err(|_| Error::DeviceMemory {
-                device: device.name().to_owned(),
-                what: name.to_owned(),
-                bytes,
-            })?;
-        // SAFETY: the allocation was made for this buffer's requirements and is bound once.
-        unsafe {
+        let allocation = device.allocate(&MemoryRequest {
+            name,
+            // SAFETY: the buffer is of this device.
+            requirements: unsafe { device.raw.get_buffer_memory_requirements(raw) },
+            location: usage.location(),
+            linear: true,
+        })?;
+        // SAFETY: the allocation meets this buffer's requirements and is bound once.
+        let bound = unsafe {
             device
                 .raw
                 .bind_buffer_memory(raw, allocation.memory(), allocation.offset())
-        }
-        .map_err(device.error("binding a buffer's memory"))?;
-        buffer.allocation = Some(allocation);
-        Ok(buffer)
+        };
+        // Stored before the check, so that a failure frees it.
+        owner.allocation = RwLock::new(Some(allocation));
+        bound.map_err(device.error("binding a buffer's memory"))?;
+        Ok(Self {
+            owner: Arc::new(owner),
+        })
     }
 
+    /// The size in bytes; at least 16, whatever the caller requested.
     pub fn bytes(&self) -> u64 {
-        self.bytes
+        self.owner.bytes
     }
 
-    /// Where an [`BufferUse::Addressed`] buffer lies, for shaders.
+    /// The device address of an [`BufferUse::Addressed`] buffer, for shaders.
+    ///
+    /// Commands cannot know which addresses a shader reads: the buffer that contains this one must
+    /// [refer to](Self::refer_to) it.
     pub fn address(&self) -> u64 {
-        let info = vk::BufferDeviceAddressInfo::default().buffer(self.raw);
-        // SAFETY: the buffer is bound, and made with an address unless the caller is wrong, which validation tells.
-        unsafe { self.device.raw.get_buffer_device_address(&info) }
+        assert_eq!(
+            self.owner.usage,
+            BufferUse::Addressed,
+            "only an addressed buffer has an address"
+        );
+        let info = vk::BufferDeviceAddressInfo::default().buffer(self.owner.raw);
+        // SAFETY: the buffer is bound to memory, and was created for use by its address.
+        unsafe { self.owner.device.raw.get_buffer_device_address(&info) }
     }
 
-    /// Writes `data` at byte `offset`. The buffer must be an [`BufferUse::Upload`] or [`BufferUse::Stream`] buffer that no
-    /// submission reads.
+    /// Keeps `addressed` alive as long as this buffer, which contains its address.
+    pub fn refer_to(&self, addressed: &Self) {
+        assert!(
+            addressed.owner.usage == BufferUse::Addressed
+                && self.owner.usage != BufferUse::Addressed,
+            "addressed buffers are referred to by buffers of other kinds"
+        );
+        lock(&self.owner.referred).hold(&addressed.owner);
+    }
+
+    /// Writes `data` at byte `offset`. The buffer must be a [`BufferUse::Upload`] or
+    /// [`BufferUse::Stream`] buffer that no submission reads.
     pub fn write<T: Pod>(&mut self, offset: u64, data: &[T]) {
         let source = bytemuck::cast_slice::<T, u8>(data);
         let offset = offset as usize;
-        let target = self
-            .allocation
+        let mut allocation = (self.owner.allocation.write()).unwrap_or_else(|e| e.into_inner());
+        let target = allocation
             .as_mut()
-            .and_then(|a| a.mapped_slice_mut())
+            .and_then(Allocation::mapped_slice_mut)
             .expect("only upload and stream buffers are written by the CPU");
         target[offset..offset + source.len()].copy_from_slice(source);
     }
 
-    /// Reads `count` values from byte `offset`. The buffer must be a [`BufferUse::Readback`] buffer whose writes are
-    /// done.
+    /// Reads `count` values from byte `offset`. The buffer must be a [`BufferUse::Readback`] buffer
+    /// whose writes are done.
     pub fn read<T: Pod>(&self, offset: u64, count: usize) -> Vec<T> {
-        let source = self
-            .allocation
+        let allocation = (self.owner.allocation.read()).unwrap_or_else(|e| e.into_inner());
+        let source = allocation
             .as_ref()
-            .and_then(|a| a.mapped_slice())
+            .and_then(Allocation::mapped_slice)
             .expect("only readback buffers are read by the CPU");
         let mut values = vec![T::zeroed(); count];
         let target = bytemuck::cast_slice_mut::<T, u8>(&mut values);
@@ -148,13 +159,39 @@ impl Buffer {
     }
 }
 
-impl Drop for Buffer {
-    fn drop(&mut self) {
-        if let Some(allocation) = self.allocation.take() {
-            // Freeing fails for foreign allocations only.
-            let _ = self.device.allocator().free(allocation);
+impl BufferUse {
+    fn flags(self) -> vk::BufferUsageFlags {
+        use vk::BufferUsageFlags as F;
+        let all = F::STORAGE_BUFFER | F::TRANSFER_SRC | F::TRANSFER_DST;
+        match self {
+            Self::Storage | Self::Upload | Self::Readback => all,
+            Self::Geometry => all | F::VERTEX_BUFFER | F::INDEX_BUFFER | F::INDIRECT_BUFFER,
+            Self::Stream => all | F::VERTEX_BUFFER | F::INDEX_BUFFER,
+            Self::Addressed => all | F::SHADER_DEVICE_ADDRESS,
         }
-        // SAFETY: whoever recorded the buffer waits for the submission before dropping it.
+    }
+
+    fn location(self) -> MemoryLocation {
+        match self {
+            Self::Storage | Self::Geometry | Self::Addressed => MemoryLocation::GpuOnly,
+            Self::Upload | Self::Stream => MemoryLocation::CpuToGpu,
+            Self::Readback => MemoryLocation::GpuToCpu,
+        }
+    }
+
+    /// Whether descriptor sets bind such buffers, which limits their size.
+    fn is_bound_by_sets(self) -> bool {
+        matches!(self, Self::Storage | Self::Geometry | Self::Stream)
+    }
+}
+
+impl Drop for BufferOwner {
+    fn drop(&mut self) {
+        // SAFETY: sets and commands that use the buffer hold its owner, so none is left.
         unsafe { self.device.raw.destroy_buffer(self.raw, None) };
+        let allocation = self.allocation.get_mut().unwrap_or_else(|e| e.into_inner());
+        if let Some(allocation) = allocation.take() {
+            self.device.free(allocation);
+        }
     }
 }

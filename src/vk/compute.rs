@@ -4,21 +4,26 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::{Bind, Binding, DescriptorLayout, DescriptorSet, Device};
+use super::pipeline::{Module, PipelineOwner};
+use super::{Bind, Binding, DescriptorSet, Device};
 use crate::error::Result;
 
 /// A compute shader with its bindings, its push constants and the specialisation constants 0, 1, ….
+/// A clone is another handle to the same pipeline.
+///
+/// Commands that record it keep it alive.
+#[derive(Clone)]
 pub struct ComputePipeline {
-    pub(super) raw: vk::Pipeline,
-    pub(super) layout: vk::PipelineLayout,
-    pub(super) push_bytes: u32,
-    descriptors: DescriptorLayout,
-    device: Arc<Device>,
+    pub(super) owner: Arc<PipelineOwner>,
 }
 
 impl ComputePipeline {
-    /// `spirv` is a whole compute module with the entry point `main`. With `subgroups`, the workgroup (its size must be
-    /// a multiple of the subgroup size) consists of full subgroups of the device's own size.
+    /// `spirv` is a whole compute module with the entry point `main`. With `subgroups`, the
+    /// workgroup (its size must be a multiple of the subgroup size) consists of full subgroups of
+    /// the device's own size.
+    ///
+    /// # Errors
+    /// A device that fails.
     pub fn new(
         device: &Arc<Device>,
         name: &str,
@@ -28,21 +33,8 @@ impl ComputePipeline {
         constants: &[u32],
         subgroups: bool,
     ) -> Result<Self> {
-        let descriptors = DescriptorLayout::new(device, name, bindings)?;
-        let layout = pipeline_layout(
-            device,
-            name,
-            &descriptors,
-            push_bytes,
-            vk::ShaderStageFlags::COMPUTE,
-        )?;
-        let mut pipeline = Self {
-            raw: vk::Pipeline::null(),
-            layout,
-            push_bytes: push_bytes as u32,
-            descriptors,
-            device: Arc::clone(device),
-        };
+        let stages = vk::ShaderStageFlags::COMPUTE;
+        let mut owner = PipelineOwner::with_layouts(device, name, bindings, push_bytes, stages)?;
         let module = Module::new(device, spirv)?;
         let entries: Vec<_> = (0..constants.len() as u32)
             .map(|id| {
@@ -58,7 +50,7 @@ impl ComputePipeline {
         let mut size = vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo::default()
             .required_subgroup_size(device.limits().subgroup_size);
         let mut stage = vk::PipelineShaderStageCreateInfo::default()
-            .stage(vk::ShaderStageFlags::COMPUTE)
+            .stage(stages)
             .module(module.raw)
             .name(c"main")
             .specialization_info(&specialisation);
@@ -69,19 +61,24 @@ impl ComputePipeline {
         }
         let info = vk::ComputePipelineCreateInfo::default()
             .stage(stage)
-            .layout(layout);
+            .layout(owner.layout);
         // SAFETY: module, layout and constants outlive the call.
-        pipeline.raw = unsafe {
+        owner.raw = unsafe {
             device
                 .raw
                 .create_compute_pipelines(vk::PipelineCache::null(), &[info], None)
         }
         .map_err(|(_, e)| device.error("creating a compute pipeline")(e))?[0];
-        device.set_name(pipeline.raw, name);
-        Ok(pipeline)
+        device.set_name(owner.raw, name);
+        Ok(Self {
+            owner: Arc::new(owner),
+        })
     }
 
-    /// Of storage buffers alone, without constants.
+    /// A pipeline that binds only storage buffers and has no specialisation constants.
+    ///
+    /// # Errors
+    /// A device that fails.
     pub fn storage(
         device: &Arc<Device>,
         name: &str,
@@ -93,62 +90,11 @@ impl ComputePipeline {
         Self::new(device, name, spirv, &bindings, push_bytes, &[], false)
     }
 
+    /// A descriptor set for this pipeline, one bind for each binding.
+    ///
+    /// # Errors
+    /// A device that fails.
     pub fn bind(&self, name: &str, binds: &[Bind<'_>]) -> Result<DescriptorSet> {
-        self.descriptors.bind(name, binds)
-    }
-}
-
-impl Drop for ComputePipeline {
-    fn drop(&mut self) {
-        // SAFETY: whoever recorded the pipeline waits for the submission before dropping it.
-        unsafe {
-            self.device.raw.destroy_pipeline(self.raw, None);
-            self.device.raw.destroy_pipeline_layout(self.layout, None);
-        }
-    }
-}
-
-pub(super) fn pipeline_layout(
-    device: &Arc<Device>,
-    name: &str,
-    descriptors: &DescriptorLayout,
-    push_bytes: usize,
-    stages: vk::ShaderStageFlags,
-) -> Result<vk::PipelineLayout> {
-    let sets = [descriptors.raw];
-    let ranges = [vk::PushConstantRange::default()
-        .stage_flags(stages)
-        .size(push_bytes as u32)];
-    let mut info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets);
-    if push_bytes > 0 {
-        info = info.push_constant_ranges(&ranges);
-    }
-    // SAFETY: `info` outlives the call.
-    let layout = unsafe { device.raw.create_pipeline_layout(&info, None) }
-        .map_err(device.error("creating a pipeline layout"))?;
-    device.set_name(layout, name);
-    Ok(layout)
-}
-
-/// A shader module, gone once its pipeline is made.
-pub(super) struct Module<'a> {
-    pub(super) raw: vk::ShaderModule,
-    device: &'a Device,
-}
-
-impl<'a> Module<'a> {
-    pub(super) fn new(device: &'a Arc<Device>, spirv: &[u32]) -> Result<Self> {
-        let info = vk::ShaderModuleCreateInfo::default().code(spirv);
-        // SAFETY: the words are a module that the build checked.
-        let raw = unsafe { device.raw.create_shader_module(&info, None) }
-            .map_err(device.error("loading a shader"))?;
-        Ok(Self { raw, device })
-    }
-}
-
-impl Drop for Module<'_> {
-    fn drop(&mut self) {
-        // SAFETY: pipelines do not need their modules once made.
-        unsafe { self.device.raw.destroy_shader_module(self.raw, None) };
+        self.owner.descriptors.bind(name, binds)
     }
 }

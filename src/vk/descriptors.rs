@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
+use super::held::Held;
 use super::{Buffer, Device, Image, Sampler};
 use crate::error::Result;
 
@@ -22,13 +23,31 @@ pub enum Bind<'a> {
     Image(&'a Image, &'a Sampler),
 }
 
+/// The bindings of a pipeline.
 pub struct DescriptorLayout {
     pub(super) raw: vk::DescriptorSetLayout,
     kinds: Vec<Binding>,
     device: Arc<Device>,
 }
 
+/// A descriptor set with its own pool. A clone is another handle to the same set.
+///
+/// It keeps alive what it binds; commands that record it keep it alive.
+#[derive(Clone)]
+pub struct DescriptorSet {
+    pub(super) owner: Arc<DescriptorSetOwner>,
+}
+
+pub(super) struct DescriptorSetOwner {
+    pub(super) raw: vk::DescriptorSet,
+    pool: vk::DescriptorPool,
+    bound: Held,
+    device: Arc<Device>,
+}
+
 impl DescriptorLayout {
+    /// # Errors
+    /// A device that fails.
     pub fn new(device: &Arc<Device>, name: &str, kinds: &[Binding]) -> Result<Self> {
         let bindings: Vec<_> = kinds
             .iter()
@@ -57,13 +76,28 @@ impl DescriptorLayout {
         })
     }
 
-    /// A set of its own pool, with everything bound.
+    /// A set with everything bound.
+    ///
+    /// # Errors
+    /// A device that fails.
     pub fn bind(&self, name: &str, binds: &[Bind<'_>]) -> Result<DescriptorSet> {
         assert_eq!(
             binds.len(),
             self.kinds.len(),
             "{name}: one bind for each binding"
         );
+        let mut set = self.allocate(name)?;
+        for (i, (bind, kind)) in binds.iter().zip(&self.kinds).enumerate() {
+            assert_eq!(bind.kind(), *kind, "{name}: the kind of binding {i}");
+            set.write(i as u32, bind);
+        }
+        Ok(DescriptorSet {
+            owner: Arc::new(set),
+        })
+    }
+
+    /// A set without content, in a pool that has room for this set alone.
+    fn allocate(&self, name: &str) -> Result<DescriptorSetOwner> {
         let device = &self.device;
         let sizes: Vec<_> = [Binding::Storage, Binding::Sampled]
             .into_iter()
@@ -82,9 +116,10 @@ impl DescriptorLayout {
         // SAFETY: `info` outlives the call.
         let pool = unsafe { device.raw.create_descriptor_pool(&info, None) }
             .map_err(device.error("creating a descriptor pool"))?;
-        let mut set = DescriptorSet {
+        let mut set = DescriptorSetOwner {
             raw: vk::DescriptorSet::null(),
             pool,
+            bound: Held::default(),
             device: Arc::clone(device),
         };
         let layouts = [self.raw];
@@ -95,39 +130,48 @@ impl DescriptorLayout {
         set.raw = unsafe { device.raw.allocate_descriptor_sets(&info) }
             .map_err(device.error("allocating a descriptor set"))?[0];
         device.set_name(set.raw, name);
-        for (i, (bind, kind)) in binds.iter().zip(&self.kinds).enumerate() {
-            let write = vk::WriteDescriptorSet::default()
-                .dst_set(set.raw)
-                .dst_binding(i as u32)
-                .descriptor_type(kind.raw());
-            match (bind, kind) {
-                (Bind::Buffer(buffer), Binding::Storage) => {
-                    let infos = [vk::DescriptorBufferInfo::default()
-                        .buffer(buffer.raw)
-                        .range(vk::WHOLE_SIZE)];
-                    // SAFETY: the set is not in use yet, and the buffer is alive.
-                    unsafe {
-                        device
-                            .raw
-                            .update_descriptor_sets(&[write.buffer_info(&infos)], &[]);
-                    }
-                }
-                (Bind::Image(image, sampler), Binding::Sampled) => {
-                    let infos = [vk::DescriptorImageInfo::default()
-                        .image_view(image.view)
-                        .image_layout(vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL)
-                        .sampler(sampler.raw)];
-                    // SAFETY: the set is not in use yet, and image and sampler are alive.
-                    unsafe {
-                        device
-                            .raw
-                            .update_descriptor_sets(&[write.image_info(&infos)], &[]);
-                    }
-                }
-                _ => panic!("{name}: binding {i} is of another kind"),
+        Ok(set)
+    }
+}
+
+impl DescriptorSetOwner {
+    fn write(&mut self, binding: u32, bind: &Bind<'_>) {
+        let write = vk::WriteDescriptorSet::default()
+            .dst_set(self.raw)
+            .dst_binding(binding)
+            .descriptor_type(bind.kind().raw());
+        match bind {
+            Bind::Buffer(buffer) => {
+                self.bound.hold(&buffer.owner);
+                let infos = [vk::DescriptorBufferInfo::default()
+                    .buffer(buffer.owner.raw)
+                    .range(vk::WHOLE_SIZE)];
+                self.update(write.buffer_info(&infos));
+            }
+            Bind::Image(image, sampler) => {
+                self.bound.hold(&image.owner);
+                self.bound.hold(&sampler.owner);
+                let infos = [vk::DescriptorImageInfo::default()
+                    .image_view(image.owner.view)
+                    .image_layout(vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL)
+                    .sampler(sampler.owner.raw)];
+                self.update(write.image_info(&infos));
             }
         }
-        Ok(set)
+    }
+
+    fn update(&self, write: vk::WriteDescriptorSet<'_>) {
+        // SAFETY: the set is not in use yet, and it holds what the write refers to.
+        unsafe { self.device.raw.update_descriptor_sets(&[write], &[]) };
+    }
+}
+
+impl Bind<'_> {
+    fn kind(&self) -> Binding {
+        match self {
+            Self::Buffer(_) => Binding::Storage,
+            Self::Image(..) => Binding::Sampled,
+        }
     }
 }
 
@@ -142,7 +186,7 @@ impl Binding {
 
 impl Drop for DescriptorLayout {
     fn drop(&mut self) {
-        // SAFETY: a layout may go before the sets and pipelines made with it.
+        // SAFETY: a layout may be destroyed before the sets and pipelines made with it.
         unsafe {
             self.device
                 .raw
@@ -151,15 +195,9 @@ impl Drop for DescriptorLayout {
     }
 }
 
-pub struct DescriptorSet {
-    pub(super) raw: vk::DescriptorSet,
-    pool: vk::DescriptorPool,
-    device: Arc<Device>,
-}
-
-impl Drop for DescriptorSet {
+impl Drop for DescriptorSetOwner {
     fn drop(&mut self) {
-        // SAFETY: whoever recorded the set waits for the submission before dropping it.
+        // SAFETY: commands that record the set hold its owner, so none is left.
         unsafe { self.device.raw.destroy_descriptor_pool(self.pool, None) };
     }
 }

@@ -6,22 +6,35 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use ash::{ext, khr, vk};
-use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+use gpu_allocator::MemoryLocation;
+use gpu_allocator::vulkan::{
+    Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc,
+};
 
 use super::instance::{Candidate, Instance, graphics_family};
+use super::lock;
 use crate::error::{Error, Result};
 
 /// A device with one queue for graphics and compute.
 pub struct Device {
     pub(super) raw: ash::Device,
-    pub(super) queue: Mutex<vk::Queue>,
+    queue: Mutex<vk::Queue>,
     pub(super) family: u32,
-    pub(super) allocator: Mutex<ManuallyDrop<Allocator>>,
+    allocator: Mutex<ManuallyDrop<Allocator>>,
     names: Option<ext::debug_utils::Device>,
     candidate: Candidate,
     limits: Limits,
-    #[cfg_attr(not(feature = "window"), allow(dead_code))] // read by swapchains, held by all
+    #[cfg_attr(not(feature = "window"), allow(dead_code))] // read by swapchains only
     pub(super) instance: Arc<Instance>,
+}
+
+/// Memory for a buffer or an image.
+pub(super) struct MemoryRequest<'a> {
+    pub(super) name: &'a str,
+    pub(super) requirements: vk::MemoryRequirements,
+    pub(super) location: MemoryLocation,
+    /// Of a buffer, as opposed to an image.
+    pub(super) linear: bool,
 }
 
 /// What the passes size themselves by.
@@ -30,7 +43,7 @@ pub struct Limits {
     pub max_storage_buffer_range: u64,
     pub max_image_side: u32,
     pub subgroup_size: u32,
-    /// Binary digits of a rasterised corner's place within a pixel.
+    /// Fractional bits of a rasterised vertex's position, in pixels.
     pub subpixel_bits: u32,
     /// Nanoseconds of one timestamp tick.
     pub timestamp_period: f64,
@@ -39,6 +52,8 @@ pub struct Limits {
 }
 
 impl Device {
+    /// # Errors
+    /// A candidate that lacks what this program needs; a device that fails.
     pub fn new(instance: &Arc<Instance>, candidate: &Candidate) -> Result<Arc<Self>> {
         if !candidate.missing.is_empty() {
             return Err(Error::Device(format!(
@@ -62,60 +77,16 @@ impl Device {
                 candidate.name
             )));
         };
-        let priorities = [1.0];
-        let queue_infos = [vk::DeviceQueueCreateInfo::default()
-            .queue_family_index(family)
-            .queue_priorities(&priorities)];
-        let mut f12 = vk::PhysicalDeviceVulkan12Features::default()
-            .scalar_block_layout(true)
-            .buffer_device_address(true)
-            .shader_buffer_int64_atomics(candidate.int64_atomics);
-        let mut f13 = vk::PhysicalDeviceVulkan13Features::default()
-            .synchronization2(true)
-            .maintenance4(true)
-            .subgroup_size_control(true)
-            .compute_full_subgroups(true);
-        let features = vk::PhysicalDeviceFeatures::default()
-            .geometry_shader(true)
-            .full_draw_index_uint32(true)
-            .shader_int64(candidate.int64_atomics);
-        let extensions = match instance.presents {
-            true => vec![khr::swapchain::NAME.as_ptr()],
-            false => Vec::new(),
-        };
-        let info = vk::DeviceCreateInfo::default()
-            .queue_create_infos(&queue_infos)
-            .enabled_extension_names(&extensions)
-            .enabled_features(&features)
-            .push_next(&mut f12)
-            .push_next(&mut f13);
-        let error = |what| {
-            move |source| Error::Vulkan {
-                device: candidate.name.clone(),
-                what,
-                source,
-            }
-        };
-        // SAFETY: `info` and its chain outlive the call; every feature was checked by `Instance::candidates`.
-        let raw = unsafe { raw_instance.create_device(candidate.raw, &info, None) }
-            .map_err(error("creating the device"))?;
-        let allocator = Allocator::new(&AllocatorCreateDesc {
-            instance: raw_instance.clone(),
-            device: raw.clone(),
-            physical_device: candidate.raw,
-            debug_settings: Default::default(),
-            buffer_device_address: true,
-            allocation_sizes: Default::default(),
-        });
-        let allocator = match allocator {
+        let raw = create(instance, candidate, family)?;
+        let allocator = match allocator(instance, candidate, &raw) {
             Ok(allocator) => allocator,
             Err(e) => {
                 // SAFETY: nothing has been made from the device yet.
                 unsafe { raw.destroy_device(None) };
-                return Err(Error::Device(format!("{}: allocator: {e}", candidate.name)));
+                return Err(e);
             }
         };
-        // SAFETY: the family and index were asked for above.
+        // SAFETY: the device was created with one queue of this family.
         let queue = unsafe { raw.get_device_queue(family, 0) };
         DEVICES.fetch_add(1, Ordering::Relaxed);
         let names = instance
@@ -127,14 +98,7 @@ impl Device {
             family,
             allocator: Mutex::new(ManuallyDrop::new(allocator)),
             names,
-            limits: Limits {
-                max_storage_buffer_range: candidate.max_storage_buffer_range,
-                max_image_side: candidate.max_image_side,
-                subgroup_size: candidate.subgroup_size,
-                subpixel_bits: properties.limits.sub_pixel_precision_bits.clamp(4, 16),
-                timestamp_period: f64::from(properties.limits.timestamp_period),
-                heap_bytes: candidate.heap_bytes,
-            },
+            limits: Limits::new(candidate, &properties.limits),
             candidate: candidate.clone(),
             instance: Arc::clone(instance),
         }))
@@ -153,14 +117,40 @@ impl Device {
         &self.limits
     }
 
-    /// Bytes in buffers and images that live now.
+    /// Bytes in live buffers and images.
     pub fn allocated_bytes(&self) -> u64 {
         self.allocator().generate_report().total_allocated_bytes
     }
 
-    pub(super) fn allocator(&self) -> MutexGuard<'_, ManuallyDrop<Allocator>> {
-        // A panic elsewhere leaves the allocator's own state whole.
-        self.allocator.lock().unwrap_or_else(|e| e.into_inner())
+    fn allocator(&self) -> MutexGuard<'_, ManuallyDrop<Allocator>> {
+        lock(&self.allocator)
+    }
+
+    pub(super) fn allocate(&self, request: &MemoryRequest<'_>) -> Result<Allocation> {
+        let requirements = request.requirements;
+        self.allocator()
+            .allocate(&AllocationCreateDesc {
+                name: request.name,
+                requirements,
+                location: request.location,
+                linear: request.linear,
+                allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+            })
+            .map_err(|_| Error::DeviceMemory {
+                device: self.name().to_owned(),
+                what: request.name.to_owned(),
+                bytes: requirements.size,
+            })
+    }
+
+    pub(super) fn free(&self, allocation: Allocation) {
+        // Freeing fails only for allocations of another allocator.
+        let _ = self.allocator().free(allocation);
+    }
+
+    /// The queue, which one thread uses at a time.
+    pub(super) fn queue(&self) -> MutexGuard<'_, vk::Queue> {
+        lock(&self.queue)
     }
 
     pub(super) fn error(&self, what: &'static str) -> impl FnOnce(vk::Result) -> Error {
@@ -172,7 +162,7 @@ impl Device {
         }
     }
 
-    /// Gives an object the name that validation messages and debuggers show.
+    /// Sets the name of an object that validation messages and debuggers show.
     pub(super) fn set_name(&self, handle: impl vk::Handle, name: &str) {
         let (Some(names), Ok(name)) = (&self.names, CString::new(name)) else {
             return;
@@ -186,33 +176,106 @@ impl Device {
 
     /// Waits until the queue is idle.
     pub fn wait_idle(&self) -> Result<()> {
+        let _queue = self.queue();
         // SAFETY: the queue's lock keeps other threads from submitting meanwhile.
-        let _queue = self.queue.lock().unwrap_or_else(|e| e.into_inner());
         unsafe { self.raw.device_wait_idle() }.map_err(self.error("waiting for the device"))
     }
 }
 
-/// Bytes in buffers and images that devices of this process took with them when they went; anything but 0 is a leak.
+/// A device with one queue of a family, and the features that this program uses.
+fn create(instance: &Instance, candidate: &Candidate, family: u32) -> Result<ash::Device> {
+    let priorities = [1.0];
+    let queue_infos = [vk::DeviceQueueCreateInfo::default()
+        .queue_family_index(family)
+        .queue_priorities(&priorities)];
+    let mut f12 = vk::PhysicalDeviceVulkan12Features::default()
+        .scalar_block_layout(true)
+        .buffer_device_address(true)
+        .shader_buffer_int64_atomics(candidate.int64_atomics);
+    let mut f13 = vk::PhysicalDeviceVulkan13Features::default()
+        .synchronization2(true)
+        .maintenance4(true)
+        .subgroup_size_control(true)
+        .compute_full_subgroups(true);
+    let features = vk::PhysicalDeviceFeatures::default()
+        .geometry_shader(true)
+        .full_draw_index_uint32(true)
+        .shader_int64(candidate.int64_atomics);
+    let extensions = match instance.presents {
+        true => vec![khr::swapchain::NAME.as_ptr()],
+        false => Vec::new(),
+    };
+    let info = vk::DeviceCreateInfo::default()
+        .queue_create_infos(&queue_infos)
+        .enabled_extension_names(&extensions)
+        .enabled_features(&features)
+        .push_next(&mut f12)
+        .push_next(&mut f13);
+    // SAFETY: `info` and its chain outlive the call; `Instance::candidates` checked every feature.
+    unsafe { instance.raw.create_device(candidate.raw, &info, None) }.map_err(|source| {
+        Error::Vulkan {
+            device: candidate.name.clone(),
+            what: "creating the device",
+            source,
+        }
+    })
+}
+
+fn allocator(instance: &Instance, candidate: &Candidate, raw: &ash::Device) -> Result<Allocator> {
+    Allocator::new(&AllocatorCreateDesc {
+        instance: instance.raw.clone(),
+        device: raw.clone(),
+        physical_device: candidate.raw,
+        debug_settings: Default::default(),
+        buffer_device_address: true,
+        allocation_sizes: Default::default(),
+    })
+    .map_err(|e| Error::Device(format!("{}: allocator: {e}", candidate.name)))
+}
+
+impl Limits {
+    fn new(candidate: &Candidate, limits: &vk::PhysicalDeviceLimits) -> Self {
+        Self {
+            max_storage_buffer_range: candidate.max_storage_buffer_range,
+            max_image_side: candidate.max_image_side,
+            subgroup_size: candidate.subgroup_size,
+            subpixel_bits: limits.sub_pixel_precision_bits.clamp(4, 16),
+            timestamp_period: f64::from(limits.timestamp_period),
+            heap_bytes: candidate.heap_bytes,
+        }
+    }
+}
+
+/// Bytes in buffers and images that were not freed before their device; anything but 0 is a leak.
 static LEFT_BYTES: AtomicU64 = AtomicU64::new(0);
 
-/// Devices of this process that live: whatever is left of one keeps it.
+/// Live devices of this process; every object keeps its device alive.
 static DEVICES: AtomicU64 = AtomicU64::new(0);
 
-/// What is left when everything should be gone: devices that something still holds, and bytes in buffers and images that were not
-/// freed before their device. None is the only good answer.
-pub fn left() -> Option<(u64, u64)> {
-    let left = (
-        DEVICES.load(Ordering::Relaxed),
-        LEFT_BYTES.load(Ordering::Relaxed),
-    );
-    (left != (0, 0)).then_some(left)
+/// What is left in this process when everything should be freed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Left {
+    /// Devices that some object still holds.
+    pub devices: u64,
+    /// Bytes in buffers and images that were not freed before their device.
+    pub bytes: u64,
+}
+
+/// What is left when everything should be freed; anything but `None` is a leak.
+pub fn left() -> Option<Left> {
+    let left = Left {
+        devices: DEVICES.load(Ordering::Relaxed),
+        bytes: LEFT_BYTES.load(Ordering::Relaxed),
+    };
+    (left.devices != 0 || left.bytes != 0).then_some(left)
 }
 
 impl Drop for Device {
     fn drop(&mut self) {
         LEFT_BYTES.fetch_add(self.allocated_bytes(), Ordering::Relaxed);
         DEVICES.fetch_sub(1, Ordering::Relaxed);
-        // SAFETY: every object of the device holds it by `Arc`, so none is left; the allocator goes before the device.
+        // SAFETY: every object of the device holds it by `Arc`, so none is left; the allocator is
+        // dropped before the device.
         unsafe {
             let _ = self.raw.device_wait_idle();
             ManuallyDrop::drop(self.allocator.get_mut().unwrap_or_else(|e| e.into_inner()));

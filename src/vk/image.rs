@@ -1,12 +1,13 @@
-//! Two-dimensional images with their memory and one view, and samplers.
+//! Two-dimensional images with their memory and one view.
 
 use std::sync::Arc;
 
 use ash::vk;
 use gpu_allocator::MemoryLocation;
-use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
+use gpu_allocator::vulkan::Allocation;
 
 use super::Device;
+use super::device::MemoryRequest;
 use crate::error::{Error, Result};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,7 +22,15 @@ pub enum ImageUse {
     Texture,
 }
 
+/// An image with its memory and a view of all of it. A clone is another handle to the same image.
+///
+/// Descriptor sets and framebuffers that bind it and commands that record it keep it alive.
+#[derive(Clone)]
 pub struct Image {
+    pub(super) owner: Arc<ImageOwner>,
+}
+
+pub(super) struct ImageOwner {
     pub(super) raw: vk::Image,
     pub(super) view: vk::ImageView,
     pub(super) width: u32,
@@ -33,6 +42,8 @@ pub struct Image {
 }
 
 impl Image {
+    /// # Errors
+    /// An image that exceeds the device's memory or its largest side.
     pub fn new(
         device: &Arc<Device>,
         name: &str,
@@ -44,6 +55,9 @@ impl Image {
     }
 
     /// A texture with every level of detail from its own size down to one texel.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
     pub fn mipped(
         device: &Arc<Device>,
         name: &str,
@@ -76,28 +90,6 @@ impl Image {
                 device.name()
             )));
         }
-        let (flags, aspect) = match usage {
-            ImageUse::ColourTarget => (
-                vk::ImageUsageFlags::COLOR_ATTACHMENT
-                    | vk::ImageUsageFlags::SAMPLED
-                    | vk::ImageUsageFlags::TRANSFER_SRC,
-                vk::ImageAspectFlags::COLOR,
-            ),
-            ImageUse::DepthTarget => (
-                vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
-                vk::ImageAspectFlags::DEPTH,
-            ),
-            ImageUse::CopiedDepth => (
-                vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC,
-                vk::ImageAspectFlags::DEPTH,
-            ),
-            ImageUse::Texture => (
-                vk::ImageUsageFlags::SAMPLED
-                    | vk::ImageUsageFlags::TRANSFER_DST
-                    | vk::ImageUsageFlags::TRANSFER_SRC,
-                vk::ImageAspectFlags::COLOR,
-            ),
-        };
         let info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_2D)
             .format(format)
@@ -110,136 +102,103 @@ impl Image {
             .array_layers(1)
             .samples(vk::SampleCountFlags::TYPE_1)
             .tiling(vk::ImageTiling::OPTIMAL)
-            .usage(flags);
+            .usage(usage.flags());
         // SAFETY: a plain creation on a live device.
         let raw = unsafe { device.raw.create_image(&info, None) }
             .map_err(device.error("creating an image"))?;
-        let mut image = Self {
+        let mut owner = ImageOwner {
             raw,
             view: vk::ImageView::null(),
             width,
             height,
             mip_levels,
-            aspect,
+            aspect: usage.aspect(),
             allocation: None,
             device: Arc::clone(device),
         };
         device.set_name(raw, name);
-        // SAFETY: the image is of this device.
-        let requirements = unsafe { device.raw.get_image_memory_requirements(raw) };
-        let allocation = device
-            .allocator()
-            .allocate(&AllocationCreateDesc {
-                name,
-                requirements,
-                location: MemoryLocation::GpuOnly,
-                linear: false,
-                allocation_scheme: AllocationScheme::GpuAllocatorManaged,
-            })
-            .map_err(|_| Error::DeviceMemory {
-                device: device.name().to_owned(),
-                what: name.to_owned(),
-                bytes: requirements.size,
-            })?;
-        // SAFETY: the allocation was made for this image's requirements and is bound once.
-        unsafe {
+        owner.bind_memory(name)?;
+        owner.make_view(name, format)?;
+        Ok(Self {
+            owner: Arc::new(owner),
+        })
+    }
+
+    /// Width and height in texels.
+    pub fn size(&self) -> (u32, u32) {
+        (self.owner.width, self.owner.height)
+    }
+}
+
+impl ImageOwner {
+    fn bind_memory(&mut self, name: &str) -> Result<()> {
+        let device = &self.device;
+        let allocation = device.allocate(&MemoryRequest {
+            name,
+            // SAFETY: the image is of this device.
+            requirements: unsafe { device.raw.get_image_memory_requirements(self.raw) },
+            location: MemoryLocation::GpuOnly,
+            linear: false,
+        })?;
+        // SAFETY: the allocation meets this image's requirements and is bound once.
+        let bound = unsafe {
             device
                 .raw
-                .bind_image_memory(raw, allocation.memory(), allocation.offset())
-        }
-        .map_err(device.error("binding an image's memory"))?;
-        image.allocation = Some(allocation);
-        let view_info = vk::ImageViewCreateInfo::default()
-            .image(raw)
+                .bind_image_memory(self.raw, allocation.memory(), allocation.offset())
+        };
+        // Stored before the check, so that a failure frees it.
+        self.allocation = Some(allocation);
+        bound.map_err(device.error("binding an image's memory"))
+    }
+
+    fn make_view(&mut self, name: &str, format: vk::Format) -> Result<()> {
+        let info = vk::ImageViewCreateInfo::default()
+            .image(self.raw)
             .view_type(vk::ImageViewType::TYPE_2D)
             .format(format)
             .subresource_range(
                 vk::ImageSubresourceRange::default()
-                    .aspect_mask(aspect)
-                    .level_count(mip_levels)
+                    .aspect_mask(self.aspect)
+                    .level_count(self.mip_levels)
                     .layer_count(1),
             );
         // SAFETY: the image is bound to memory and outlives its view.
-        image.view = unsafe { device.raw.create_image_view(&view_info, None) }
-            .map_err(device.error("creating an image view"))?;
-        device.set_name(image.view, name);
-        Ok(image)
-    }
-
-    pub fn size(&self) -> (u32, u32) {
-        (self.width, self.height)
+        self.view = unsafe { self.device.raw.create_image_view(&info, None) }
+            .map_err(self.device.error("creating an image view"))?;
+        self.device.set_name(self.view, name);
+        Ok(())
     }
 }
 
-impl Drop for Image {
+impl ImageUse {
+    fn flags(self) -> vk::ImageUsageFlags {
+        use vk::ImageUsageFlags as F;
+        match self {
+            Self::ColourTarget => F::COLOR_ATTACHMENT | F::SAMPLED | F::TRANSFER_SRC,
+            Self::DepthTarget => F::DEPTH_STENCIL_ATTACHMENT,
+            Self::CopiedDepth => F::DEPTH_STENCIL_ATTACHMENT | F::TRANSFER_SRC,
+            Self::Texture => F::SAMPLED | F::TRANSFER_DST | F::TRANSFER_SRC,
+        }
+    }
+
+    fn aspect(self) -> vk::ImageAspectFlags {
+        match self {
+            Self::ColourTarget | Self::Texture => vk::ImageAspectFlags::COLOR,
+            Self::DepthTarget | Self::CopiedDepth => vk::ImageAspectFlags::DEPTH,
+        }
+    }
+}
+
+impl Drop for ImageOwner {
     fn drop(&mut self) {
-        // SAFETY: whoever recorded the image waits for the submission before dropping it; a null view is allowed.
+        // SAFETY: sets, framebuffers and commands that use the image hold its owner, so none is
+        // left; a null view is allowed.
         unsafe {
             self.device.raw.destroy_image_view(self.view, None);
             self.device.raw.destroy_image(self.raw, None);
         }
         if let Some(allocation) = self.allocation.take() {
-            // Freeing fails for foreign allocations only.
-            let _ = self.device.allocator().free(allocation);
+            self.device.free(allocation);
         }
-    }
-}
-
-/// A sampler that repeats, either nearest (for integer images read by texel) or linear, between levels of detail too.
-pub struct Sampler {
-    pub(super) raw: vk::Sampler,
-    device: Arc<Device>,
-}
-
-impl Sampler {
-    pub fn new(device: &Arc<Device>, name: &str, linear: bool) -> Result<Self> {
-        let repeat = vk::SamplerAddressMode::REPEAT;
-        Self::with_edges(device, name, linear, repeat)
-    }
-
-    /// A linear one that goes on beyond the edges as it is there.
-    pub fn held(device: &Arc<Device>, name: &str) -> Result<Self> {
-        let edge = vk::SamplerAddressMode::CLAMP_TO_EDGE;
-        Self::with_edges(device, name, true, edge)
-    }
-
-    fn with_edges(
-        device: &Arc<Device>,
-        name: &str,
-        linear: bool,
-        edges: vk::SamplerAddressMode,
-    ) -> Result<Self> {
-        let filter = if linear {
-            vk::Filter::LINEAR
-        } else {
-            vk::Filter::NEAREST
-        };
-        let between_levels = if linear {
-            vk::SamplerMipmapMode::LINEAR
-        } else {
-            vk::SamplerMipmapMode::NEAREST
-        };
-        let info = vk::SamplerCreateInfo::default()
-            .mag_filter(filter)
-            .min_filter(filter)
-            .mipmap_mode(between_levels)
-            .max_lod(vk::LOD_CLAMP_NONE)
-            .address_mode_u(edges)
-            .address_mode_v(edges);
-        // SAFETY: a plain creation on a live device.
-        let raw = unsafe { device.raw.create_sampler(&info, None) }
-            .map_err(device.error("creating a sampler"))?;
-        device.set_name(raw, name);
-        Ok(Self {
-            raw,
-            device: Arc::clone(device),
-        })
-    }
-}
-
-impl Drop for Sampler {
-    fn drop(&mut self) {
-        // SAFETY: whoever bound the sampler waits for the submission before dropping it.
-        unsafe { self.device.raw.destroy_sampler(self.raw, None) };
     }
 }

@@ -1,6 +1,6 @@
 //! The instance, its validation messages, and the devices it offers.
 
-use std::ffi::{CStr, c_void};
+use std::ffi::{CStr, FromBytesUntilNulError, c_void};
 use std::sync::{Arc, Mutex};
 
 use ash::{ext, vk};
@@ -12,7 +12,8 @@ const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 /// Messages of warning severity or above that the validation layer has sent in this process.
 static VALIDATION_MESSAGES: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
-/// How many validation messages (warnings and errors) this process has seen; 0 is the only good answer.
+/// The number of validation messages (warnings and errors) in this process; anything but 0 is a
+/// bug.
 pub fn validation_messages() -> usize {
     validation_log().len()
 }
@@ -31,11 +32,10 @@ pub struct Instance {
     /// Whether devices of this instance are to show pictures on windows.
     pub(super) presents: bool,
     messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
-    // Last: the library is unloaded after everything made from it.
     pub(super) entry: ash::Entry,
 }
 
-/// A physical device and what this program could do on it.
+/// A physical device and what this program can do on it.
 #[derive(Debug, Clone)]
 pub struct Candidate {
     pub(super) raw: vk::PhysicalDevice,
@@ -55,55 +55,72 @@ pub struct Candidate {
     rank: u8,
 }
 
-impl Instance {
-    /// Loads Vulkan. With `validation`, a missing layer is an error: a silent run must mean that it was watched.
-    pub fn new(validation: bool) -> Result<Arc<Self>> {
-        Self::with_extensions(validation, &[])
-    }
+/// The layers and extensions of this machine.
+struct Installed {
+    layers: Vec<vk::LayerProperties>,
+    extensions: Vec<vk::ExtensionProperties>,
+}
 
-    /// With the extensions that a window's surface needs, if any.
-    pub(super) fn with_extensions(validation: bool, wanted: &[&CStr]) -> Result<Arc<Self>> {
-        // SAFETY: the loader is a well-behaved system library; nothing of it is used after `_entry` is dropped.
-        let entry = unsafe { ash::Entry::load() }.map_err(|e| {
-            Error::Device(format!(
-                "no Vulkan loader: {e}; on Debian install libvulkan1 and mesa-vulkan-drivers"
-            ))
-        })?;
+impl Installed {
+    fn query(entry: &ash::Entry) -> Self {
         // SAFETY: plain queries on a loaded entry.
         let (layers, extensions) = unsafe {
             (
-                entry
-                    .enumerate_instance_layer_properties()
-                    .unwrap_or_default(),
-                entry
-                    .enumerate_instance_extension_properties(None)
-                    .unwrap_or_default(),
+                entry.enumerate_instance_layer_properties(),
+                entry.enumerate_instance_extension_properties(None),
             )
         };
-        let has_layer = layers
-            .iter()
-            .any(|l| l.layer_name_as_c_str() == Ok(VALIDATION_LAYER));
-        if validation && !has_layer {
+        Self {
+            layers: layers.unwrap_or_default(),
+            extensions: extensions.unwrap_or_default(),
+        }
+    }
+
+    fn has_extension(&self, name: &CStr) -> bool {
+        let mut extensions = self.extensions.iter();
+        extensions.any(|e| e.extension_name_as_c_str() == Ok(name))
+    }
+
+    fn check(&self, validation: bool, wanted: &[&CStr]) -> Result<()> {
+        let mut layers = self.layers.iter();
+        if validation && !layers.any(|l| l.layer_name_as_c_str() == Ok(VALIDATION_LAYER)) {
             return Err(Error::Device(
                 "validation was asked for, but VK_LAYER_KHRONOS_validation is not installed \
                  (Debian: vulkan-validationlayers)"
                     .into(),
             ));
         }
-        let debug_utils = validation
-            || extensions
-                .iter()
-                .any(|e| e.extension_name_as_c_str() == Ok(ext::debug_utils::NAME));
-        if let Some(missing) = wanted.iter().find(|name| {
-            !extensions
-                .iter()
-                .any(|e| e.extension_name_as_c_str() == Ok(**name))
-        }) {
-            return Err(Error::Display(format!(
+        match wanted.iter().find(|name| !self.has_extension(name)) {
+            None => Ok(()),
+            Some(missing) => Err(Error::Display(format!(
                 "Vulkan has no surface for this display: {} is missing",
                 missing.to_string_lossy()
-            )));
+            ))),
         }
+    }
+}
+
+impl Instance {
+    /// Loads Vulkan. With `validation`, a missing layer is an error: a silent run must mean that
+    /// the layer checked it.
+    ///
+    /// # Errors
+    /// No Vulkan; no validation layer.
+    pub fn new(validation: bool) -> Result<Arc<Self>> {
+        Self::with_extensions(validation, &[])
+    }
+
+    /// With the extensions that a window's surface needs, if any.
+    pub(super) fn with_extensions(validation: bool, wanted: &[&CStr]) -> Result<Arc<Self>> {
+        // SAFETY: the loader is a well-behaved system library, which `Self` unloads last.
+        let entry = unsafe { ash::Entry::load() }.map_err(|e| {
+            Error::Device(format!(
+                "no Vulkan loader: {e}; on Debian install libvulkan1 and mesa-vulkan-drivers"
+            ))
+        })?;
+        let installed = Installed::query(&entry);
+        installed.check(validation, wanted)?;
+        let debug_utils = validation || installed.has_extension(ext::debug_utils::NAME);
         let mut extension_names: Vec<_> = wanted.iter().map(|name| name.as_ptr()).collect();
         if debug_utils {
             extension_names.push(ext::debug_utils::NAME.as_ptr());
@@ -114,7 +131,8 @@ impl Instance {
             .engine_name(c"mesolux")
             .api_version(vk::API_VERSION_1_3);
         let mut messenger_info = messenger_info();
-        // The layer's own checks of this very call need the messenger in the chain; synchronisation is checked too.
+        // In the chain, the messenger also receives messages about this call. Synchronisation is
+        // checked too.
         let checks = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
         let mut features =
             vk::ValidationFeaturesEXT::default().enabled_validation_features(&checks);
@@ -138,18 +156,26 @@ impl Instance {
             entry,
         };
         if validation {
-            let loader = ext::debug_utils::Instance::new(&instance.entry, &instance.raw);
-            // SAFETY: the extension is enabled, and the callback is a plain function.
-            let messenger =
-                unsafe { loader.create_debug_utils_messenger(&self::messenger_info(), None) }
-                    .map_err(|e| Error::Device(format!("Vulkan debug messenger: {e}")))?;
-            instance.messenger = Some((loader, messenger));
+            instance.listen()?;
         }
         Ok(Arc::new(instance))
     }
 
-    /// Every physical device, best first: fit ones before unfit, discrete GPUs before integrated before software.
-    /// `Candidate::index` is the loader's own order.
+    /// Receives the messages of the validation layer.
+    fn listen(&mut self) -> Result<()> {
+        let loader = ext::debug_utils::Instance::new(&self.entry, &self.raw);
+        // SAFETY: the extension is enabled, and the callback is a plain function.
+        let messenger = unsafe { loader.create_debug_utils_messenger(&messenger_info(), None) }
+            .map_err(|e| Error::Device(format!("Vulkan debug messenger: {e}")))?;
+        self.messenger = Some((loader, messenger));
+        Ok(())
+    }
+
+    /// Every physical device, best first: those that can run this program, then by kind, discrete
+    /// GPUs before integrated ones before software. `Candidate::index` is the loader's own order.
+    ///
+    /// # Errors
+    /// Devices that cannot be listed.
     pub fn candidates(&self) -> Result<Vec<Candidate>> {
         // SAFETY: a plain query.
         let devices = unsafe { self.raw.enumerate_physical_devices() }
@@ -164,9 +190,7 @@ impl Instance {
     }
 
     fn candidate(&self, index: usize, raw: vk::PhysicalDevice) -> Candidate {
-        let mut driver = vk::PhysicalDeviceDriverProperties::default();
-        let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
-        // SAFETY: plain queries on a device of this instance; a driver older than a chained struct leaves it as it is.
+        // SAFETY: plain queries on a device of this instance.
         let (base, memory, queues) = unsafe {
             (
                 self.raw.get_physical_device_properties(raw),
@@ -174,64 +198,12 @@ impl Instance {
                 self.raw.get_physical_device_queue_family_properties(raw),
             )
         };
-        let mut missing = Vec::new();
-        let mut int64_atomics = false;
-        if base.api_version < vk::API_VERSION_1_3 {
-            missing.push("Vulkan 1.3");
-        } else {
-            let mut properties = vk::PhysicalDeviceProperties2::default()
-                .push_next(&mut driver)
-                .push_next(&mut subgroup);
-            let mut f12 = vk::PhysicalDeviceVulkan12Features::default();
-            let mut f13 = vk::PhysicalDeviceVulkan13Features::default();
-            let mut features = vk::PhysicalDeviceFeatures2::default()
-                .push_next(&mut f12)
-                .push_next(&mut f13);
-            // SAFETY: the device is of Vulkan 1.3, so that every struct of the chains is known to it.
-            unsafe {
-                self.raw
-                    .get_physical_device_properties2(raw, &mut properties);
-                self.raw.get_physical_device_features2(raw, &mut features);
-            }
-            let base_features = features.features;
-            let needed_operations = vk::SubgroupFeatureFlags::BASIC
-                | vk::SubgroupFeatureFlags::VOTE
-                | vk::SubgroupFeatureFlags::BALLOT;
-            for (has, name) in [
-                (
-                    base_features.geometry_shader != 0,
-                    "geometryShader (gl_PrimitiveID in fragment shaders)",
-                ),
-                (
-                    base_features.full_draw_index_uint32 != 0,
-                    "fullDrawIndexUint32",
-                ),
-                (f12.scalar_block_layout != 0, "scalarBlockLayout"),
-                (f12.buffer_device_address != 0, "bufferDeviceAddress"),
-                (f13.synchronization2 != 0, "synchronization2"),
-                (
-                    f13.maintenance4 != 0,
-                    "maintenance4 (LocalSizeId in compute shaders)",
-                ),
-                (f13.subgroup_size_control != 0, "subgroupSizeControl"),
-                (f13.compute_full_subgroups != 0, "computeFullSubgroups"),
-                (
-                    subgroup.supported_operations.contains(needed_operations)
-                        && subgroup
-                            .supported_stages
-                            .contains(vk::ShaderStageFlags::COMPUTE),
-                    "subgroup vote and ballot in compute",
-                ),
-                (
-                    graphics_family(&queues).is_some(),
-                    "a queue with graphics and compute",
-                ),
-            ] {
-                if !has {
-                    missing.push(name);
-                }
-            }
-            int64_atomics = base_features.shader_int64 != 0 && f12.shader_buffer_int64_atomics != 0;
+        let mut support = match base.api_version {
+            vk::API_VERSION_1_3.. => self.support(raw),
+            _ => Support::missing("Vulkan 1.3"),
+        };
+        if graphics_family(&queues).is_none() {
+            support.missing.push("a queue with graphics and compute");
         }
         let (kind, rank) = match base.device_type {
             vk::PhysicalDeviceType::DISCRETE_GPU => ("discrete GPU", 0),
@@ -239,12 +211,6 @@ impl Instance {
             vk::PhysicalDeviceType::VIRTUAL_GPU => ("virtual GPU", 2),
             vk::PhysicalDeviceType::CPU => ("software", 4),
             _ => ("other", 3),
-        };
-        let text = |s: std::result::Result<&CStr, _>| {
-            s.map_or_else(
-                |_| String::new(),
-                |s: &CStr| s.to_string_lossy().into_owned(),
-            )
         };
         let v = base.api_version;
         Candidate {
@@ -257,13 +223,9 @@ impl Instance {
                 vk::api_version_minor(v),
                 vk::api_version_patch(v),
             ),
-            driver: format!(
-                "{} {}",
-                text(driver.driver_name_as_c_str()),
-                text(driver.driver_info_as_c_str())
-            ),
-            missing,
-            int64_atomics,
+            driver: support.driver,
+            missing: support.missing,
+            int64_atomics: support.int64_atomics,
             heap_bytes: memory
                 .memory_heaps_as_slice()
                 .iter()
@@ -272,10 +234,99 @@ impl Instance {
                 .unwrap_or(0),
             max_storage_buffer_range: u64::from(base.limits.max_storage_buffer_range),
             max_image_side: base.limits.max_image_dimension2_d,
-            subgroup_size: subgroup.subgroup_size,
+            subgroup_size: support.subgroup_size,
             rank,
         }
     }
+
+    /// What a device of Vulkan 1.3 supports.
+    fn support(&self, raw: vk::PhysicalDevice) -> Support {
+        let mut driver = vk::PhysicalDeviceDriverProperties::default();
+        let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
+        let mut properties = vk::PhysicalDeviceProperties2::default()
+            .push_next(&mut driver)
+            .push_next(&mut subgroup);
+        let mut f12 = vk::PhysicalDeviceVulkan12Features::default();
+        let mut f13 = vk::PhysicalDeviceVulkan13Features::default();
+        let mut features = vk::PhysicalDeviceFeatures2::default()
+            .push_next(&mut f12)
+            .push_next(&mut f13);
+        // SAFETY: Vulkan 1.3 knows every struct of the chains.
+        unsafe {
+            self.raw
+                .get_physical_device_properties2(raw, &mut properties);
+            self.raw.get_physical_device_features2(raw, &mut features);
+        }
+        let base = features.features;
+        let needed = [
+            (
+                base.geometry_shader != 0,
+                "geometryShader (gl_PrimitiveID in fragment shaders)",
+            ),
+            (base.full_draw_index_uint32 != 0, "fullDrawIndexUint32"),
+            (f12.scalar_block_layout != 0, "scalarBlockLayout"),
+            (f12.buffer_device_address != 0, "bufferDeviceAddress"),
+            (f13.synchronization2 != 0, "synchronization2"),
+            (
+                f13.maintenance4 != 0,
+                "maintenance4 (LocalSizeId in compute shaders)",
+            ),
+            (f13.subgroup_size_control != 0, "subgroupSizeControl"),
+            (f13.compute_full_subgroups != 0, "computeFullSubgroups"),
+            (
+                votes_in_compute(&subgroup),
+                "subgroup vote and ballot in compute",
+            ),
+        ];
+        let missing = needed.into_iter().filter(|(has, _)| !has);
+        Support {
+            driver: format!(
+                "{} {}",
+                text(driver.driver_name_as_c_str()),
+                text(driver.driver_info_as_c_str())
+            ),
+            missing: missing.map(|(_, name)| name).collect(),
+            int64_atomics: base.shader_int64 != 0 && f12.shader_buffer_int64_atomics != 0,
+            subgroup_size: subgroup.subgroup_size,
+        }
+    }
+}
+
+/// What a device supports beyond the first version of Vulkan.
+struct Support {
+    driver: String,
+    missing: Vec<&'static str>,
+    int64_atomics: bool,
+    subgroup_size: u32,
+}
+
+impl Support {
+    /// A device so old that nothing else is known of it.
+    fn missing(what: &'static str) -> Self {
+        Self {
+            driver: String::new(),
+            missing: vec![what],
+            int64_atomics: false,
+            subgroup_size: 0,
+        }
+    }
+}
+
+fn votes_in_compute(subgroup: &vk::PhysicalDeviceSubgroupProperties<'_>) -> bool {
+    use vk::SubgroupFeatureFlags as F;
+    let compute = vk::ShaderStageFlags::COMPUTE;
+    subgroup
+        .supported_operations
+        .contains(F::BASIC | F::VOTE | F::BALLOT)
+        && subgroup.supported_stages.contains(compute)
+}
+
+/// A string of Vulkan; empty where it is malformed.
+fn text(text: std::result::Result<&CStr, FromBytesUntilNulError>) -> String {
+    text.map_or_else(
+        |_| String::new(),
+        |text| text.to_string_lossy().into_owned(),
+    )
 }
 
 pub(super) fn graphics_family(queues: &[vk::QueueFamilyProperties]) -> Option<u32> {
@@ -318,7 +369,8 @@ unsafe extern "system" fn on_message(
 
 impl Drop for Instance {
     fn drop(&mut self) {
-        // SAFETY: everything made from the instance holds it by `Arc`, so nothing is left.
+        // SAFETY: everything made from the instance holds it by `Arc`, so nothing is left. The
+        // library is unloaded with the fields, after this.
         unsafe {
             if let Some((loader, messenger)) = &self.messenger {
                 loader.destroy_debug_utils_messenger(*messenger, None);

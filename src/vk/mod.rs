@@ -1,7 +1,11 @@
-//! A thin, safe layer over Vulkan: it knows nothing of radiosity. All `unsafe` of the crate stands here.
+//! A thin, safe layer over Vulkan, without knowledge of radiosity. Only this module contains
+//! `unsafe` code.
 //!
-//! Owners free what they own when dropped and hold the device alive. Barriers are written where stages meet, through
-//! [`Stage`].
+//! Every object is a handle to an owner, which frees its Vulkan objects in `Drop` and keeps the
+//! device alive. A descriptor set holds the owners of what it binds, a command buffer those of what
+//! it records: objects may be dropped in any order and at any time, and are freed once no
+//! submission can use them. Barriers are written where stages meet, through [`Stage`].
+#![allow(unsafe_code)]
 
 mod barrier;
 mod buffer;
@@ -10,26 +14,31 @@ mod compute;
 mod descriptors;
 mod device;
 mod graphics;
+mod held;
 mod image;
 mod instance;
+mod pipeline;
+mod render_pass;
+mod sampler;
 #[cfg(feature = "window")]
 mod surface;
 #[cfg(feature = "window")]
 mod swapchain;
 mod timestamps;
 
+use std::sync::{Mutex, MutexGuard};
+
 pub use barrier::Stage;
 pub use buffer::{Buffer, BufferUse};
 pub use commands::Commands;
 pub use compute::ComputePipeline;
 pub use descriptors::{Bind, Binding, DescriptorLayout, DescriptorSet};
-pub use device::{Device, Limits, left};
-pub use graphics::{
-    AfterPass, Attachment, Framebuffer, GraphicsPipeline, GraphicsState, RenderPass,
-    VertexAttribute,
-};
-pub use image::{Image, ImageUse, Sampler};
+pub use device::{Device, Left, Limits, left};
+pub use graphics::{GraphicsPipeline, GraphicsState, VertexAttribute};
+pub use image::{Image, ImageUse};
 pub use instance::{Candidate, Instance, validation_log, validation_messages};
+pub use render_pass::{AfterPass, Attachment, Framebuffer, RenderPass};
+pub use sampler::Sampler;
 #[cfg(feature = "window")]
 pub use surface::Surface;
 #[cfg(feature = "window")]
@@ -37,3 +46,8 @@ pub use swapchain::{Shown, Swapchain};
 pub use timestamps::Timestamps;
 
 pub use ash::vk::Format;
+
+/// Locks a mutex whose content is valid even after a panic of another thread.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(|e| e.into_inner())
+}

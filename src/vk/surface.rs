@@ -1,4 +1,4 @@
-//! What a window offers to draw on.
+//! Surfaces of windows.
 
 use std::any::Any;
 use std::ffi::CStr;
@@ -11,12 +11,12 @@ use super::Instance;
 use super::instance::{Candidate, graphics_family};
 use crate::error::{Error, Result};
 
-/// The surface of a window, which it keeps open.
+/// The surface of a window, which keeps the window open.
 pub struct Surface {
     pub(super) raw: vk::SurfaceKHR,
     pub(super) loader: khr::surface::Instance,
     instance: Arc<Instance>,
-    // Last: the window outlives its surface.
+    /// The window, until the surface is destroyed.
     _window: Arc<dyn Any + Send + Sync>,
 }
 
@@ -90,7 +90,7 @@ impl Surface {
 
 impl Drop for Surface {
     fn drop(&mut self) {
-        // SAFETY: a swapchain holds its surface, so that none is left.
+        // SAFETY: a swapchain holds its surface, so none is left.
         unsafe { self.loader.destroy_surface(self.raw, None) };
     }
 }

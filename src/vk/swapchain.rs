@@ -1,4 +1,4 @@
-//! The images of a window, one of which is shown at a time.
+//! Swapchains: the images of a window, one of which is shown at a time.
 
 use std::sync::Arc;
 
@@ -11,29 +11,30 @@ use crate::error::{Error, Result};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shown {
     Yes,
-    /// The window has another size by now, or none of its images was free in time: make the swapchain anew.
+    /// The window has another size, or none of its images was free in time: make a new swapchain.
     Stale,
-    /// The surface is gone: make both anew.
+    /// The surface is lost: make a new surface and a new swapchain.
     Lost,
 }
 
-/// Images of a window, each of which takes a copy of what was drawn.
+/// The images of a window, into which frames are copied.
 pub struct Swapchain {
     raw: vk::SwapchainKHR,
     loader: khr::swapchain::Device,
     images: Vec<vk::Image>,
-    /// An image may be written; one frame is under way at a time.
+    /// Signalled when an image may be written; one frame is under way at a time.
     free: vk::Semaphore,
-    /// `[image]`: it has been written.
+    /// `[image]`, signalled when it has been written.
     written: Vec<vk::Semaphore>,
     size: (u32, u32),
     format: vk::Format,
     device: Arc<Device>,
-    // Last: the surface outlives its swapchain.
+    /// The surface, until the swapchain is destroyed.
     _surface: Arc<Surface>,
 }
 
-/// Formats of a byte a channel that hold sRGB codes, each with what is drawn for it: a copy keeps the codes.
+/// Formats of one byte a channel that hold sRGB codes, each with the format that frames are drawn
+/// in: a copy keeps the codes.
 const FORMATS: [(vk::Format, vk::Format); 4] = [
     (vk::Format::B8G8R8A8_UNORM, vk::Format::B8G8R8A8_UNORM),
     (vk::Format::R8G8B8A8_UNORM, vk::Format::R8G8B8A8_UNORM),
@@ -41,57 +42,34 @@ const FORMATS: [(vk::Format, vk::Format); 4] = [
     (vk::Format::R8G8B8A8_SRGB, vk::Format::R8G8B8A8_UNORM),
 ];
 
-/// Nanoseconds until a frame is given up because the window frees no image: then the window still hears its events.
+/// A format of a window's images, and the format that frames are drawn in.
+struct WindowFormat {
+    shown: vk::SurfaceFormatKHR,
+    drawn: vk::Format,
+}
+
+/// Nanoseconds until a frame is given up because the window frees no image. The window handles its
+/// events between attempts.
 const PATIENCE: u64 = 100_000_000;
 
 impl Swapchain {
-    /// For a window of so many pixels; none while it has no area. `before` is what the window had until now, of which nothing may
-    /// be under way.
+    /// For a window of `width` × `height` pixels; none while it has no area. `before` is the
+    /// window's last swapchain, whose frames are done.
     ///
     /// # Errors
-    /// A surface that is lost or takes no 8-bit sRGB.
+    /// A surface that is lost or does not support 8-bit sRGB.
     pub fn new(
         device: &Arc<Device>,
         surface: &Arc<Surface>,
         (width, height): (u32, u32),
         before: Option<Self>,
     ) -> Result<Option<Self>> {
-        let physical = device.candidate().raw;
-        // SAFETY: plain queries on a live surface of the device's instance.
-        let (capabilities, formats) = unsafe {
-            (
-                surface
-                    .loader
-                    .get_physical_device_surface_capabilities(physical, surface.raw)
-                    .map_err(device.error("asking for the window's size"))?,
-                surface
-                    .loader
-                    .get_physical_device_surface_formats(physical, surface.raw)
-                    .map_err(device.error("asking for the window's formats"))?,
-            )
-        };
-        let (least, most) = (capabilities.min_image_extent, capabilities.max_image_extent);
-        // All ones: the window takes the size of what is shown.
-        let extent = match capabilities.current_extent.width {
-            u32::MAX => vk::Extent2D {
-                width: width.clamp(least.width, most.width.max(least.width)),
-                height: height.clamp(least.height, most.height.max(least.height)),
-            },
-            _ => capabilities.current_extent,
-        };
+        let capabilities = surface.capabilities(device)?;
+        let extent = extent(&capabilities, (width, height));
         if extent.width == 0 || extent.height == 0 {
             return Ok(None);
         }
-        let found = FORMATS.iter().find_map(|&(shown, drawn)| {
-            let of = formats.iter().find(|f| f.format == shown)?;
-            Some((*of, drawn))
-        });
-        let Some((shown, format)) = found else {
-            return Err(Error::Display(format!(
-                "the window takes no 8-bit sRGB on {}",
-                device.name()
-            )));
-        };
+        let format = surface.format(device)?;
         let wanted = capabilities.min_image_count + 1;
         let count = match capabilities.max_image_count {
             0 => wanted,
@@ -101,8 +79,8 @@ impl Swapchain {
         let info = vk::SwapchainCreateInfoKHR::default()
             .surface(surface.raw)
             .min_image_count(count)
-            .image_format(shown.format)
-            .image_color_space(shown.color_space)
+            .image_format(format.shown.format)
+            .image_color_space(format.shown.color_space)
             .image_extent(extent)
             .image_array_layers(1)
             .image_usage(vk::ImageUsageFlags::TRANSFER_DST)
@@ -116,7 +94,7 @@ impl Swapchain {
             .clipped(true)
             .old_swapchain(before.as_ref().map_or(vk::SwapchainKHR::null(), |b| b.raw));
         let loader = khr::swapchain::Device::new(&device.instance.raw, &device.raw);
-        // SAFETY: surface and old swapchain are alive, and nothing of the old one is under way.
+        // SAFETY: surface and old swapchain are alive, and the frames of the old one are done.
         let raw = unsafe { loader.create_swapchain(&info, None) }
             .map_err(device.error("creating a swapchain"))?;
         drop(before);
@@ -127,35 +105,41 @@ impl Swapchain {
             free: vk::Semaphore::null(),
             written: Vec::new(),
             size: (extent.width, extent.height),
-            format,
+            format: format.drawn,
             device: Arc::clone(device),
             _surface: Arc::clone(surface),
         };
         device.set_name(raw, "window");
+        swapchain.find_images()?;
+        Ok(Some(swapchain))
+    }
+
+    /// Lists the images, and makes the semaphores for them.
+    fn find_images(&mut self) -> Result<()> {
+        let device = &self.device;
         // SAFETY: a plain query on the swapchain.
-        swapchain.images = unsafe { swapchain.loader.get_swapchain_images(raw) }
+        self.images = unsafe { self.loader.get_swapchain_images(self.raw) }
             .map_err(device.error("asking for the window's images"))?;
-        swapchain.free = semaphore(device, "window image free")?;
-        for &image in &swapchain.images {
+        self.free = semaphore(device, "window image free")?;
+        for &image in &self.images {
             device.set_name(image, "window image");
-            swapchain
-                .written
+            self.written
                 .push(semaphore(device, "window image written")?);
         }
-        Ok(Some(swapchain))
+        Ok(())
     }
 
     pub fn size(&self) -> (u32, u32) {
         self.size
     }
 
-    /// What is to be drawn in.
+    /// The format that frames are drawn in.
     pub fn format(&self) -> vk::Format {
         self.format
     }
 
-    /// Records what `record` says, which leaves `image` to be copied from, submits it, shows the image and waits until the
-    /// device is done with it.
+    /// Submits what `record` records, which leaves `image` to be copied from, shows the image and
+    /// waits until the device is done with it.
     ///
     /// # Errors
     /// A device that fails.
@@ -188,8 +172,9 @@ impl Swapchain {
             .swapchains(&swapchains)
             .image_indices(&indices);
         let presented = {
-            let queue = device.queue.lock().unwrap_or_else(|e| e.into_inner());
-            // SAFETY: the image was acquired and is written before the semaphore is signalled; the queue is locked.
+            let queue = device.queue();
+            // SAFETY: the image was acquired and is written before the semaphore is signalled; the
+            // queue is locked.
             unsafe { self.loader.queue_present(*queue, &info) }
         };
         commands.wait()?;
@@ -214,11 +199,13 @@ impl Swapchain {
                 depth: 1,
             })];
         self.transition(cmd, to, L::UNDEFINED, L::TRANSFER_DST_OPTIMAL);
-        // SAFETY: the render pass left the image to be copied from; both have this size and formats of four bytes.
+        cmd.hold(&image.owner);
+        // SAFETY: the render pass left the image to be copied from; both have this size and
+        // formats of four bytes.
         unsafe {
             self.device.raw.cmd_copy_image(
                 cmd.raw,
-                image.raw,
+                image.owner.raw,
                 L::TRANSFER_SRC_OPTIMAL,
                 to,
                 L::TRANSFER_DST_OPTIMAL,
@@ -256,7 +243,50 @@ impl Swapchain {
     }
 }
 
-/// What an answer other than success says of a frame.
+impl Surface {
+    fn capabilities(&self, device: &Device) -> Result<vk::SurfaceCapabilitiesKHR> {
+        let physical = device.candidate().raw;
+        // SAFETY: a plain query on a live surface of the device's instance.
+        unsafe {
+            self.loader
+                .get_physical_device_surface_capabilities(physical, self.raw)
+        }
+        .map_err(device.error("asking for the window's size"))
+    }
+
+    /// The first of [`FORMATS`] that the surface supports.
+    fn format(&self, device: &Device) -> Result<WindowFormat> {
+        let physical = device.candidate().raw;
+        // SAFETY: a plain query on a live surface of the device's instance.
+        let formats = unsafe {
+            self.loader
+                .get_physical_device_surface_formats(physical, self.raw)
+        }
+        .map_err(device.error("asking for the window's formats"))?;
+        let found = FORMATS.iter().find_map(|&(shown, drawn)| {
+            let shown = *formats.iter().find(|f| f.format == shown)?;
+            Some(WindowFormat { shown, drawn })
+        });
+        found.ok_or_else(|| {
+            let name = device.name();
+            Error::Display(format!("the window takes no 8-bit sRGB on {name}"))
+        })
+    }
+}
+
+/// The size of a swapchain's images; a wish where the window adopts the size of what is shown.
+fn extent(capabilities: &vk::SurfaceCapabilitiesKHR, (width, height): (u32, u32)) -> vk::Extent2D {
+    let (least, most) = (capabilities.min_image_extent, capabilities.max_image_extent);
+    match capabilities.current_extent.width {
+        u32::MAX => vk::Extent2D {
+            width: width.clamp(least.width, most.width.max(least.width)),
+            height: height.clamp(least.height, most.height.max(least.height)),
+        },
+        _ => capabilities.current_extent,
+    }
+}
+
+/// What became of a frame, by an answer other than success.
 fn shown(device: &Device, answer: vk::Result) -> Result<Shown> {
     match answer {
         vk::Result::ERROR_OUT_OF_DATE_KHR | vk::Result::TIMEOUT | vk::Result::NOT_READY => {
@@ -281,9 +311,9 @@ fn semaphore(device: &Device, name: &str) -> Result<vk::Semaphore> {
 
 impl Drop for Swapchain {
     fn drop(&mut self) {
-        // What presents waits for semaphores after the frame's fence is signalled.
+        // Presentation still waits for semaphores when the frame's fence is signalled.
         let _ = self.device.wait_idle();
-        // SAFETY: nothing of the swapchain is under way; null handles are allowed.
+        // SAFETY: the device uses nothing of the swapchain; null handles are allowed.
         unsafe {
             self.device.raw.destroy_semaphore(self.free, None);
             for &semaphore in &self.written {

@@ -7,14 +7,23 @@ use ash::vk;
 use super::Device;
 use crate::error::Result;
 
-/// A pool of timestamps.
+/// A pool of timestamps. A clone is another handle to the same pool.
+///
+/// Commands that record it keep it alive.
+#[derive(Clone)]
 pub struct Timestamps {
+    pub(super) owner: Arc<TimestampsOwner>,
+}
+
+pub(super) struct TimestampsOwner {
     pub(super) raw: vk::QueryPool,
     pub(super) count: u32,
     device: Arc<Device>,
 }
 
 impl Timestamps {
+    /// # Errors
+    /// A device that fails.
     pub fn new(device: &Arc<Device>, name: &str, count: u32) -> Result<Self> {
         let info = vk::QueryPoolCreateInfo::default()
             .query_type(vk::QueryType::TIMESTAMP)
@@ -24,26 +33,33 @@ impl Timestamps {
             .map_err(device.error("creating a query pool"))?;
         device.set_name(raw, name);
         Ok(Self {
-            raw,
-            count,
-            device: Arc::clone(device),
+            owner: Arc::new(TimestampsOwner {
+                raw,
+                count,
+                device: Arc::clone(device),
+            }),
         })
     }
 
-    /// Seconds between each timestamp and the next, `count - 1` of them; the submission must be done.
+    /// Seconds between each timestamp and the next, `count - 1` of them; the submission must be
+    /// done.
+    ///
+    /// # Errors
+    /// A device that fails.
     pub fn intervals(&self) -> Result<Vec<f64>> {
-        let mut ticks = vec![0u64; self.count as usize];
+        let TimestampsOwner { raw, count, device } = &*self.owner;
+        let mut ticks = vec![0u64; *count as usize];
         // SAFETY: the pool holds as many results as the slice.
         unsafe {
-            self.device.raw.get_query_pool_results(
-                self.raw,
+            device.raw.get_query_pool_results(
+                *raw,
                 0,
                 &mut ticks,
                 vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT,
             )
         }
-        .map_err(self.device.error("reading timestamps"))?;
-        let period = self.device.limits().timestamp_period * 1e-9;
+        .map_err(device.error("reading timestamps"))?;
+        let period = device.limits().timestamp_period * 1e-9;
         Ok(ticks
             .windows(2)
             .map(|t| t[1].saturating_sub(t[0]) as f64 * period)
@@ -51,9 +67,9 @@ impl Timestamps {
     }
 }
 
-impl Drop for Timestamps {
+impl Drop for TimestampsOwner {
     fn drop(&mut self) {
-        // SAFETY: whoever recorded the pool waits for the submission before dropping it.
+        // SAFETY: commands that record the pool hold its owner, so none is left.
         unsafe { self.device.raw.destroy_query_pool(self.raw, None) };
     }
 }

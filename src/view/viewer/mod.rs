@@ -30,7 +30,6 @@ use crate::solver::{ItemPicture, Settings, Update};
 use layout::KeptTexture;
 
 pub struct Viewer {
-    // The threads first: they stop before what they show is gone.
     baker: Baker,
     detailer: Detailer,
     surfaces: SurfacePass,

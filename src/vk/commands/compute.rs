@@ -1,0 +1,76 @@
+//! Dispatches of compute shaders.
+
+use ash::vk;
+use bytemuck::Pod;
+
+use super::Commands;
+use crate::vk::{Buffer, ComputePipeline, DescriptorSet};
+
+impl Commands {
+    /// Dispatches `groups` workgroups; nothing is recorded where there are none.
+    pub fn dispatch<T: Pod>(
+        &self,
+        pipeline: &ComputePipeline,
+        set: &DescriptorSet,
+        push: &T,
+        groups: [u32; 3],
+    ) {
+        if groups.contains(&0) {
+            return;
+        }
+        self.bind_compute(pipeline, set, push);
+        // SAFETY: a pipeline with its set and constants is bound.
+        unsafe {
+            self.device
+                .raw
+                .cmd_dispatch(self.raw, groups[0], groups[1], groups[2]);
+        }
+    }
+
+    /// Dispatches as many workgroups as the device has written at byte `offset` of `counts`.
+    pub fn dispatch_indirect<T: Pod>(
+        &self,
+        pipeline: &ComputePipeline,
+        set: &DescriptorSet,
+        push: &T,
+        (counts, offset): (&Buffer, u64),
+    ) {
+        self.bind_compute(pipeline, set, push);
+        self.hold(&counts.owner);
+        // SAFETY: as above; the command lies within the buffer and was written by a pass.
+        unsafe {
+            self.device
+                .raw
+                .cmd_dispatch_indirect(self.raw, counts.owner.raw, offset);
+        }
+    }
+
+    fn bind_compute<T: Pod>(&self, pipeline: &ComputePipeline, set: &DescriptorSet, push: &T) {
+        let pipeline = &pipeline.owner;
+        let bytes = pipeline.push_constants(push);
+        self.hold(pipeline);
+        self.hold(&set.owner);
+        let raw = &self.device.raw;
+        // SAFETY: pipeline, set and constants match by construction of the pass.
+        unsafe {
+            raw.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::COMPUTE, pipeline.raw);
+            raw.cmd_bind_descriptor_sets(
+                self.raw,
+                vk::PipelineBindPoint::COMPUTE,
+                pipeline.layout,
+                0,
+                &[set.owner.raw],
+                &[],
+            );
+            if !bytes.is_empty() {
+                raw.cmd_push_constants(
+                    self.raw,
+                    pipeline.layout,
+                    vk::ShaderStageFlags::COMPUTE,
+                    0,
+                    bytes,
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! Render passes and draws.
+
+use ash::vk;
+use bytemuck::Pod;
+
+use super::Commands;
+use crate::vk::graphics::GRAPHICS_STAGES;
+use crate::vk::{Buffer, DescriptorSet, Framebuffer, GraphicsPipeline, RenderPass};
+
+impl Commands {
+    /// Begins a render pass over the whole framebuffer: colour cleared to `clear` (one word a
+    /// channel), depth to 0.
+    pub fn begin_render_pass(&self, pass: &RenderPass, target: &Framebuffer, clear: [u32; 4]) {
+        self.hold(&pass.owner);
+        self.hold(&target.owner);
+        let clears = [
+            vk::ClearValue {
+                color: vk::ClearColorValue { uint32: clear },
+            },
+            vk::ClearValue {
+                depth_stencil: vk::ClearDepthStencilValue {
+                    depth: 0.0,
+                    stencil: 0,
+                },
+            },
+        ];
+        let info = vk::RenderPassBeginInfo::default()
+            .render_pass(pass.owner.raw)
+            .framebuffer(target.owner.raw)
+            .render_area(rectangle(0, 0, target.owner.width, target.owner.height))
+            .clear_values(&clears);
+        // SAFETY: the framebuffer was made for a render pass with these attachments.
+        unsafe {
+            self.device
+                .raw
+                .cmd_begin_render_pass(self.raw, &info, vk::SubpassContents::INLINE);
+        }
+    }
+
+    pub fn end_render_pass(&self) {
+        // SAFETY: closes `begin_render_pass`.
+        unsafe { self.device.raw.cmd_end_render_pass(self.raw) };
+    }
+
+    pub fn bind_graphics(
+        &self,
+        pipeline: &GraphicsPipeline,
+        set: &DescriptorSet,
+        vertices: &Buffer,
+    ) {
+        let pipeline = &pipeline.owner;
+        self.hold(pipeline);
+        self.hold(&set.owner);
+        self.hold(&vertices.owner);
+        let raw = &self.device.raw;
+        // SAFETY: pipeline, set and vertices match by construction of the pass.
+        unsafe {
+            raw.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::GRAPHICS, pipeline.raw);
+            raw.cmd_bind_descriptor_sets(
+                self.raw,
+                vk::PipelineBindPoint::GRAPHICS,
+                pipeline.layout,
+                0,
+                &[set.owner.raw],
+                &[],
+            );
+            raw.cmd_bind_vertex_buffers(self.raw, 0, &[vertices.owner.raw], &[0]);
+        }
+    }
+
+    pub fn bind_indices(&self, indices: &Buffer) {
+        self.hold(&indices.owner);
+        // SAFETY: the buffer feeds indices, of 32 bits each.
+        unsafe {
+            self.device.raw.cmd_bind_index_buffer(
+                self.raw,
+                indices.owner.raw,
+                0,
+                vk::IndexType::UINT32,
+            );
+        }
+    }
+
+    /// Sets the viewport to a rectangle of the framebuffer, to which draws are clipped.
+    pub fn viewport(&self, x: u32, y: u32, width: u32, height: u32) {
+        let viewports = [vk::Viewport {
+            x: x as f32,
+            y: y as f32,
+            width: width as f32,
+            height: height as f32,
+            min_depth: 0.0,
+            max_depth: 1.0,
+        }];
+        // SAFETY: the viewport is dynamic in every pipeline of this crate.
+        unsafe { self.device.raw.cmd_set_viewport(self.raw, 0, &viewports) };
+        self.scissor(x, y, width, height);
+    }
+
+    /// Clips the draws that follow to a rectangle of the framebuffer.
+    pub fn scissor(&self, x: u32, y: u32, width: u32, height: u32) {
+        let scissors = [rectangle(x, y, width, height)];
+        // SAFETY: the scissor is dynamic in every pipeline of this crate.
+        unsafe { self.device.raw.cmd_set_scissor(self.raw, 0, &scissors) };
+    }
+
+    pub fn push_graphics<T: Pod>(&self, pipeline: &GraphicsPipeline, push: &T) {
+        let pipeline = &pipeline.owner;
+        let bytes = pipeline.push_constants(push);
+        // SAFETY: the constants fit the pipeline's range; only its layout is used, while recording.
+        unsafe {
+            self.device.raw.cmd_push_constants(
+                self.raw,
+                pipeline.layout,
+                GRAPHICS_STAGES,
+                0,
+                bytes,
+            );
+        }
+    }
+
+    /// Draws one `VkDrawIndexedIndirectCommand` read at byte `offset`.
+    pub fn draw_indexed_indirect(&self, draws: &Buffer, offset: u64) {
+        self.hold(&draws.owner);
+        // SAFETY: the command lies within the buffer and was written by a pass.
+        unsafe {
+            self.device
+                .raw
+                .cmd_draw_indexed_indirect(self.raw, draws.owner.raw, offset, 1, 20);
+        }
+    }
+
+    pub fn draw_indexed(&self, first_index: u32, index_count: u32) {
+        // SAFETY: the range lies within the bound indices.
+        unsafe {
+            self.device
+                .raw
+                .cmd_draw_indexed(self.raw, index_count, 1, first_index, 0, 0);
+        }
+    }
+}
+
+fn rectangle(x: u32, y: u32, width: u32, height: u32) -> vk::Rect2D {
+    vk::Rect2D {
+        offset: vk::Offset2D {
+            x: x as i32,
+            y: y as i32,
+        },
+        extent: vk::Extent2D { width, height },
+    }
+}

@@ -1,0 +1,227 @@
+//! Recording and submitting.
+
+mod compute;
+mod copy;
+mod draw;
+
+use std::cell::RefCell;
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::held::Held;
+use super::{Device, Stage, Timestamps};
+use crate::error::Result;
+
+/// A command buffer, recorded once and submitted any number of times, with the fence of its last
+/// submission.
+///
+/// It keeps alive what it records. Dropping it waits for the last submission.
+pub struct Commands {
+    pub(super) raw: vk::CommandBuffer,
+    pool: vk::CommandPool,
+    fence: vk::Fence,
+    under_way: bool,
+    held: RefCell<Held>,
+    device: Arc<Device>,
+}
+
+impl Commands {
+    /// Calls `record`, which records the commands.
+    ///
+    /// # Errors
+    /// An error of `record`; a device that fails.
+    pub fn record(
+        device: &Arc<Device>,
+        name: &str,
+        record: impl FnOnce(&Self) -> Result<()>,
+    ) -> Result<Self> {
+        let info = vk::CommandPoolCreateInfo::default().queue_family_index(device.family);
+        // SAFETY: the family is the device's own.
+        let pool = unsafe { device.raw.create_command_pool(&info, None) }
+            .map_err(device.error("creating a command pool"))?;
+        let mut commands = Self {
+            raw: vk::CommandBuffer::null(),
+            pool,
+            fence: vk::Fence::null(),
+            under_way: false,
+            held: RefCell::default(),
+            device: Arc::clone(device),
+        };
+        let info = vk::CommandBufferAllocateInfo::default()
+            .command_pool(pool)
+            .level(vk::CommandBufferLevel::PRIMARY)
+            .command_buffer_count(1);
+        // SAFETY: the pool is this object's own.
+        commands.raw = unsafe { device.raw.allocate_command_buffers(&info) }
+            .map_err(device.error("allocating a command buffer"))?[0];
+        // SAFETY: a plain creation on a live device.
+        commands.fence = unsafe {
+            device
+                .raw
+                .create_fence(&vk::FenceCreateInfo::default(), None)
+        }
+        .map_err(device.error("creating a fence"))?;
+        device.set_name(commands.raw, name);
+        device.set_name(commands.fence, name);
+        // SAFETY: the buffer is new, and recorded only here.
+        unsafe {
+            device
+                .raw
+                .begin_command_buffer(commands.raw, &vk::CommandBufferBeginInfo::default())
+        }
+        .map_err(device.error("recording"))?;
+        record(&commands)?;
+        // SAFETY: recording was begun above.
+        unsafe { device.raw.end_command_buffer(commands.raw) }
+            .map_err(device.error("recording"))?;
+        Ok(commands)
+    }
+
+    /// Records, submits and waits.
+    ///
+    /// # Errors
+    /// As [`Self::record`].
+    pub fn run(
+        device: &Arc<Device>,
+        name: &str,
+        record: impl FnOnce(&Self) -> Result<()>,
+    ) -> Result<()> {
+        let mut commands = Self::record(device, name, record)?;
+        commands.submit()?;
+        commands.wait()
+    }
+
+    /// Submits; the last submission must have been waited for.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn submit(&mut self) -> Result<()> {
+        self.submit_between(&[], &[])
+    }
+
+    /// Submits between semaphores: copies wait for those of `after`, and those of `before` are
+    /// signalled when everything is done.
+    pub(super) fn submit_between(
+        &mut self,
+        after: &[vk::Semaphore],
+        before: &[vk::Semaphore],
+    ) -> Result<()> {
+        assert!(!self.under_way, "commands are submitted once at a time");
+        let infos = [vk::CommandBufferSubmitInfo::default().command_buffer(self.raw)];
+        let at = |stage| {
+            move |&semaphore: &vk::Semaphore| {
+                vk::SemaphoreSubmitInfo::default()
+                    .semaphore(semaphore)
+                    .stage_mask(stage)
+            }
+        };
+        let copies = at(vk::PipelineStageFlags2::ALL_TRANSFER);
+        let waits: Vec<_> = after.iter().map(copies).collect();
+        let all = at(vk::PipelineStageFlags2::ALL_COMMANDS);
+        let signals: Vec<_> = before.iter().map(all).collect();
+        let submits = [vk::SubmitInfo2::default()
+            .command_buffer_infos(&infos)
+            .wait_semaphore_infos(&waits)
+            .signal_semaphore_infos(&signals)];
+        let queue = self.device.queue();
+        // SAFETY: the fence is unsignalled and free, the queue is locked, and the recording has
+        // ended.
+        unsafe { self.device.raw.queue_submit2(*queue, &submits, self.fence) }
+            .map_err(self.device.error("submitting"))?;
+        self.under_way = true;
+        Ok(())
+    }
+
+    /// Waits until the device has done the last submission, if there is one.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn wait(&mut self) -> Result<()> {
+        self.wait_for_fence()
+            .map_err(self.device.error("waiting for a submission"))
+    }
+
+    fn wait_for_fence(&mut self) -> ash::prelude::VkResult<()> {
+        if !self.under_way {
+            return Ok(());
+        }
+        let raw = &self.device.raw;
+        // SAFETY: only this object waits for the fence or resets it.
+        unsafe {
+            raw.wait_for_fences(&[self.fence], true, u64::MAX)?;
+            self.under_way = false;
+            raw.reset_fences(&[self.fence])
+        }
+    }
+
+    /// Keeps an owner alive until these commands are dropped.
+    pub(super) fn hold<T: Send + Sync + 'static>(&self, owner: &Arc<T>) {
+        self.held.borrow_mut().hold(owner);
+    }
+
+    /// Everything of the kinds `before` is done and visible before anything of the kinds `after`
+    /// starts.
+    pub fn barrier(&self, before: &[Stage], after: &[Stage]) {
+        let join = |stages: &[Stage]| {
+            stages.iter().fold(
+                (vk::PipelineStageFlags2::empty(), vk::AccessFlags2::empty()),
+                |(s, a), stage| (s | stage.masks().0, a | stage.masks().1),
+            )
+        };
+        let (src_stage, src_access) = join(before);
+        let (dst_stage, dst_access) = join(after);
+        let barriers = [vk::MemoryBarrier2::default()
+            .src_stage_mask(src_stage)
+            .src_access_mask(src_access)
+            .dst_stage_mask(dst_stage)
+            .dst_access_mask(dst_access)];
+        let info = vk::DependencyInfo::default().memory_barriers(&barriers);
+        // SAFETY: a plain barrier, which the passes record outside render passes.
+        unsafe { self.device.raw.cmd_pipeline_barrier2(self.raw, &info) };
+    }
+
+    /// Writes timestamp `index` when everything before it is done.
+    pub fn timestamp(&self, timestamps: &Timestamps, index: u32) {
+        assert!(index < timestamps.owner.count, "a timestamp of the pool");
+        self.hold(&timestamps.owner);
+        // SAFETY: the index lies within the pool, which `reset_timestamps` has reset.
+        unsafe {
+            self.device.raw.cmd_write_timestamp2(
+                self.raw,
+                vk::PipelineStageFlags2::ALL_COMMANDS,
+                timestamps.owner.raw,
+                index,
+            );
+        }
+    }
+
+    pub fn reset_timestamps(&self, timestamps: &Timestamps) {
+        let pool = &timestamps.owner;
+        self.hold(pool);
+        // SAFETY: the range is the whole pool.
+        unsafe {
+            self.device
+                .raw
+                .cmd_reset_query_pool(self.raw, pool.raw, 0, pool.count);
+        }
+    }
+}
+
+impl Drop for Commands {
+    fn drop(&mut self) {
+        // The fence and not the device: waiting for the device would lock the queue, and so block
+        // every other thread that submits.
+        let waited = self.wait_for_fence();
+        if self.under_way && waited != Err(vk::Result::ERROR_DEVICE_LOST) {
+            // The device may still execute these commands: what they use is leaked, not freed.
+            std::mem::forget((self.held.take(), Arc::clone(&self.device)));
+            return;
+        }
+        // SAFETY: the device executes none of these commands, or is lost.
+        unsafe {
+            self.device.raw.destroy_fence(self.fence, None);
+            self.device.raw.destroy_command_pool(self.pool, None);
+        }
+    }
+}

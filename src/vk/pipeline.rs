@@ -1,0 +1,96 @@
+//! What compute and graphics pipelines share.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::{Binding, DescriptorLayout, Device};
+use crate::error::Result;
+
+/// A pipeline with its layouts.
+pub(super) struct PipelineOwner {
+    /// Null until the pipeline itself is created.
+    pub(super) raw: vk::Pipeline,
+    pub(super) layout: vk::PipelineLayout,
+    pub(super) push_bytes: u32,
+    pub(super) descriptors: DescriptorLayout,
+    device: Arc<Device>,
+}
+
+impl PipelineOwner {
+    /// The layouts of a pipeline with one descriptor set, whose push constants are visible to
+    /// `stages`.
+    pub(super) fn with_layouts(
+        device: &Arc<Device>,
+        name: &str,
+        bindings: &[Binding],
+        push_bytes: usize,
+        stages: vk::ShaderStageFlags,
+    ) -> Result<Self> {
+        let descriptors = DescriptorLayout::new(device, name, bindings)?;
+        let sets = [descriptors.raw];
+        let ranges = [vk::PushConstantRange::default()
+            .stage_flags(stages)
+            .size(push_bytes as u32)];
+        let mut info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets);
+        if push_bytes > 0 {
+            info = info.push_constant_ranges(&ranges);
+        }
+        // SAFETY: `info` outlives the call.
+        let layout = unsafe { device.raw.create_pipeline_layout(&info, None) }
+            .map_err(device.error("creating a pipeline layout"))?;
+        device.set_name(layout, name);
+        Ok(Self {
+            raw: vk::Pipeline::null(),
+            layout,
+            push_bytes: push_bytes as u32,
+            descriptors,
+            device: Arc::clone(device),
+        })
+    }
+
+    /// The push constants as bytes, of exactly the pipeline's size.
+    pub(super) fn push_constants<'a, T: bytemuck::Pod>(&self, push: &'a T) -> &'a [u8] {
+        let bytes = bytemuck::bytes_of(push);
+        assert_eq!(
+            bytes.len(),
+            self.push_bytes as usize,
+            "push constants of the pipeline's size"
+        );
+        bytes
+    }
+}
+
+impl Drop for PipelineOwner {
+    fn drop(&mut self) {
+        // SAFETY: commands that record the pipeline hold its owner, so none is left; a null
+        // pipeline is allowed.
+        unsafe {
+            self.device.raw.destroy_pipeline(self.raw, None);
+            self.device.raw.destroy_pipeline_layout(self.layout, None);
+        }
+    }
+}
+
+/// A shader module, needed only until its pipeline is created.
+pub(super) struct Module<'a> {
+    pub(super) raw: vk::ShaderModule,
+    device: &'a Device,
+}
+
+impl<'a> Module<'a> {
+    pub(super) fn new(device: &'a Device, spirv: &[u32]) -> Result<Self> {
+        let info = vk::ShaderModuleCreateInfo::default().code(spirv);
+        // SAFETY: the words are a module that the build checked.
+        let raw = unsafe { device.raw.create_shader_module(&info, None) }
+            .map_err(device.error("loading a shader"))?;
+        Ok(Self { raw, device })
+    }
+}
+
+impl Drop for Module<'_> {
+    fn drop(&mut self) {
+        // SAFETY: pipelines do not need their modules after creation.
+        unsafe { self.device.raw.destroy_shader_module(self.raw, None) };
+    }
+}
