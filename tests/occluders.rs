@@ -309,11 +309,13 @@ fn merged_elements_show_the_same_planes() {
         .expect("the scene fits the device");
         let n = FACE as usize;
         let mut columns = BTreeMap::new();
-        for _ in 0..24 {
-            solver.run_batches(1, |_| ()).expect("a batch runs");
-            let (items, sources) = solver.item_buffers().expect("the item buffers come back");
+        let count = solver.sources.list.len() as u32;
+        let slots = solver.report().batch;
+        for first in (0..count.min(24 * slots)).step_by(slots as usize) {
+            let sources: Vec<u32> = (first..count.min(first + slots)).collect();
+            let drawn = solver.draw(&sources).expect("a batch is drawn");
             for (slot, &source) in sources.iter().enumerate() {
-                let rows = items.chunks_exact(n * sources.len());
+                let rows = drawn.items.chunks_exact(n * drawn.slots as usize);
                 let column: Vec<u32> = rows
                     .flat_map(|row| &row[slot * n..][..n])
                     .copied()

@@ -6,7 +6,7 @@ use std::cell::Cell;
 use std::collections::BTreeSet;
 
 use common::{Build, assert_silent, device};
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use mesolux::constants::NONE;
 use mesolux::elements::Elements;
 use mesolux::passes::cull::Culling;

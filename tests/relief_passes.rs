@@ -87,7 +87,10 @@ fn solver_by(estimator: Estimator, transport: Transport, k: u32, shots: Option<u
         .expect("the scene fits the device")
 }
 
-/// What the sources of one batch send, from the moments before it: emission and first light as well as second shots.
+/// Sources that send at once, at most: what more send is found after the moments have changed.
+const SENDING: u64 = 100;
+
+/// What sources send, from the moments before: emission and first light as well as what follows.
 #[test]
 fn sources_send_as_their_twin() {
     for (transport, k) in [
@@ -97,28 +100,23 @@ fn sources_send_as_their_twin() {
     ] {
         let (mut seen, mut again, mut glowing, mut worst) = (0, 0, 0, 0.0_f64);
         let mut now = solver(transport, k, None);
-        for steps in 1..=125 {
-            // Two submissions a step. What the last one sent is told by what lay there before it.
-            now.run_batches(1, |_| ()).expect("a batch runs");
-            if steps > 4 && (steps < 100 || steps % 25 != 0) {
+        for steps in 1..=12 {
+            // What is sent follows from the moments that lay there before.
+            let light = now.light().expect("it comes back").relief;
+            let light = light.expect("it has relief");
+            let exits = |solver: &Solver, count: u64| {
+                let exits = solver.relief_exits(count as usize).expect("they come back");
+                exits.expect("it has relief")
+            };
+            let kept = exits(&now, 1).kept;
+            let before = now.report().gathered_rows;
+            now.run(|_| false).expect("a batch or two are gathered");
+            let rows = now.report().gathered_rows - before;
+            if rows == 0 || rows > SENDING {
                 continue;
             }
-            let sent = now
-                .relief_exits()
-                .expect("they come back")
-                .expect("it has relief");
-            let mut before = solver(transport, k, Some((2 * steps - 1) * BATCH));
-            before.run(|_| true).expect("it runs");
-            let kept = before
-                .relief_exits()
-                .expect("they come back")
-                .expect("it has relief")
-                .kept;
-            let light = before
-                .light()
-                .expect("it comes back")
-                .relief
-                .expect("it has relief");
+            let sent = exits(&now, rows);
+            let before = &now;
             let relief = before.elements.relief.as_ref().expect("it has relief");
             let directions = k as usize;
             for (i, slot) in sent.slots.iter().enumerate() {
@@ -236,7 +234,7 @@ fn dark_slots_are_counted() {
     solver.run(|_| true).expect("it runs");
     assert!(solver.report().skipped.dark_slots > 0);
     let shots_of_relief = solver
-        .relief_exits()
+        .relief_exits(1)
         .expect("they come back")
         .expect("it has relief")
         .kept;
@@ -268,21 +266,27 @@ fn pixels_bring_light_as_their_twin() {
     for (transport, k) in [(Transport::Physical, 32), (Transport::Paper, 16)] {
         let (mut by_direction, mut even) = (0, 0);
         // Emission at first, and later what the relief sends.
-        for batches in [2, 3, 80] {
+        for batches in [2_u32, 3, 80] {
             let start = |shots| solver_by(Estimator::Pixel, transport, k, shots);
             let mut now = start(None);
-            now.run_batches(batches as usize, |_| ())
-                .expect("batches run");
+            // It asks before each batch.
+            let mut left = batches + 1;
+            now.run(|_| {
+                left -= 1;
+                left > 0
+            })
+            .expect("batches run");
             let mut before = start(Some((batches - 1) * BATCH));
             before.run(|_| true).expect("it runs");
             let exits = now
-                .relief_exits()
+                .relief_exits(BATCH as usize)
                 .expect("they come back")
                 .expect("it has relief");
-            let (items, of_slots) = now.item_buffers().expect("they come back");
+            let items = now.shot_items().expect("they come back");
+            let items = items.expect("it shoots by pixel");
             let relief = now.elements.relief.as_ref().expect("it has relief");
             let mut twin = Received::new(&now.elements, relief);
-            let width = of_slots.len() * FACE as usize;
+            let width = exits.slots.len() * FACE as usize;
             for (i, slot) in exits.slots.iter().enumerate() {
                 if slot.source == NONE {
                     continue;

@@ -47,7 +47,7 @@ fn spirv() -> BTreeSet<Vec<u32>> {
     let mut found = BTreeSet::new();
     for words in [
         shaders::CULL_COMP,
-        shaders::SELECT_COMP,
+        shaders::COUPLE_COMP,
         shaders::MEASURE_COMP,
         shaders::FORM_FACTORS_COMP,
         shaders::GATHER_TO_RELIEF_COMP,

@@ -57,7 +57,6 @@ pub struct Hemicubes {
     pub items: Image,
     pub framebuffer: Framebuffer,
     pub sampler: Sampler,
-    _depth: Image,
 }
 
 /// Bytes of the lists of drawn triangles, for one occluder in one face of one slot.
@@ -159,7 +158,6 @@ impl Hemicubes {
             framebuffer: Framebuffer::new(device, "item buffer", pass, &items, &depth)?,
             sampler: Sampler::new(device, "item buffer", false)?,
             items,
-            _depth: depth,
         })
     }
 }

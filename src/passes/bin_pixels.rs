@@ -20,10 +20,8 @@ pub struct BinPixels {
     rows: ComputePipeline,
 }
 
-/// The pixels' own form factors, and their sums for a batch, `[slot][element]`.
+/// Bound to the pixels' own form factors and their sums for a batch, `[slot][element]`.
 pub struct Bound {
-    _deltas: Buffer,
-    _sums: Buffer,
     bin: DescriptorSet,
     rows: DescriptorSet,
 }
@@ -104,8 +102,6 @@ impl BinPixels {
         ];
         let rows = self.rows.bind("pixel rows", &to_rows.map(Bind::Buffer))?;
         Ok(Bound {
-            _deltas: deltas,
-            _sums: sums,
             bin,
             rows,
         })

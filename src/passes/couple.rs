@@ -23,7 +23,6 @@ pub struct Bound {
     pub word_count: u32,
     /// `[slot][word]`.
     pub coupling: Buffer,
-    _targets: Buffer,
 }
 
 impl Couple {
@@ -65,7 +64,6 @@ impl Couple {
             target_count: targets.len() as u32,
             word_count,
             coupling,
-            _targets: on_device,
         })
     }
 

@@ -19,8 +19,6 @@ pub struct KeptRows {
     pub state: Buffer,
     pub chunk_words: u32,
     chunks: Vec<Buffer>,
-    /// Bound by their addresses alone.
-    _scratch: Vec<Buffer>,
 }
 
 /// Batches under way at once, each with a chunk of its own for rows that find no room.
@@ -83,14 +81,17 @@ impl KeptRows {
             .map(|_| Buffer::new(device, "rows without room", bytes, BufferUse::Addressed))
             .collect::<Result<Vec<_>>>()?;
         let addresses: Vec<u64> = chunks.iter().chain(&scratch).map(Buffer::address).collect();
-        let storage = BufferUse::Storage;
+        let table = upload(device, "row chunks", &addresses, BufferUse::Storage)?;
+        // Shaders reach them by their addresses alone.
+        for chunk in chunks.iter().chain(&scratch) {
+            table.refer_to(chunk);
+        }
         Ok(Self {
             shape,
-            table: upload(device, "chunks of form factors", &addresses, storage)?,
+            table,
             state: filled(device, "kept state", size_of::<KeptState>() as u64, 0)?,
             chunk_words: (chunk / 4) as u32,
             chunks,
-            _scratch: scratch,
         })
     }
 

@@ -12,7 +12,7 @@ use super::{groups, shaders};
 use crate::error::Result;
 use crate::hemicube::pixel_form_factors;
 use crate::vk::{
-    Bind, Binding, Buffer, BufferUse, Commands, ComputePipeline, DescriptorSet, Device, Stage,
+    Bind, Binding, BufferUse, Commands, ComputePipeline, DescriptorSet, Device, Stage,
 };
 
 /// First the elements without relief, then those with one.
@@ -21,9 +21,8 @@ pub struct PixelsRelief {
     to: ComputePipeline,
 }
 
-/// The pixels' own form factors, and the sets of [`PixelsRelief`].
-pub struct Buffers {
-    _deltas: Buffer,
+/// Sets of [`PixelsRelief`].
+pub struct Bound {
     from: DescriptorSet,
     to: DescriptorSet,
 }
@@ -74,7 +73,7 @@ impl PixelsRelief {
         state: &State,
         batch: &Batch,
         relief: &ReliefBuffers,
-    ) -> Result<Buffers> {
+    ) -> Result<Bound> {
         let hemicubes = batch.hemicubes();
         let table = pixel_form_factors(hemicubes.face_size);
         let deltas = upload(device, "pixel form factors", &table, BufferUse::Storage)?;
@@ -111,25 +110,24 @@ impl PixelsRelief {
             .map(Bind::Buffer),
         );
         let to = self.to.bind("pixels to relief", &binds)?;
-        Ok(Buffers {
-            _deltas: deltas,
+        Ok(Bound {
             from,
             to,
         })
     }
 
     /// Slot after slot, some rows at a time; elements without relief and those with one are different elements.
-    pub fn record(&self, cmd: &Commands, buffers: &Buffers, relief: &ReliefBuffers, batch: &Batch) {
+    pub fn record(&self, cmd: &Commands, bound: &Bound, relief: &ReliefBuffers, batch: &Batch) {
         let hemicubes = batch.hemicubes();
         let rows = 3 * hemicubes.face_size;
         let band = (MOST_PIXELS / hemicubes.face_size).max(1);
         for slot in 0..batch.slot_count {
             for first_row in (0..rows).step_by(band as usize) {
                 for (pipeline, set, first_element, element_count) in [
-                    (&self.from, &buffers.from, 0, relief.first_element),
+                    (&self.from, &bound.from, 0, relief.first_element),
                     (
                         &self.to,
-                        &buffers.to,
+                        &bound.to,
                         relief.first_element,
                         relief.element_count,
                     ),

@@ -79,7 +79,6 @@ pub struct Solver {
     pub sources: Sources,
     pub connections: Connections,
     pub occluders: Occluders,
-    // Before the buffers that its commands use.
     method: Method,
     scene: SceneBuffers,
     state: State,

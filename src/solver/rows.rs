@@ -8,7 +8,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::drawing::{Drawing, read_items};
-use super::estimate::{Evaluate, Evaluated};
+use super::estimate::Evaluate;
 use super::{EmitterShadows, Settings};
 use crate::constants::{FACES, NONE};
 use crate::error::Result;
@@ -16,7 +16,7 @@ use crate::passes::batch::{Batch, Sight};
 use crate::passes::buffers::SceneBuffers;
 use crate::passes::couple::{self, Couple};
 use crate::passes::fresh_rows::FreshRows;
-use crate::passes::keep::{self, Keep};
+use crate::passes::keep::Keep;
 use crate::passes::kept_rows::KeptRows;
 use crate::passes::occluder_tree::OccluderTree;
 use crate::passes::types::{CouplingTarget, KeptRow, ShadowOccluder, Slot};
@@ -112,10 +112,6 @@ pub(super) struct RowMaker {
     layout: Layout,
     device: Arc<Device>,
     batch: Batch,
-    _drawing: Option<Drawing>,
-    _evaluate: (Evaluate, Evaluated),
-    _couple: (Couple, couple::Bound),
-    _keep: Option<(Keep, keep::Bound)>,
 }
 
 /// Batches under way at once: as many as there is room for rows without room.
@@ -203,10 +199,6 @@ impl RowMaker {
             layout,
             device: Arc::clone(device),
             batch,
-            _drawing: drawing,
-            _evaluate: (evaluate, evaluated),
-            _couple: (couple, coupled),
-            _keep: keep,
         })
     }
 

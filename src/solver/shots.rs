@@ -17,12 +17,12 @@ use crate::passes::batch::Batch;
 use crate::passes::buffers::{State, download};
 use crate::passes::measure::Measure;
 use crate::passes::measure_relief::MeasureRelief;
-use crate::passes::pixels_relief::{self, PixelsRelief};
+use crate::passes::pixels_relief::PixelsRelief;
 use crate::passes::relief_buffers::ReliefBuffers;
 use crate::passes::send_relief::SendRelief;
 use crate::passes::types::Slot;
 use crate::sources::least_strong;
-use crate::vk::{Buffer, BufferUse, Commands, DescriptorSet, Device, Stage, Timestamps};
+use crate::vk::{Buffer, BufferUse, Commands, Device, Stage, Timestamps};
 
 pub(super) struct Shots {
     device: Arc<Device>,
@@ -32,7 +32,6 @@ pub(super) struct Shots {
     /// `[source]`
     sources: Vec<Shot>,
     stop_power: f64,
-    _measure: (Measure, DescriptorSet, MeasureRelief, DescriptorSet),
 }
 
 /// What a source has sent.
@@ -103,7 +102,6 @@ impl Shots {
             emitters,
             sources,
             stop_power,
-            _measure: (measure, set, measure_relief, relief_set),
         })
     }
 
@@ -243,9 +241,6 @@ struct ShotPass {
     readback: Buffer,
     timestamps: Timestamps,
     batch: Batch,
-    _drawing: Drawing,
-    _send: (SendRelief, DescriptorSet),
-    _pixels: (PixelsRelief, pixels_relief::Buffers),
 }
 
 impl ShotPass {
@@ -291,9 +286,6 @@ impl ShotPass {
             readback,
             timestamps,
             batch,
-            _drawing: drawing,
-            _send: (send, send_set),
-            _pixels: (pixels, bound),
         })
     }
 

@@ -43,8 +43,6 @@ pub(super) enum Team {
 pub(super) struct Makers {
     all: RowMaker,
     emitters: Option<RowMaker>,
-    _fresh: FreshRows,
-    _meso: Option<Buffer>,
 }
 
 /// What the makers of every device are made from.
@@ -96,8 +94,6 @@ impl Makers {
         Ok(Self {
             all,
             emitters: emitters.transpose()?,
-            _fresh: fresh,
-            _meso: meso,
         })
     }
 
@@ -132,11 +128,11 @@ impl Team {
                 scope.spawn(move || {
                     if i == 0 {
                         let makers = Makers::new(&device, parts, scene, None)?;
-                        return Ok(Worker::start(board, makers, None));
+                        return Ok(Worker::start(board, makers));
                     }
                     let scene = parts.scene.buffers(&device)?;
                     let makers = Makers::new(&device, parts, &scene, None)?;
-                    Ok::<_, Error>(Worker::start(board, makers, Some(scene)))
+                    Ok::<_, Error>(Worker::start(board, makers))
                 })
             };
             let workers: Vec<_> = devices.iter().enumerate().map(make).collect();
@@ -403,8 +399,7 @@ impl Board {
 struct Worker(Option<JoinHandle<()>>, Arc<Board>);
 
 impl Worker {
-    /// `scene`: the buffers that the makers read, of a device that holds nothing else.
-    fn start(board: Arc<Board>, makers: Makers, scene: Option<SceneBuffers>) -> Self {
+    fn start(board: Arc<Board>, makers: Makers) -> Self {
         let of_thread = Arc::clone(&board);
         let thread = thread::spawn(move || {
             let _closes = Closes(&of_thread);
@@ -412,7 +407,6 @@ impl Worker {
             if let Err(error) = work(&of_thread, &mut makers) {
                 of_thread.notes().error = Some(error);
             }
-            drop((makers, scene));
         });
         Self(Some(thread), board)
     }

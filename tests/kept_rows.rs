@@ -1,4 +1,4 @@
-//! Sources that are drawn once and replayed give what sources drawn for every shot give.
+//! However much memory there is for rows and their coupling, the light is the same.
 
 mod common;
 
@@ -71,33 +71,30 @@ fn largest_difference(a: &[Vec3], b: &[Vec3]) -> f32 {
 }
 
 #[test]
-fn replayed_sources_light_as_drawn_ones_do() {
+fn light_does_not_depend_on_memory() {
     for relief in [false, true] {
-        let (drawn, every) = solve(relief, Some(0));
-        assert_eq!((every.kept_sources, every.replayed), (0, 0));
-        assert_eq!(every.hemicubes, u64::from(every.shots));
-        // All; and so little that the rest is drawn for every shot.
-        for memory in [None, Some(40 << 10)] {
-            let (replayed, once) = solve(relief, memory);
-            let difference = largest_difference(&drawn.irradiance, &replayed.irradiance)
-                .max(largest_difference(&drawn.radiosity, &replayed.radiosity));
+        let (whole, once) = solve(relief, None);
+        assert_eq!((once.kept_sources, once.drawn_again), (once.hemicubes, 0));
+        // None; and so little that most rows find no room.
+        for memory in [0, 40 << 10] {
+            let (again, twice) = solve(relief, Some(memory));
+            let difference = largest_difference(&whole.irradiance, &again.irradiance)
+                .max(largest_difference(&whole.radiosity, &again.radiosity));
             println!(
-                "relief {relief}, memory {memory:?}: {} of {} sources kept, {} drawn, {} replayed ({} drawn without): largest difference {difference:.1e}",
-                once.kept_sources, once.sources, once.hemicubes, once.replayed, every.hemicubes
+                "relief {relief}, memory {memory}: {} of {} sources kept, {} drawn, {} of them again: largest difference {difference:.1e}",
+                twice.kept_sources, twice.sources, twice.hemicubes, twice.drawn_again
             );
             assert!(difference <= TOLERANCE);
-            assert_eq!(u64::from(once.shots), once.hemicubes + once.replayed);
-            assert!(once.replayed > 0 && once.hemicubes < every.hemicubes);
-            match memory {
-                None => assert_eq!(once.kept_sources, once.hemicubes, "each is drawn once"),
-                Some(_) => assert!(0 < once.kept_sources && once.kept_sources < once.sources),
-            }
-            if let (Some(a), Some(b)) = (&drawn.relief, &replayed.relief) {
+            assert_eq!(twice.kept_sources > 0, memory > 0);
+            assert!(twice.kept_sources < twice.sources && twice.drawn_again > 0);
+            // By direction a source may have to be drawn for each correction.
+            assert!(relief || twice.hemicubes <= 2 * once.hemicubes);
+            if let (Some(a), Some(b)) = (&whole.relief, &again.relief) {
                 let moments = |light: &mesolux::solver::ReliefLight| -> Vec<Vec3> {
                     light.moments.iter().flatten().copied().collect()
                 };
                 // Plain sums in f32, in another order: the strongest slot's rounding, half a step of random sign a shot.
-                let rounding = 0.5 * f32::EPSILON * (every.shots as f32).sqrt();
+                let rounding = 0.5 * f32::EPSILON * (twice.shots as f32).sqrt();
                 let (a, b) = (moments(a), moments(b));
                 let largest = a.iter().map(|v| v.abs().max_element()).fold(0.0, f32::max);
                 let apart = a.iter().zip(&b).map(|(a, b)| (a - b).abs().max_element());
@@ -110,52 +107,41 @@ fn replayed_sources_light_as_drawn_ones_do() {
     assert_silent();
 }
 
-/// All emission is drawn in the end, and what a few weak emitters add is not replayed after every few of them: the light is the same.
+/// Without memory for the coupling, what sources send is found by gathering and measuring.
 #[test]
-fn kept_sources_wait_while_more_emission_is_to_be_drawn() {
-    let mut build = scene(false);
-    let glow = build.material(0.5, 0.02);
-    build.sphere(DVec3::new(0.8, 0.2, 0.2), 0.1, 3, true, glow);
-    let solve = |visibility_memory| {
-        let settings = Settings {
-            batch: 1,
-            visibility_memory,
-            emitter_hemicube: Some(settings().hemicube),
-            ..settings()
+fn light_does_not_depend_on_memory_for_the_coupling() {
+    for relief in [false, true] {
+        let scene = scene(relief).0.scene;
+        let solve = |coupling_memory| {
+            let settings = Settings {
+                coupling_memory,
+                residual: 1e-5,
+                ..settings()
+            };
+            let solver = bake::solve(&device(), &scene, &settings, None, |_| true);
+            let solver = solver.expect("the scene is solved");
+            let report = solver.report().clone();
+            (solver.light().expect("it comes back"), report)
         };
-        let scene = &build.scene;
-        let lights = &scene.point_lights;
-        let mut solver = Solver::new(&device(), Elements::new(scene), lights, &settings)
-            .expect("the scene fits the device");
-        let mut waited = 0;
-        solver
-            .run_batches(100, |batch| {
-                let progress = batch.progress;
-                if progress.unshot_reflected <= progress.unshot_emitted {
-                    assert_eq!(progress.replayed, 0, "{progress:?}");
-                    waited += 1;
-                }
-            })
-            .expect("the first batches run");
-        solver.run(|_| true).expect("the scene is solved");
-        let light = solver.light().expect("the light comes back");
-        (light, solver.report().clone(), waited)
-    };
-    let (drawn, every, ..) = solve(Some(0));
-    let (light, once, waited) = solve(None);
-    let difference = largest_difference(&drawn.irradiance, &light.irradiance);
-    println!(
-        "{waited} batches waited, {} replays, {} of {} sources drawn: {difference:.1e}",
-        once.replayed, once.hemicubes, every.sources
-    );
-    assert!(waited > 0);
-    assert!(difference <= TOLERANCE);
+        let (whole, with) = solve(u64::MAX);
+        for memory in [0, with.coupling_bytes / 2] {
+            let (light, report) = solve(memory);
+            let difference = largest_difference(&whole.irradiance, &light.irradiance);
+            println!(
+                "relief {relief}, {memory} bytes: {} rows gathered for {}, {difference:.1e} apart",
+                report.gathered_rows, with.gathered_rows
+            );
+            assert!(report.coupling_bytes <= memory && report.drawn_again == 0);
+            assert!(report.gathered_rows > with.gathered_rows);
+            assert!(difference <= 5e-5);
+        }
+    }
     assert_silent();
 }
 
 /// The count of shots and the order of sources repeat, whatever is kept.
 #[test]
-fn a_run_with_kept_sources_repeats_to_the_bit() {
+fn a_run_with_kept_rows_repeats_to_the_bit() {
     let runs = [(); 2].map(|()| solve(true, Some(100 << 10)));
     let [(a, first), (b, second)] = &runs;
     assert_eq!(first.shots, second.shots);
@@ -246,14 +232,14 @@ fn relights(emitter_hemicube: Option<u32>) {
         assert!(off <= f64::from(TOLERANCE));
     }
 
-    // Without a point light nothing is left to draw: all that is emitted is replayed.
+    // Without a point light nothing is left to draw.
     let mut lamps = scene(true).0.scene;
     lamps.point_lights.clear();
-    let replayed = solve(&lamps, Some(&kept));
-    let report = replayed.report();
+    let solved = solve(&lamps, Some(&kept));
+    let report = solved.report();
     assert_eq!((report.hemicubes, report.emitters_by_rays), (0, 0));
     assert!(
-        report.shots > 0 && report.unshot_share < 1e-3,
+        report.sweeps > 0 && report.unshot_share < 1e-3,
         "{}",
         report.unshot_share
     );
@@ -336,7 +322,7 @@ fn kept_form_factors_of_something_else_are_refused() {
 fn sources_with_relief_send_by_direction_in_the_end() {
     // As coarse as bakes are: at a fine residual every source sends again in any case.
     const RESIDUAL: f64 = 0.005;
-    // UNEVEN of measure_relief.comp: the share of an even source's light that counts as unshot.
+    // UNEVEN of the solver: the share of an even source's light that counts as unshot.
     const UNEVEN: f64 = 0.1;
     let settings = Settings {
         residual: RESIDUAL,
@@ -345,7 +331,7 @@ fn sources_with_relief_send_by_direction_in_the_end() {
     let scene = scene(true).0.scene;
     let solver =
         bake::solve(&device(), &scene, &settings, None, |_| true).expect("the scene is solved");
-    let exits = solver.relief_exits().expect("they come back");
+    let exits = solver.relief_exits(0).expect("they come back");
     let kept = exits.expect("it has relief").kept;
     let of_relief = &solver.sources.list[solver.sources.relief.clone()];
     let directions = kept.len() / of_relief.len();
