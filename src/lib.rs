@@ -24,7 +24,7 @@
 //! | hemicubes | [`hemicube`], [`passes::item_buffer`] |
 //!
 //! Cargo features: `cli` (the program and its benchmarks) and `window` (`view`) are on by default, and
-//! nothing else needs them; `exr`, part of `cli`, reads and writes OpenEXR.
+//! nothing else needs them; `formats`, part of `cli`, brings scene.toml, JPEG and OpenEXR.
 //!
 //! [`bake::bake`] is the main road; [`solver::Solver`] gives each step.
 
