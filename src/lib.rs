@@ -23,12 +23,16 @@
 //! | drawing by relief mapping | [`render`], `shaders/relief.frag` |
 //! | hemicubes | [`hemicube`], [`passes::item_buffer`] |
 //!
+//! Cargo features: `cli` (the program and its benchmarks) and `window` (`view`) are on by default, and
+//! nothing else needs them; `formats`, part of `cli`, brings scene.toml, JPEG and OpenEXR.
+//!
 //! [`bake::bake`] is the main road; [`solver::Solver`] gives each step.
 #![deny(unsafe_code)]
 
 pub mod atomic_file;
 pub mod bake;
 pub mod bake_cache;
+#[cfg(feature = "cli")]
 pub mod bench;
 pub mod charts;
 pub mod constants;

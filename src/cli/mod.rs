@@ -23,6 +23,8 @@ use clap::{Args, Parser, Subcommand};
 use mesolux::error::{Error, Result};
 use mesolux::scene::{BuiltinOptions, Scene};
 use mesolux::solution::Bake;
+use tracing_subscriber::filter::{LevelFilter, Targets};
+use tracing_subscriber::prelude::*;
 
 /// Bake and draw global illumination with Vulkan: progressive radiosity through hemicube item buffers.
 ///
@@ -41,6 +43,13 @@ enum Command {
     Render(render::Options),
     #[cfg(feature = "window")]
     View(view::Options),
+    /// Takes what the other takes, to say what it lacks.
+    #[cfg(not(feature = "window"))]
+    #[command(hide = true, disable_help_flag = true)]
+    View {
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        _given: Vec<std::ffi::OsString>,
+    },
     Compare(compare::Options),
     Scene(scene::Options),
     Info(info::Options),
@@ -158,24 +167,41 @@ fn check_validation() -> Result<()> {
     }
 }
 
+/// As `MESOLUX_LOG` asks: a level, or levels by module, such as `warn,mesolux::meso=debug`.
+fn log_to_stderr() {
+    let asked = std::env::var("MESOLUX_LOG").ok();
+    let filter = asked.and_then(|asked| asked.parse::<Targets>().ok());
+    // The window's library warns of what desktops lack and it does without.
+    let by_itself = || {
+        Targets::new()
+            .with_default(LevelFilter::INFO)
+            .with_target("winit", LevelFilter::ERROR)
+    };
+    let lines = tracing_subscriber::fmt::layer()
+        .with_writer(std::io::stderr)
+        .without_time()
+        .with_target(false);
+    tracing_subscriber::registry()
+        .with(lines)
+        .with(filter.unwrap_or_else(by_itself))
+        .init();
+}
+
 pub fn main() -> ExitCode {
     #[cfg(feature = "window")]
     let start = std::time::Instant::now();
     let cli = Cli::parse();
-    let filter = tracing_subscriber::EnvFilter::try_from_env("MESOLUX_LOG")
-        // The window's library warns of what desktops lack and it does without.
-        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("info,winit=error"));
-    tracing_subscriber::fmt()
-        .with_writer(std::io::stderr)
-        .with_env_filter(filter)
-        .without_time()
-        .with_target(false)
-        .init();
+    log_to_stderr();
     let done = match &cli.command {
         Command::Bake(options) => bake::run(options),
         Command::Render(options) => render::run(options),
         #[cfg(feature = "window")]
         Command::View(options) => view::run(options, start),
+        #[cfg(not(feature = "window"))]
+        Command::View { .. } => Err(Error::Usage(
+            "this build has no window: cargo run --release -- view; or draw a file with `render`"
+                .into(),
+        )),
         Command::Compare(options) => compare::run(options),
         Command::Scene(options) => scene::run(options),
         Command::Info(options) => info::run(options),

@@ -24,6 +24,7 @@ use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 pub use film::Film;
+#[cfg(feature = "cli")]
 pub(crate) use film::NORMAL_95;
 pub use instant::VirtualLights;
 

@@ -1,9 +1,12 @@
 //! A picture in linear light and the files that hold it.
 
-use std::io::{self, Cursor};
+use std::io;
+#[cfg(feature = "formats")]
+use std::io::Cursor;
 use std::path::Path;
 
 use image::ImageEncoder;
+#[cfg(feature = "formats")]
 use image::codecs::openexr::OpenExrEncoder;
 use image::codecs::png::PngEncoder;
 use rayon::prelude::*;
@@ -165,6 +168,12 @@ impl Picture {
     pub fn write(&self, path: &Path, exposure: Option<f32>) -> Result<()> {
         match FileKind::of(path)? {
             FileKind::Png => write_png(path, (self.width, self.height), &self.srgb_codes(exposure)),
+            #[cfg(not(feature = "formats"))]
+            FileKind::Exr => Err(Error::file(
+                path,
+                "OpenEXR needs the Cargo feature `formats`",
+            )),
+            #[cfg(feature = "formats")]
             FileKind::Exr => write_atomically(path, |out| {
                 // The encoder goes back to fill in its table, which a stream cannot.
                 let mut whole = Cursor::new(Vec::new());

@@ -3,10 +3,12 @@
 use super::*;
 
 /// Directions closer than this sine count as parallel.
+#[cfg(feature = "formats")]
 const PARALLEL: f64 = 1e-6;
 
 impl Camera {
     /// The error is one clause.
+    #[cfg(feature = "formats")]
     pub(super) fn check(&self) -> Result<(), String> {
         if ![self.position, self.look_at, self.up]
             .iter()

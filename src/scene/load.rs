@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use super::assemble::Assembly;
 use super::material::TextureCache;
-use super::{Scene, builtin, check, obj, scene_file};
+#[cfg(feature = "formats")]
+use super::scene_file;
+use super::{Scene, builtin, check, obj};
 use crate::error::{Error, Result};
 
 /// What a person may ask of a built-in scene.
@@ -42,10 +44,14 @@ pub fn load(spec: &str, options: &BuiltinOptions) -> Result<Scene> {
             builtin::NAMES.join(", ")
         )));
     }
-    if extension == "obj" {
-        load_obj(path)
-    } else {
-        scene_file::load(path)
+    match extension.as_str() {
+        "obj" => load_obj(path),
+        #[cfg(feature = "formats")]
+        _ => scene_file::load(path),
+        #[cfg(not(feature = "formats"))]
+        _ => Err(Error::Usage(format!(
+            "scene {spec}: scene.toml needs the Cargo feature `formats`"
+        ))),
     }
 }
 

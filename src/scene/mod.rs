@@ -17,6 +17,7 @@ mod check;
 mod displace;
 mod hash;
 mod load;
+#[cfg(feature = "formats")]
 mod map_files;
 mod maps;
 mod material;
@@ -24,11 +25,14 @@ mod mtl;
 mod mtl_relief;
 mod obj;
 mod obj_lint;
+#[cfg(feature = "formats")]
 mod placement;
 mod relief_notes;
+#[cfg(feature = "formats")]
 mod scene_file;
 mod texture;
 mod uv;
+#[cfg(feature = "formats")]
 mod write;
 
 use std::path::PathBuf;
@@ -41,6 +45,7 @@ pub use load::{BuiltinOptions, load};
 pub use maps::{HeightMap, NormalMap};
 pub use material::Material;
 pub use texture::Texture;
+#[cfg(feature = "formats")]
 pub use write::write_scene;
 
 /// A scene that is fit to be baked: at least one triangle, every number finite, every reflectance in 0..=1.

@@ -339,7 +339,8 @@ fn unit_random(seed: u64, index: u64) -> f64 {
     ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
 }
 
-#[cfg(test)]
+// The shapes are those of the benchmarks.
+#[cfg(all(test, feature = "cli"))]
 mod tests {
     use super::*;
     use crate::bench::stress::shapes::Shapes;
