@@ -1,8 +1,11 @@
 //! Files that are either whole or not there: written beside their place, synced, then renamed into it.
 
+use std::collections::hash_map::RandomState;
 use std::fs::{self, File, OpenOptions};
+use std::hash::BuildHasher;
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::{Error, Result};
 
@@ -39,19 +42,56 @@ fn write_beside(
         Some(dir) if !dir.as_os_str().is_empty() => dir,
         _ => Path::new("."),
     };
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".mesolux-");
-    // Temporary files are private by default; the umask is to decide, as for any other file.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-
-    let mut out = BufWriter::new(builder.tempfile_in(dir)?);
+    let (beside, file) = Beside::create(dir)?;
+    let mut out = BufWriter::new(file);
     fill(&mut out)?;
     let file = out.into_inner().map_err(io::IntoInnerError::into_error)?;
-    file.as_file().sync_all()?;
-    file.persist(path).map_err(|failed| failed.error)?;
+    file.sync_all()?;
+    // Closed first: some systems do not rename what is open.
+    drop(file);
+    beside.rename_to(path)?;
     // The rename itself lasts only once the folder is synced; other systems cannot open a folder.
     #[cfg(unix)]
     File::open(dir)?.sync_all()?;
     Ok(())
+}
+
+/// A file under a name of its own, removed unless it is renamed.
+struct Beside {
+    path: Option<PathBuf>,
+}
+
+impl Beside {
+    /// The umask decides who may read it, as for any other file.
+    fn create(dir: &Path) -> io::Result<(Self, File)> {
+        static COUNT: AtomicU64 = AtomicU64::new(0);
+        loop {
+            let count = COUNT.fetch_add(1, Ordering::Relaxed);
+            // Seeded at random: processes of two containers may share a folder and a number.
+            let random = RandomState::new().hash_one(count);
+            let path = dir.join(format!(".mesolux-{random:016x}"));
+            match OpenOptions::new().write(true).create_new(true).open(&path) {
+                Ok(file) => return Ok((Self { path: Some(path) }, file)),
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    fn rename_to(mut self, to: &Path) -> io::Result<()> {
+        if let Some(path) = &self.path {
+            fs::rename(path, to)?;
+        }
+        self.path = None;
+        Ok(())
+    }
+}
+
+impl Drop for Beside {
+    fn drop(&mut self) {
+        if let Some(path) = &self.path {
+            // What cannot be removed is left lying; the error that led here says more.
+            let _ = fs::remove_file(path);
+        }
+    }
 }

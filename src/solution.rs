@@ -236,7 +236,7 @@ impl Solution {
             })
             .collect::<std::result::Result<Vec<_>, _>>()
             .map_err(|e| Error::file(path, e.to_string()))?;
-        let bytes = safetensors::serialize(tensors, Some(metadata))
+        let bytes = safetensors::serialize(tensors, Some(metadata.into_iter().collect()))
             .map_err(|e| Error::file(path, e.to_string()))?;
         write_atomically(path, |file| file.write_all(&bytes))
     }
