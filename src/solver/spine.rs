@@ -332,7 +332,12 @@ impl Spine {
             true => self.system.emitted(s).as_vec3(),
             false => Vec3::ZERO,
         };
-        (emitted, self.system.shot(s) - drawn.gathered)
+        let shot = self.system.shot(s);
+        let reflected = shot - drawn.gathered;
+        // What rounding to f32 has left is nothing.
+        let rounding = f64::from(f32::EPSILON) * shot.abs();
+        let reflected = DVec3::select(reflected.abs().cmpgt(rounding), reflected, DVec3::ZERO);
+        (emitted, reflected)
     }
 
     fn owed_power(&self, s: usize) -> f64 {
