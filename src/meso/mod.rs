@@ -19,7 +19,7 @@ mod transfer;
 mod vertices;
 mod visibility;
 
-pub use clusters::{Cluster, FaceClusters, NEAR_PARALLEL_COS, clusters};
+pub use clusters::{Cluster, CornerLight, Face, FaceClusters, NEAR_PARALLEL_COS, clusters};
 pub use factors::{CORNERS, Factors, RANK_STEP};
 pub use footprints::Footprints;
 pub use height_field::{Facet, HeightField};

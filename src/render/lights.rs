@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::seen_scene::SeenScene;
 use super::shafts::Shafts;
 use super::{Lighting, Projection};
 use crate::constants::{KIND_POINT, KIND_SURFACE, LIGHT_POINTS, LIGHT_SETS};
@@ -121,10 +122,14 @@ impl Shining {
 /// A device without the memory.
 pub fn light_buffers(
     device: &Arc<Device>,
-    scene: &Scene,
-    lighting: &Lighting<'_>,
-    projection: &Projection,
+    seen: &SeenScene<'_>,
 ) -> Result<(LightBuffers, Option<Shafts>)> {
+    let SeenScene {
+        scene,
+        lighting,
+        projection,
+        ..
+    } = *seen;
     let points: Vec<_> = if lighting.sharp() {
         shining(scene)
             .iter()

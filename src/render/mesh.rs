@@ -5,11 +5,12 @@ use std::sync::Arc;
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::flat_relief::FlatRelief;
 use super::projection::{self, Projection, Tile};
-use super::relief_mesh::FlatRelief;
+use super::seen_scene::SeenScene;
 use super::shafts::Shafts;
 use super::textures::Bound;
-use super::{Light, Lighting, corner_irradiance};
+use super::{Light, corner_irradiance};
 use crate::corners::Corners;
 use crate::error::Result;
 use crate::passes::buffers::upload;
@@ -47,13 +48,22 @@ impl Kind {
 }
 
 impl Mesh {
+    /// All triangles but those that are drawn as prisms; lit where there are `shafts`.
+    ///
+    /// # Errors
+    /// A device without the memory.
     pub fn new(
         device: &Arc<Device>,
-        scene: &Scene,
-        lighting: &Lighting<'_>,
-        projection: &Projection,
-        (rest, shafts): (Option<&FlatRelief>, Option<&Shafts>),
+        seen: &SeenScene<'_>,
+        rest: Option<&FlatRelief>,
+        shafts: Option<&Shafts>,
     ) -> Result<Self> {
+        let SeenScene {
+            scene,
+            lighting,
+            projection,
+            ..
+        } = *seen;
         let far = |e: usize| rest.and_then(|rest| rest.far.get(&e));
         let smooth = corner_irradiance(scene, &lighting.baked());
         // Which side is seen is found here in f64: a rasteriser finds it from rounded corners, wrongly for slivers.
@@ -106,16 +116,16 @@ impl Mesh {
         })
     }
 
-    /// `lights` counts light points as [`Parameters::lit_by`] does.
+    /// Draws of one tile. `lights` counts light points as [`Parameters::lit_by`] does.
     pub fn draws<'a>(
         &'a self,
-        scene: &'a Scene,
+        seen: &SeenScene<'a>,
+        tile: Tile,
         textures: &'a Bound,
-        (projection, tile): (&Projection, Tile),
-        part: Light,
         lights: [u32; 2],
     ) -> impl Iterator<Item = Draw<'a>> {
-        let rows = projection.rows(tile);
+        let rows = seen.projection.rows(tile);
+        let (scene, part) = (seen.scene, seen.lighting.part);
         self.ranges.iter().map(move |&(kind, first, count)| Draw {
             first_vertex: first,
             vertex_count: count,

@@ -9,6 +9,7 @@
 //! ```
 
 mod compare;
+mod flat_relief;
 mod flip;
 mod gathered;
 mod lighting;
@@ -20,7 +21,9 @@ mod projection;
 mod relief;
 mod relief_mesh;
 mod relief_scene;
+mod relief_surfaces;
 mod renderer;
+mod seen_scene;
 mod shafts;
 mod slots;
 mod smooth;

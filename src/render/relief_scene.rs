@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::relief_mesh::Surfaces;
+use super::relief_surfaces::Surfaces;
 use super::{Lighting, Show};
 use crate::directions::Directions;
 use crate::elements::Elements;
