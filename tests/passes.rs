@@ -331,9 +331,9 @@ fn estimators_equal_their_twins() {
                         reference::form_factors::gather(elements, source, e, sees)
                     }
                     Estimator::Receiver => {
-                        let drawn = (&items[..], FACE);
-                        let sees =
-                            |p| reference::form_factors::visible(elements, source, drawn, p, e);
+                        let sees = |p| {
+                            reference::form_factors::visible(elements, source, &items, FACE, p, e)
+                        };
                         reference::form_factors::gather(elements, source, e, sees)
                     }
                     Estimator::Pixel => {

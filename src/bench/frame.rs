@@ -92,9 +92,14 @@ pub fn run(
     })?;
     let cameras = [Some(own.clone()), close(scene, &solutions[0], &own)];
     for camera in cameras.into_iter().flatten() {
-        for &size in &options.sizes {
+        for &(width, height) in &options.sizes {
+            let view = View {
+                camera: &camera,
+                width,
+                height,
+            };
             let first = rows.len();
-            measure(device, scene, &solutions, (&camera, size), options, rows)?;
+            measure(device, scene, &solutions, &view, options, rows)?;
             for row in &rows[first..] {
                 println!("{}", line(row, &rows[first..]));
             }
@@ -108,15 +113,10 @@ fn measure(
     device: &Arc<Device>,
     scene: &Scene,
     solutions: &[Solution],
-    (camera, (width, height)): (&Camera, (u32, u32)),
+    view: &View<'_>,
     options: &Options<'_>,
     rows: &mut Vec<Row>,
 ) -> Result<()> {
-    let view = View {
-        camera,
-        width,
-        height,
-    };
     let mut found = Vec::new();
     let mut renderers = Vec::new();
     for (name, shading, direct) in SHADINGS {
@@ -130,14 +130,14 @@ fn measure(
                 cache: options.cache,
                 ..Lighting::from(solution)
             };
-            let renderer = Renderer::new(device, scene, lighting, &view, 1)?;
+            let renderer = Renderer::new(device, scene, lighting, view, 1)?;
             found.push(Row {
                 scene: scene.name.clone(),
-                camera: camera.name.clone(),
+                camera: view.camera.name.clone(),
                 shading: name.into(),
                 directions: (shading != ReliefShading::None).then_some(k),
-                width,
-                height,
+                width: view.width,
+                height: view.height,
                 relief: renderer.relief_coverage()?,
                 median: 0.0,
                 low: 0.0,

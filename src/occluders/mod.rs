@@ -16,6 +16,13 @@ use crate::elements::Elements;
 use outline::outlines;
 use region::{Region, regions};
 
+/// A region with the triangles that are drawn in place of its members.
+struct Merged {
+    region: Region,
+    /// Corners, as of [`Elements::corners`].
+    triangles: Vec<[u32; 3]>,
+}
+
 /// Structure of arrays, `[occluder]`.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Occluders {
@@ -46,19 +53,15 @@ impl Occluders {
             .zip(outlines)
             .filter_map(|(region, outline)| {
                 let triangles = triangulate::triangulate(elements, &region, &outline)?;
-                Some((region, triangles))
+                Some(Merged { region, triangles })
             })
             .collect();
         Self::from_regions(elements, connections, &drawn)
     }
 
-    fn from_regions(
-        elements: &Elements,
-        connections: &Connections,
-        drawn: &[(Region, Vec<[u32; 3]>)],
-    ) -> Self {
+    fn from_regions(elements: &Elements, connections: &Connections, drawn: &[Merged]) -> Self {
         let mut merged = vec![false; elements.len()];
-        for &e in drawn.iter().flat_map(|(region, _)| &region.members) {
+        for &e in drawn.iter().flat_map(|m| &m.region.members) {
             merged[e as usize] = true;
         }
         let mut items: Vec<_> = (0..elements.len() as u32)
@@ -69,10 +72,10 @@ impl Occluders {
             .map(|&e| elements.corners[e as usize])
             .collect();
         let own = items.len();
-        // Part by part, for meshlets are of one part each.
-        let mut pairs: Vec<_> = drawn.iter().collect();
-        pairs.sort_by_key(|(region, _)| connections.component[region.item as usize]);
-        for (region, triangles) in pairs {
+        // By connected part, because a meshlet holds elements of one part only.
+        let mut by_part: Vec<_> = drawn.iter().collect();
+        by_part.sort_by_key(|m| connections.component[m.region.item as usize]);
+        for Merged { region, triangles } in by_part {
             items.extend(std::iter::repeat_n(region.item, triangles.len()));
             corners.extend(triangles);
         }

@@ -13,7 +13,8 @@ const HEIGHT_EPSILON: f64 = 1e-6;
 /// Pixels' footprints that two points of one surface may lie apart, as in the shader.
 const REACH: f64 = 1.5;
 
-/// Mean over an element of form factor times visibility, which `seen` tells of a place: irradiance from a unit of the source's radiosity.
+/// Mean over an element of form factor times visibility: irradiance from a unit of the source's
+/// radiosity. `seen` says whether the source sees a place.
 pub fn gather(
     elements: &Elements,
     source: &Source,
@@ -102,11 +103,13 @@ fn form_factor(elements: &Elements, source: &Source, p: DVec3, element: usize) -
         .sum()
 }
 
-/// Whether the source's item buffer, of n pixels a side, says that it sees a place on an element.
+/// Whether the source sees a place `p` on an element, by its item buffer `items`, `[row][column]` of
+/// a hemicube of `n` pixels a side.
 pub fn visible(
     elements: &Elements,
     source: &Source,
-    (items, n): (&[u32], u32),
+    items: &[u32],
+    n: u32,
     p: DVec3,
     element: usize,
 ) -> bool {

@@ -17,6 +17,16 @@ pub enum Light<'a> {
     ByDirection(&'a [DVec3], &'a [DVec3]),
 }
 
+/// What one pixel brings to the element that it shows.
+struct Beam {
+    /// Of the source, internal units.
+    eye: DVec3,
+    /// From the eye through the pixel, unit, along the world's axes.
+    ray: DVec3,
+    /// Irradiance, W·m⁻², RGB.
+    brought: DVec3,
+}
+
 /// What the elements receive, W·m⁻², RGB; meso elements are the last ones.
 pub struct Received {
     /// `[element]`.
@@ -46,7 +56,8 @@ impl Received {
     /// Adds what `source` brings to the elements in its item buffer, `[row][column]` of a hemicube of `n` pixels a side.
     pub fn add(
         &mut self,
-        (elements, relief): (&Elements, &Relief),
+        elements: &Elements,
+        relief: &Relief,
         source: &Source,
         items: &[u32],
         n: u32,
@@ -82,31 +93,20 @@ impl Received {
             self.direct[e] += weight * emitted;
             self.indirect[e] += weight * reflected;
             if relief.is_meso(e) {
-                let world = axes[0] * ray.x + axes[1] * ray.y + axes[2] * ray.z;
-                let brought = weight * (emitted + reflected);
-                self.reflect(
-                    (elements, relief),
-                    e,
-                    first_meso,
-                    source.eye,
-                    world,
-                    brought,
-                );
+                let beam = Beam {
+                    eye: source.eye,
+                    ray: axes[0] * ray.x + axes[1] * ray.y + axes[2] * ray.z,
+                    brought: weight * (emitted + reflected),
+                };
+                self.reflect(elements, relief, e, e - first_meso, &beam);
             }
         }
     }
 
-    /// Light along `ray` on a meso element.
-    fn reflect(
-        &mut self,
-        (elements, relief): (&Elements, &Relief),
-        e: usize,
-        first_meso: usize,
-        eye: DVec3,
-        ray: DVec3,
-        brought: DVec3,
-    ) {
-        let (m, k) = (e - first_meso, relief.directions.count());
+    /// Adds a beam's light on element `e`, which is meso element `m`.
+    fn reflect(&mut self, elements: &Elements, relief: &Relief, e: usize, m: usize, beam: &Beam) {
+        let Beam { eye, ray, brought } = *beam;
+        let k = relief.directions.count();
         let frame = [
             relief.tangent[e].as_dvec3(),
             relief.bitangent[e].as_dvec3(),

@@ -10,18 +10,20 @@ use crate::sources::Source;
 pub struct Sent {
     pub emitted: Vec<DVec3>,
     pub reflected: Vec<DVec3>,
-    /// All reflected light that the source has been given to send, this included.
+    /// All reflected light that the source has been given to send so far, this included.
     pub kept: Vec<DVec3>,
 }
 
-/// What `source` sends of its unshot emitted and reflected radiosity. `moments` are those of its members, `[member][slot]
-/// [colour]`; `before` is what it had been given to send up to now, `[direction]`.
+/// What `source` sends of its unshot emitted and reflected radiosity, W·m⁻². `moments` are those of
+/// its members, `[member][slot][colour]`; `before` is [`Sent::kept`] of its last turn, `[direction]`.
 pub fn send_relief(
-    (elements, relief): (&Elements, &Relief),
+    elements: &Elements,
+    relief: &Relief,
     source: &Source,
     moments: &[[Vec3; 3]],
     before: &[DVec3],
-    (emitted, reflected): (DVec3, DVec3),
+    emitted: DVec3,
+    reflected: DVec3,
 ) -> Sent {
     let directions = &relief.directions;
     let k = directions.count();

@@ -126,7 +126,9 @@ impl Try {
     /// Bakes and measures. What a look costs does not count; `go_on` may stop the bake between looks.
     pub fn bake(
         &self,
-        (device, scene, grid): (&Arc<Device>, &Scene, &Grid),
+        device: &Arc<Device>,
+        scene: &Scene,
+        grid: &Grid,
         truth: &Truth,
         go_on: &impl Fn() -> bool,
     ) -> Result<Done> {

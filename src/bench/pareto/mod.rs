@@ -174,7 +174,7 @@ pub fn run(
 ) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, e))?;
     let fine = displace(scene);
-    let Some(truth) = Truth::of((scene, &fine), &options.wanted, folder, &go_on)? else {
+    let Some(truth) = Truth::of(scene, &fine, &options.wanted, folder, &go_on)? else {
         return Ok(());
     };
     println!(
@@ -190,15 +190,26 @@ pub fn run(
     println!("{HEADER}");
     let mut rows: Vec<Row> = Vec::new();
     let mut closest: Option<(f64, Done)> = None;
-    let mut told = None;
-    let save = |rows: &[Row], told: Option<&Breakdown>| {
-        write((scene, device, options), &truth, (rows, told), folder)
+    let mut breakdown = None;
+    let save = |rows: &[Row], breakdown: Option<&Breakdown>| {
+        let found = Found {
+            scene: &scene.name,
+            device: device.name(),
+            elements: scene.triangles.len(),
+            places: truth.triangles.len(),
+            reference_paths: options.wanted.paths,
+            reference_seconds: truth.seconds,
+            reference_noise: truth.noise(),
+            rows,
+            breakdown,
+        };
+        write(&found, folder)
     };
     for trial in options.grid.tries(scene) {
         if !go_on() {
             break;
         }
-        let done = trial.bake((device, scene, &options.grid), &truth, &go_on)?;
+        let done = trial.bake(device, scene, &options.grid, &truth, &go_on)?;
         rows.extend(done.rows.iter().cloned());
         mark(&mut rows);
         if let Some(last) = done.rows.last() {
@@ -207,11 +218,11 @@ pub fn run(
                 .as_ref()
                 .is_none_or(|(rms, _)| last.measure.rms < *rms)
             {
-                told = Some(Breakdown::new(scene, &done, &truth));
+                breakdown = Some(Breakdown::new(scene, &done, &truth));
                 closest = Some((last.measure.rms, done));
             }
         }
-        save(&rows, told.as_ref())?;
+        save(&rows, breakdown.as_ref())?;
     }
     if let Some(limit) = options.peers.filter(|_| go_on()) {
         let job = Job {
@@ -229,7 +240,7 @@ pub fn run(
         if let Some(why) = job.mitsuba(&options.python, &folder.join("mitsuba"), &mut add)? {
             println!("Mitsuba 3 is left out: {why}");
         }
-        save(&rows, told.as_ref())?;
+        save(&rows, breakdown.as_ref())?;
     }
     println!("\nbest settings, none of which is slower and further off than another:\n{HEADER}");
     let mut best: Vec<&Row> = rows.iter().filter(|r| r.best).collect();
@@ -237,10 +248,10 @@ pub fn run(
     for row in best {
         println!("{}", line(row));
     }
-    if let (Some(told), Some((_, done))) = (&told, &closest) {
+    if let (Some(breakdown), Some((_, done))) = (&breakdown, &closest) {
         let of = done.rows.last().map_or(String::new(), Row::settings);
         println!("\nerror of the closest bake ({of}) over the mean irradiance:");
-        told.print();
+        breakdown.print();
     }
     Ok(())
 }
@@ -279,33 +290,17 @@ fn line(row: &Row) -> String {
     )
 }
 
-fn write(
-    (scene, device, options): (&Scene, &Device, &Options),
-    truth: &Truth,
-    (rows, breakdown): (&[Row], Option<&Breakdown>),
-    folder: &Path,
-) -> Result<()> {
-    let found = Found {
-        scene: &scene.name,
-        device: device.name(),
-        elements: scene.triangles.len(),
-        places: truth.triangles.len(),
-        reference_paths: options.wanted.paths,
-        reference_seconds: truth.seconds,
-        reference_noise: truth.noise(),
-        rows,
-        breakdown,
-    };
+fn write(found: &Found<'_>, folder: &Path) -> Result<()> {
     let json = folder.join("pareto.json");
     let text =
-        serde_json::to_string_pretty(&found).map_err(|e| Error::file(&json, e.to_string()))?;
+        serde_json::to_string_pretty(found).map_err(|e| Error::file(&json, e.to_string()))?;
     write_atomically(&json, |out| out.write_all(text.as_bytes()))?;
     write_atomically(&folder.join("pareto.csv"), |out| {
         writeln!(
             out,
             "method,hemicube,emitter_hemicube,source_scale,directions,sources,hemicubes,paths,error_bound,finished,seconds,rms,rms_low,rms_high,bias,bias_interval,best"
         )?;
-        for r in rows {
+        for r in found.rows {
             fn cell<T: ToString>(value: Option<T>) -> String {
                 value.map_or(String::new(), |v| v.to_string())
             }
@@ -334,6 +329,6 @@ fn write(
         }
         Ok(())
     })?;
-    let caption = format!("{}, {} elements", scene.name, scene.triangles.len());
-    plot::write(rows, &caption, folder)
+    let caption = format!("{}, {} elements", found.scene, found.elements);
+    plot::write(found.rows, &caption, folder)
 }

@@ -55,10 +55,11 @@ pub struct Wanted {
 }
 
 impl Truth {
-    /// Reads the reference of `scene` from `folder`, or traces it in `fine`, the scene with its relief as geometry, and keeps it.
-    /// None when `go_on` said no.
+    /// Reads the reference of `scene` from `folder`; where there is none, traces it in `fine`, the
+    /// scene with its relief as geometry, and keeps it in `folder`. None when `go_on` returned false.
     pub fn of(
-        (scene, fine): (&Scene, &Scene),
+        scene: &Scene,
+        fine: &Scene,
         wanted: &Wanted,
         folder: &Path,
         go_on: &impl Fn() -> bool,

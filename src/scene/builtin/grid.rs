@@ -16,7 +16,7 @@ pub(super) enum Part {
     Floor,
     Ceiling,
     Back,
-    /// At the greatest x, on the left for who looks in.
+    /// At the greatest x, on the left seen from the opening.
     Left,
     Right,
     Light,
@@ -26,6 +26,13 @@ pub(super) enum Part {
 struct Quad {
     corners: [DVec3; 4],
     part: Part,
+}
+
+/// A triangle of the room, counter-clockwise seen from inside.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Piece {
+    pub corners: [DVec3; 3],
+    pub part: Part,
 }
 
 /// Cells along each stretch of an axis. The lines are the same on every surface they meet, so no edge ends within
@@ -103,7 +110,7 @@ pub(super) fn least_triangles() -> usize {
 ///
 /// What a grid leaves over is made up by quads cut in four about their centre, spread evenly (two more each), and, where
 /// one is missing still, by halving a triangle at the opening, whose edge no other triangle shares.
-pub(super) fn triangles(room: &Room, count: usize) -> Vec<([DVec3; 3], Part)> {
+pub(super) fn triangles(room: &Room, count: usize) -> Vec<Piece> {
     let quads = quads(room, &Cells::within(room, count));
     let more = count - 2 * quads.len();
     let in_four = more / 2;
@@ -111,13 +118,17 @@ pub(super) fn triangles(room: &Room, count: usize) -> Vec<([DVec3; 3], Part)> {
     let mut triangles = Vec::with_capacity(count);
     for (index, quad) in quads.iter().enumerate() {
         let [a, b, c, d] = quad.corners;
+        let piece = |corners| Piece {
+            corners,
+            part: quad.part,
+        };
         let share = |quads_before: usize| quads_before * in_four / quads.len();
         if share(index + 1) > share(index) {
             let centre = (a + b + c + d) / 4.0;
             let about = [[a, b], [b, c], [c, d], [d, a]];
-            triangles.extend(about.map(|[p, q]| ([p, q, centre], quad.part)));
+            triangles.extend(about.map(|[p, q]| piece([p, q, centre])));
         } else {
-            triangles.extend([([a, b, c], quad.part), ([a, c, d], quad.part)]);
+            triangles.extend([piece([a, b, c]), piece([a, c, d])]);
         }
     }
     if more % 2 == 1 {
@@ -126,22 +137,23 @@ pub(super) fn triangles(room: &Room, count: usize) -> Vec<([DVec3; 3], Part)> {
     triangles
 }
 
-fn halve_at_opening(triangles: &mut Vec<([DVec3; 3], Part)>) {
+fn halve_at_opening(triangles: &mut Vec<Piece>) {
     let edge = |corners: &[DVec3; 3]| {
         (0..3).find(|&k| corners[k].z == 0.0 && corners[(k + 1) % 3].z == 0.0)
     };
     let found = triangles
         .iter()
         .enumerate()
-        .find_map(|(index, (corners, _))| Some((index, edge(corners)?)));
+        .find_map(|(index, piece)| Some((index, edge(&piece.corners)?)));
     let Some((index, first)) = found else {
         unreachable!("the opening has edges");
     };
-    let (corners, part) = triangles[index];
+    let Piece { corners, part } = triangles[index];
     let [a, b, c] = [0, 1, 2].map(|k| corners[(first + k) % 3]);
     let middle = (a + b) / 2.0;
-    triangles[index] = ([a, middle, c], part);
-    triangles.insert(index + 1, ([middle, b, c], part));
+    let piece = |corners| Piece { corners, part };
+    triangles[index] = piece([a, middle, c]);
+    triangles.insert(index + 1, piece([middle, b, c]));
 }
 
 fn quads(room: &Room, cells: &Cells) -> Vec<Quad> {

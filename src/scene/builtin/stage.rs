@@ -111,7 +111,7 @@ pub(super) fn count(mesh: &Mesh) -> usize {
 /// A room in exactly `count` triangles.
 pub(super) fn room(room: &Room, count: usize, material_of: fn(Part) -> u32) -> Mesh {
     let mut mesh = Mesh::default();
-    for (corners, part) in grid::triangles(room, count) {
+    for grid::Piece { corners, part } in grid::triangles(room, count) {
         let first = mesh.positions.len() as u32;
         mesh.positions.extend(corners);
         mesh.triangles.push(MeshTriangle {

@@ -10,11 +10,21 @@ use crate::view::input::Input;
 use crate::view::overlay;
 use crate::view::panel::{self, Asked, Changed, Told};
 
-/// A picture over the view, drawn anew when what it shows changes.
+/// What a picture over the view shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Subject {
+    /// The element or the source.
+    index: u32,
+    /// Number of the light, counted as [`Viewer::lights`].
+    light: u64,
+    /// Bits of the factor of exposure.
+    exposure: u32,
+}
+
+/// A picture over the view; it is redrawn when its subject changes.
 #[derive(Default)]
 pub(super) struct KeptTexture {
-    /// The element or the source, and the light and the exposure by which it is shown.
-    shows: Option<(u32, (u64, u32))>,
+    shows: Option<Subject>,
     /// None where there is nothing to be seen.
     texture: Option<TextureHandle>,
 }
@@ -24,7 +34,7 @@ impl KeptTexture {
         &mut self,
         context: &egui::Context,
         name: &str,
-        shows: (u32, (u64, u32)),
+        shows: Subject,
         draw: impl FnOnce() -> Option<egui::ColorImage>,
     ) -> Option<&TextureHandle> {
         if self.shows != Some(shows) {
@@ -146,14 +156,19 @@ impl Viewer {
         }
         let exposure = self.exposure().exp2();
         let screen = context.content_rect();
-        let light = (self.lights, exposure.to_bits());
+        let light = self.lights;
+        let subject = |index| Subject {
+            index,
+            light,
+            exposure: exposure.to_bits(),
+        };
         let slots = marked(&self.input).filter(|_| self.switches.slots);
         match (slots, &self.snapshot.relief) {
             (Some(e), Some(relief)) => {
                 let draw = || overlay::hemisphere(relief, e, exposure);
                 let texture = self
                     .slots_picture
-                    .of(context, "hemisphere", (e, light), draw);
+                    .of(context, "hemisphere", subject(e), draw);
                 let at = self.input.pointer.unwrap_or_default();
                 let corner = egui::pos2(at.0 / self.scale + 16.0, at.1 / self.scale + 16.0);
                 lay(&painter, texture, corner, overlay::SIDE as f32);
@@ -164,7 +179,7 @@ impl Viewer {
         match self.items.as_ref().filter(|_| wanted) {
             Some(items) => {
                 let draw = || Some(overlay::items(items, &self.snapshot.irradiance, exposure));
-                let key = (items.source, light);
+                let key = subject(items.source);
                 let texture = self.items_picture.of(context, "items", key, draw);
                 let side = 0.35 * screen.width().min(screen.height());
                 let corner = screen.right_bottom() - egui::vec2(side + 8.0, side + 8.0);
