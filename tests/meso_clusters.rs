@@ -128,8 +128,8 @@ fn lit(scene: &Scene, directions: &Directions, towards: DVec3, strength: Vec3) -
     let light = light_on(scene, directions, |frame| {
         parallel(directions, frame, towards, strength)
     });
-    let vertices = MesoVertices::new(scene, &light);
-    let gathered = vertices.gather(directions, &light, &light.incident_moment);
+    let vertices = MesoVertices::new(scene, &light.elements, &light.frames);
+    let gathered = vertices.gather(directions, &light.frames, &light.incident_moment);
     let faces: Vec<_> = (0..light.elements.len() as u32)
         .map(|meso| Face {
             meso,

@@ -6,6 +6,7 @@ use glam::Vec3;
 
 use super::relief_surfaces::Surfaces;
 use super::{Lighting, Show};
+use crate::bake::marcher;
 use crate::directions::Directions;
 use crate::elements::Elements;
 use crate::error::Result;
@@ -57,10 +58,10 @@ impl ReliefScene {
                 surface_of[elements.input_index[e] as usize] = surface;
             }
         }
-        let mut marcher = None;
+        let mut march = marcher(device);
         let mut factors = Vec::with_capacity(tiles.len());
         for tile in &tiles {
-            let (visibility, _) = visibility(device, &tile.field, lighting.cache, &mut marcher)?;
+            let (visibility, _) = visibility(&tile.field, lighting.cache, &mut march)?;
             factors.push(Factors::new(
                 &directions,
                 &tile.field,
@@ -69,8 +70,8 @@ impl ReliefScene {
                 FACTOR_ERROR,
             ));
         }
-        let vertices = MesoVertices::new(scene, light);
-        let gather = |moments| vertices.gather(&directions, light, moments);
+        let vertices = MesoVertices::new(scene, &light.elements, &light.frames);
+        let gather = |moments| vertices.gather(&directions, &light.frames, moments);
         Ok(Some(Self {
             pass: Arc::new(passes::relief::Relief::new(
                 device,
