@@ -1,4 +1,5 @@
-//! A room with an open front as quads on shared lines, and its cut into an exact number of triangles.
+//! A room with an open front as quads on shared lines, and its cut into an exact number of
+//! triangles.
 
 use glam::DVec3;
 
@@ -6,7 +7,7 @@ use glam::DVec3;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Room {
     pub size: DVec3,
-    /// The light in the plane of the ceiling, from and to.
+    /// The light in the plane of the ceiling: its range along x and along z.
     pub light_x: [f64; 2],
     pub light_z: [f64; 2],
 }
@@ -35,7 +36,7 @@ pub(super) struct Piece {
     pub part: Part,
 }
 
-/// Cells along each stretch of an axis. The lines are the same on every surface they meet, so no edge ends within
+/// Cells along each stretch of an axis. All surfaces share the lines, so no edge ends within
 /// another.
 #[derive(Debug, Clone, Copy)]
 struct Cells {
@@ -76,7 +77,7 @@ impl Cells {
                 rounded(room.light_z[1] - room.light_z[0]),
                 rounded(size.y),
             ];
-            // Each count one less, as wanted or one more: 3⁵ choices.
+            // Each count as wanted, one less or one more: 3⁵ choices.
             let best = (0..3_i64.pow(5))
                 .map(|choice| {
                     let count = |axis: usize| {
@@ -108,8 +109,9 @@ pub(super) fn least_triangles() -> usize {
 
 /// The room in exactly `count` triangles, at least [`least_triangles`].
 ///
-/// What a grid leaves over is made up by quads cut in four about their centre, spread evenly (two more each), and, where
-/// one is missing still, by halving a triangle at the opening, whose edge no other triangle shares.
+/// Triangles that a grid lacks are made by cutting quads in four about their centre, evenly spread
+/// (two more each). If one is still missing, a triangle at the opening is halved at an edge that no
+/// other triangle shares.
 pub(super) fn triangles(room: &Room, count: usize) -> Vec<Piece> {
     let quads = quads(room, &Cells::within(room, count));
     let more = count - 2 * quads.len();
