@@ -1,14 +1,14 @@
-//! What lies over the view: the panel, marks of lights, light by direction, an item buffer.
+//! Overlays of the view: the panel, marks of lights, light by direction, an item buffer.
 
 use std::time::{Duration, Instant};
 
 use egui::TextureHandle;
 
 use super::Viewer;
+use super::input::Input;
 use crate::error::Result;
-use crate::view::input::Input;
 use crate::view::overlay;
-use crate::view::panel::{self, Asked, Changed, Told};
+use crate::view::panel::{self, Asked, Changed, Status};
 
 /// What a picture over the view shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,7 +25,7 @@ struct Subject {
 #[derive(Default)]
 pub(super) struct KeptTexture {
     shows: Option<Subject>,
-    /// None where there is nothing to be seen.
+    /// None where there is nothing to show.
     texture: Option<TextureHandle>,
 }
 
@@ -60,7 +60,7 @@ fn marked(input: &Input) -> Option<u32> {
 }
 
 impl Viewer {
-    /// Lays out the panel and what lies over the view; takes what was changed there.
+    /// Lays out the panel and the overlays, and applies the changes made in the panel.
     pub(super) fn panel(
         &mut self,
         (width, height): (u32, u32),
@@ -95,7 +95,7 @@ impl Viewer {
             .viewport_output
             .get(&egui::ViewportId::ROOT)
             .map_or(Duration::MAX, |viewport| viewport.repaint_delay);
-        // Later than an hour is never.
+        // A delay above an hour means never.
         let soon = delay < Duration::from_secs(3600);
         self.repaint = soon.then(|| Instant::now() + delay);
         Ok(context.tessellate(output.shapes, output.pixels_per_point))
@@ -106,7 +106,7 @@ impl Viewer {
         let baking = self.is_baking();
         let marked = marked(&self.input);
         let device = self.screen.device().name().to_owned();
-        let told = Told {
+        let status = Status {
             scene: &self.scene.name,
             triangles: self.scene.triangles.len(),
             device: &device,
@@ -128,10 +128,10 @@ impl Viewer {
             directions: &mut self.directions,
             relief_scale: &mut self.relief_scale,
         };
-        panel::show(context, &told, &mut changed)
+        panel::show(context, &status, &mut changed)
     }
 
-    /// An element in a line.
+    /// One line about an element.
     fn describe(&self, element: u32) -> String {
         let e = element as usize;
         let material = self.scene.triangles[e].material as usize;
@@ -143,7 +143,7 @@ impl Viewer {
         )
     }
 
-    /// What lies over the view: marks of lights, light by direction, an item buffer.
+    /// Draws marks of lights, light by direction and an item buffer over the view.
     fn marks(&mut self, context: &egui::Context, size: (u32, u32)) {
         let layer = egui::LayerId::new(egui::Order::Background, egui::Id::new("marks"));
         let painter = context.layer_painter(layer);
@@ -166,26 +166,27 @@ impl Viewer {
         match (slots, &self.snapshot.relief) {
             (Some(e), Some(relief)) => {
                 let draw = || overlay::hemisphere(relief, e, exposure);
-                let texture = self
-                    .slots_picture
-                    .of(context, "hemisphere", subject(e), draw);
+                let texture =
+                    self.overlays
+                        .slots_picture
+                        .of(context, "hemisphere", subject(e), draw);
                 let at = self.input.pointer.unwrap_or_default();
                 let corner = egui::pos2(at.0 / self.scale + 16.0, at.1 / self.scale + 16.0);
                 lay(&painter, texture, corner, overlay::SIDE as f32);
             }
-            _ => self.slots_picture = KeptTexture::default(),
+            _ => self.overlays.slots_picture = KeptTexture::default(),
         }
         let wanted = self.switches.items && self.input.chosen.is_some();
-        match self.items.as_ref().filter(|_| wanted) {
+        match self.overlays.items.as_ref().filter(|_| wanted) {
             Some(items) => {
                 let draw = || Some(overlay::items(items, &self.snapshot.irradiance, exposure));
                 let key = subject(items.source);
-                let texture = self.items_picture.of(context, "items", key, draw);
+                let texture = self.overlays.items_picture.of(context, "items", key, draw);
                 let side = 0.35 * screen.width().min(screen.height());
                 let corner = screen.right_bottom() - egui::vec2(side + 8.0, side + 8.0);
                 lay(&painter, texture, corner, side);
             }
-            None => self.items_picture = KeptTexture::default(),
+            None => self.overlays.items_picture = KeptTexture::default(),
         }
     }
 }
