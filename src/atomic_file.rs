@@ -1,4 +1,5 @@
-//! Files that are either whole or not there: written beside their place, synced, then renamed into it.
+//! Files that are written completely or not at all: written beside their path, synced, then renamed
+//! to it.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
@@ -6,9 +7,11 @@ use std::path::Path;
 
 use crate::error::{Error, Result};
 
-/// Writes `path` through `fill`, so that a crash, a full disk or an error from `fill` leaves what stood there before.
+/// Writes `path` through `fill`, so that a crash, a full disk or an error from `fill` leaves the
+/// previous file.
 ///
-/// What is no regular file, such as a pipe or `/dev/null`, is written in place: renaming over it would destroy it.
+/// A path that is not a regular file, such as a pipe or `/dev/null`, is written in place: renaming
+/// over it would destroy it.
 pub fn write_atomically(
     path: &Path,
     fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -41,7 +44,7 @@ fn write_beside(
     };
     let mut builder = tempfile::Builder::new();
     builder.prefix(".mesolux-");
-    // Temporary files are private by default; the umask is to decide, as for any other file.
+    // Temporary files are private by default; the umask decides, as for any other file.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
 
@@ -50,7 +53,7 @@ fn write_beside(
     let file = out.into_inner().map_err(io::IntoInnerError::into_error)?;
     file.as_file().sync_all()?;
     file.persist(path).map_err(|failed| failed.error)?;
-    // The rename itself lasts only once the folder is synced; other systems cannot open a folder.
+    // The rename is durable only once the folder is synced; other systems cannot open a folder.
     #[cfg(unix)]
     File::open(dir)?.sync_all()?;
     Ok(())

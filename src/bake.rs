@@ -11,8 +11,8 @@ use crate::solution::Solution;
 use crate::solver::{self, Settings, Solver, Update, Visibility};
 use crate::vk::Device;
 
-/// Bakes a scene. `go_on` is called at every step; when it returns false, the bake stops, and what has
-/// been solved by then is a valid solution.
+/// Bakes a scene. `go_on` is called at every step; when it returns false, the bake stops, and what
+/// has been solved by then is a valid solution.
 ///
 /// # Errors
 /// Settings out of range; a scene that does not fit the device; a device that fails.
@@ -25,8 +25,8 @@ pub fn bake(
     solution(scene, &solve(device, scene, settings, None, go_on)?)
 }
 
-/// As [`bake`], and returns the solver. With `kept`, hemicubes that were drawn under other light are
-/// not drawn again.
+/// As [`bake`], and returns the solver. With `kept`, hemicubes that were drawn under other light
+/// are not drawn again.
 ///
 /// # Errors
 /// `kept` is of another scene or other settings.
@@ -79,8 +79,8 @@ pub fn elements(device: &Arc<Device>, scene: &Scene, settings: &Settings) -> Res
     Ok(elements)
 }
 
-/// Marches height fields on a device. The pass is made at the first call, so that a run that finds all
-/// visibility in its cache makes none.
+/// Marches height fields on a device. The pass is made at the first call, so that a run that finds
+/// all visibility in its cache makes none.
 pub(crate) fn marcher(
     device: &Arc<Device>,
 ) -> impl FnMut(&HeightField) -> Result<meso::Visibility> {

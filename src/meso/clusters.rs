@@ -1,5 +1,6 @@
-//! Clusters of near-parallel light on a face: the paper's way of drawing relief. The light by slots of the face's three
-//! vertices becomes a few parallel lights, each of which one march over the height map shadows.
+//! Clusters of near-parallel light on a face: the paper's way of drawing relief. The light by slots
+//! of the face's three vertices becomes a few parallel lights, each of which one march over the
+//! height map shadows.
 
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
@@ -9,9 +10,9 @@ use crate::constants::{MOST_CLUSTERS, MOST_DIRECTIONS};
 use crate::directions::Directions;
 
 /// Cosine of 12°, the greatest angle between a cluster's strongest moment and the others that join
-/// it. The angle is above 10°, the farthest a moment of K = 64 strays from its slot's middle, so that
-/// a slot's light at the three vertices is one cluster; and below 18°, the angle between middles of
-/// neighbouring slots, so that those stay apart.
+/// it. The angle is above 10°, the farthest a moment of K = 64 strays from its slot's middle, so
+/// that a slot's light at the three vertices is one cluster; and below 18°, the angle between
+/// middles of neighbouring slots, so that those stay apart.
 pub const NEAR_PARALLEL_COS: f64 = 0.978_147_600_733_806;
 
 /// A parallel light on a face.
@@ -19,8 +20,8 @@ pub const NEAR_PARALLEL_COS: f64 = 0.978_147_600_733_806;
 pub struct Cluster {
     /// Towards the light, unit, along the world's axes.
     pub towards: Vec3,
-    /// Fluence Φ at the face's corners a, b and c, RGB, W·m⁻²: the light there is Φ · `towards` as a
-    /// vector. Over all corners and colours, its sum is that of the moments in the cluster.
+    /// Fluence Φ at the face's corners a, b and c, RGB, W·m⁻²: the light there is Φ · `towards` as
+    /// a vector. Over all corners and colours, its sum is that of the moments in the cluster.
     pub fluence: [Vec3; 3],
 }
 

@@ -1,4 +1,4 @@
-//! Relief: height fields, what they see of themselves, and what they do to light.
+//! Relief: height fields, their visibility, and their response to light.
 //!
 //! ```text
 //! height map ─► height field ─► visibility (cached) ─► response ─► relief of the elements

@@ -1,5 +1,6 @@
 //! The relief of a scene's elements: tangent frames and responses. There is one response for each
-//! material and size of its tiles, and one for each footprint where elements are smaller than a tile.
+//! material and size of its tiles, and one for each footprint where elements are smaller than a
+//! tile.
 
 use std::path::{Path, PathBuf};
 
@@ -31,7 +32,7 @@ pub enum Transport {
     Lambert,
 }
 
-/// What of the scene's relief is wanted.
+/// Settings of a scene's relief.
 #[derive(Debug, Clone)]
 pub struct Options {
     pub transport: Transport,
@@ -61,21 +62,21 @@ pub struct Relief {
     pub transport: Transport,
     /// Index into `responses`, NONE for an element without relief.
     pub class: Vec<u32>,
-    /// Along growing u and growing v, orthogonal, unit; zero for an element without relief.
+    /// Along increasing u and increasing v, orthogonal, unit; zero for an element without relief.
     pub tangent: Vec<Vec3>,
     pub bitangent: Vec<Vec3>,
     /// The element's own mean reflectance over that of its response's facets.
     pub scale: Vec<Vec3>,
     pub responses: Vec<Response>,
     pub classes: Vec<Class>,
-    /// Where the elements lie in their textures; `paper` transport alone.
+    /// The elements' places in their textures; only for `paper` transport.
     pub texels: Option<Texels>,
     /// Largest share of light, the same over all of a tile, that leaves the tile again; over all
     /// elements, directions and colours.
     pub highest_albedo: f32,
 }
 
-/// Normals and reflectance that the pixels of an item buffer look up.
+/// Normals and reflectance for look-ups by the pixels of an item buffer.
 #[derive(Debug, Clone, Default)]
 pub struct Texels {
     /// `[element]` in the elements' own order; zero for one without relief.
@@ -86,7 +87,7 @@ pub struct Texels {
 
 /// Bytes of all responses at most, unless each tile has only one.
 const MOST_RESPONSES: usize = 32 << 20;
-/// Footprints of a tile at most.
+/// Most footprints of a tile.
 pub const MOST_FOOTPRINTS: usize = 256;
 
 /// One material at one size of its tiles.
@@ -100,7 +101,8 @@ pub struct Class {
     pub footprints: usize,
     pub facets: usize,
     pub rms_slope: f64,
-    /// Mean reflectance of the facets, and share of a uniform sky's light that leaves the tile again, RGB.
+    /// Mean reflectance of the facets, and share of a uniform sky's light that leaves the tile
+    /// again, RGB.
     pub reflectance: [f32; 3],
     pub albedo: [f32; 3],
     pub visibility_from_cache: bool,
@@ -123,7 +125,7 @@ impl Texels {
             }
         }));
         for (&e, uv) in tile.members.iter().zip(coordinates) {
-            // Near the origin, where f32 is finest.
+            // Shifted towards the origin, where f32 is most precise.
             let home = uv[0].floor();
             let [uv_a, uv_b, uv_c] = uv.map(|p| (p - home).as_vec2());
             self.elements[e] = MesoTexel {
@@ -190,8 +192,8 @@ impl TileResponses {
 }
 
 impl Relief {
-    /// The relief of a scene. None where no element has one or none is wanted. `march` is called for
-    /// each tile whose visibility is not in the cache.
+    /// The relief of a scene. None where no element has one or none is wanted. `march` is called
+    /// for each tile whose visibility is not in the cache.
     ///
     /// # Errors
     /// A relief whose scale is implausibly steep; a march or a cache that fails.
@@ -308,7 +310,7 @@ impl Relief {
         self.class[element] != NONE
     }
 
-    /// Meso elements; in a solver's order they are the last ones.
+    /// Number of meso elements; in a solver's order they are the last ones.
     pub fn count(&self) -> usize {
         self.class.iter().filter(|&&c| c != NONE).count()
     }

@@ -1,5 +1,5 @@
-//! Light by direction at the vertices of a surface with a relief, gathered from the elements about them: the paper's
-//! Figure 1, from slots to slots between the frames of neighbours.
+//! Light by direction at the vertices of a surface with a relief, gathered from the elements about
+//! them: the paper's Figure 1, from slots to slots between the frames of neighbours.
 
 use std::collections::HashMap;
 
@@ -10,13 +10,14 @@ use crate::corners::Corners;
 use crate::directions::Directions;
 use crate::scene::Scene;
 
-/// Cosine of 45°: elements whose tangents are further apart meet in a seam of their texture coordinates.
+/// Cosine of 45°: between elements whose tangents are further apart there is a seam of the texture
+/// coordinates.
 const SEAM_COS: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// The vertices that meso elements share where one's surface and texture continue the other's.
+/// The vertices of meso elements, shared by elements whose surface and texture continue each other.
 pub struct MesoVertices {
-    /// Tangent, bitangent and normal, `[vertex]`: those of the elements about it, by angle, made orthonormal; alike on
-    /// both sides of a shared edge.
+    /// Tangent, bitangent and normal, `[vertex]`: mean of the elements' about it weighted by angle,
+    /// made orthonormal; the same on both sides of a shared edge.
     pub frames: Vec<[Vec3; 3]>,
     /// The vertex of each corner, `[meso element][corner]`.
     pub corners: Vec<[u32; 3]>,
@@ -25,8 +26,8 @@ pub struct MesoVertices {
 }
 
 impl MesoVertices {
-    /// The vertices of the meso elements that are the triangles `elements` of the scene; `frames` are
-    /// their tangents, bitangents and normals. Both are `[meso element]`.
+    /// The vertices of the meso elements that are the triangles `elements` of the scene; `frames`
+    /// are their tangents, bitangents and normals. Both are `[meso element]`.
     pub fn new(scene: &Scene, elements: &[u32], frames: &[[Vec3; 3]]) -> Self {
         let meso: HashMap<usize, u32> =
             (0..).zip(elements).map(|(m, &e)| (e as usize, m)).collect();
@@ -104,8 +105,8 @@ impl MesoVertices {
     }
 
     /// Weighted means at the vertices, `[vertex][slot]`, of the elements' `values`,
-    /// `[meso element][slot]`. The elements' frames are taken for the vertex's. `k` is the number of
-    /// slots.
+    /// `[meso element][slot]`. The elements' frames are taken for the vertex's. `k` is the number
+    /// of slots.
     pub fn mean(&self, values: &[Vec3], k: usize) -> Vec<Vec3> {
         self.around
             .par_iter()
@@ -121,10 +122,11 @@ impl MesoVertices {
     }
 
     /// Vector moments at the vertices, `[vertex][slot][colour]`, from those of the elements,
-    /// `[meso element][slot][colour]`, W·m⁻². `frames` are the elements', as given to [`Self::new`].
+    /// `[meso element][slot][colour]`, W·m⁻². `frames` are the elements', as given to
+    /// [`Self::new`].
     ///
-    /// A moment is turned as a vector from the element's frame into the vertex's and is added to the
-    /// slot that it then points into, so that the light as a vector is kept. A moment below the
+    /// A moment is turned as a vector from the element's frame into the vertex's and is added to
+    /// the slot that it then points into, so that the light as a vector is kept. A moment below the
     /// vertex's horizon is projected onto the horizon.
     pub fn gather(
         &self,

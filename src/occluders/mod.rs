@@ -1,8 +1,9 @@
 //! Occluders: the triangles that item buffers are drawn from.
 //!
-//! The `receiver` estimator asks an item for its plane alone. So neighbouring elements of one plane are drawn as the few
-//! triangles that their outline needs, each as one element of that plane. The outline keeps all its corners, those at which it goes
-//! straight on as well: neighbours share whole edges, no crack opens, and the same pixels are covered.
+//! The `receiver` estimator needs only the plane of an item. Neighbouring elements of one plane are
+//! therefore drawn as the few triangles that fill their outline, each drawn as one element of that
+//! plane. The outline keeps all its corners, also those on a straight line: neighbours share whole
+//! edges, no crack opens, and the same pixels are covered.
 
 mod outline;
 mod region;
@@ -28,9 +29,9 @@ struct Merged {
 pub struct Occluders {
     /// Corners, as of [`Elements::corners`].
     pub corners: Vec<[u32; 3]>,
-    /// The element that each is drawn as, in whose plane and connected part it lies.
+    /// The element that each is drawn as; both lie in the same plane and connected part.
     pub items: Vec<u32>,
-    /// How many, at the beginning, are elements as they are, in their order.
+    /// Number of occluders at the beginning of the list that are single elements, in their order.
     pub own: usize,
 }
 
@@ -44,7 +45,7 @@ impl Occluders {
         }
     }
 
-    /// Elements of one plane merged, wherever that gives fewer triangles.
+    /// Elements of one plane merged where that gives fewer triangles.
     pub fn merged(elements: &Elements, connections: &Connections) -> Self {
         let regions = regions(elements, connections);
         let outlines = outlines(elements, connections, &regions);

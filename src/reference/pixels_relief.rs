@@ -1,4 +1,5 @@
-//! Twin of the pixel estimator where light has directions: the paper's equations (2) to (4), pixel by pixel.
+//! Twin of the pixel estimator where light has directions: the paper's equations (2) to (4), pixel
+//! by pixel.
 
 use glam::{DVec2, DVec3};
 
@@ -8,10 +9,11 @@ use crate::hemicube::{Pixel, delta_form_factor, direction_of, solid_angle_share}
 use crate::meso::{Relief, slot_shares};
 use crate::sources::Source;
 
-/// A grazing pixel's light counts as coming from no lower than this.
+/// Least cosine that the light of a grazing pixel is taken to come from.
 const LEAST_HEIGHT: f64 = 1e-3;
 
-/// What one source sends: the same in all directions, or by direction of the hemicube's frame, `[direction]`; W·m⁻².
+/// What one source sends: the same in all directions, or by direction of the hemicube's frame,
+/// `[direction]`; W·m⁻².
 pub enum Light<'a> {
     Even(DVec3, DVec3),
     ByDirection(&'a [DVec3], &'a [DVec3]),
@@ -36,7 +38,7 @@ pub struct Received {
     pub moments: Vec<[DVec3; 3]>,
     /// Radiosity, `[meso element]`.
     pub reflected: Vec<DVec3>,
-    /// `paper` transport alone: light sent by direction, `[meso element][slot]`.
+    /// Light sent by direction, `[meso element][slot]`; only for `paper` transport.
     pub outgoing: Vec<DVec3>,
 }
 
@@ -53,7 +55,8 @@ impl Received {
         }
     }
 
-    /// Adds what `source` brings to the elements in its item buffer, `[row][column]` of a hemicube of `n` pixels a side.
+    /// Adds what `source` brings to the elements in its item buffer, `[row][column]` of a hemicube
+    /// of `n` pixels a side.
     pub fn add(
         &mut self,
         elements: &Elements,
@@ -67,7 +70,7 @@ impl Received {
         let axes = [source.tangent, source.bitangent, source.normal];
         for (i, &item) in items.iter().enumerate() {
             let e = item as usize;
-            // A back blocks light and takes none.
+            // A back blocks light and receives none.
             if item == NONE || (source.eye - elements.centroid[e]).dot(elements.normal[e]) <= 0.0 {
                 continue;
             }
@@ -124,7 +127,7 @@ impl Received {
             self.reflected[m] += DVec3::from_array(albedo) * relief.scale[e].as_dvec3() * brought;
             return;
         };
-        // The place in the texture that the pixel shows, by areas of the parts of the triangle.
+        // The place in the texture that the pixel shows, by barycentric areas.
         let [a, b, c] = elements.triangle(e);
         let n = elements.normal[e];
         let p = eye + ray * (n.dot(a - eye) / n.dot(ray));

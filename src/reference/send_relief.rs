@@ -15,7 +15,8 @@ pub struct Sent {
 }
 
 /// What `source` sends of its unshot emitted and reflected radiosity, W·m⁻². `moments` are those of
-/// its members, `[member][slot][colour]`; `before` is [`Sent::kept`] of its last turn, `[direction]`.
+/// its members, `[member][slot][colour]`; `before` is [`Sent::kept`] of its last turn,
+/// `[direction]`.
 pub fn send_relief(
     elements: &Elements,
     relief: &Relief,
@@ -98,7 +99,8 @@ fn power(values: &[DVec3], shares: &[f64]) -> DVec3 {
     values.iter().zip(shares).map(|(v, &s)| *v * s).sum()
 }
 
-/// Brings a distribution to the power that it must have: scaled, or where less than half of it is there, shifted.
+/// Gives a distribution the wanted power: by scaling, or where it has less than half of it, by
+/// adding a constant.
 fn with_power(mut values: Vec<DVec3>, shares: &[f64], wanted: DVec3) -> Vec<DVec3> {
     let power = power(&values, shares);
     for value in &mut values {

@@ -25,7 +25,7 @@ pub struct Relief {
 }
 
 impl Relief {
-    /// None where nothing with relief is drawn as such.
+    /// None where no relief is drawn by rays or its response.
     ///
     /// # Errors
     /// A device without the memory.

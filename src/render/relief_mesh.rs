@@ -1,4 +1,5 @@
-//! What the relief pass draws: prisms over the triangles with relief, their height maps, factors and light.
+//! What the relief pass draws: prisms over the triangles with relief, their height maps, factors
+//! and light.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -174,7 +175,7 @@ impl<'a> Incident<'a> {
             _ => (arriving, None),
         };
         Self {
-            // Light that has bounced inside the relief is indirect, wherever it came from.
+            // Light that has bounced inside the relief counts as indirect.
             inside: (lighting.part != Light::Direct).then_some(all),
             arriving,
             clustered,

@@ -1,4 +1,5 @@
-//! What of a scene's relief and its light does not depend on the view: made once for a series of pictures.
+//! The part of a scene's relief and its light that does not depend on the view; made once for a
+//! series of pictures.
 
 use std::sync::Arc;
 
@@ -16,17 +17,17 @@ use crate::passes::shade::Shade;
 use crate::scene::Scene;
 use crate::vk::Device;
 
-/// What the factors may leave out of the light, see [`Factors::error`].
+/// Largest error of the factors, see [`Factors::error`].
 const FACTOR_ERROR: f64 = 0.01;
 
-/// The relief of a scene, seen from nowhere yet.
+/// The relief of a scene, without a view.
 pub struct ReliefScene {
     pub pass: Arc<passes::relief::Relief>,
     pub directions: Directions,
     pub tiles: Vec<Tile>,
-    /// `[triangle]`, its place in `tiles`; `u32::MAX` of those without.
+    /// Index into `tiles`, `[triangle]`; `u32::MAX` for triangles without.
     pub surface_of: Vec<u32>,
-    /// `[surface]`, as `tiles`.
+    /// `[surface]`, in the order of `tiles`.
     pub factors: Vec<Factors>,
     pub surfaces: Surfaces,
     pub vertices: MesoVertices,
@@ -36,7 +37,7 @@ pub struct ReliefScene {
 }
 
 impl ReliefScene {
-    /// None where nothing with relief is drawn as such.
+    /// None where no relief is drawn by rays or its response.
     ///
     /// # Errors
     /// As [`super::render`].

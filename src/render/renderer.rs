@@ -152,10 +152,10 @@ impl<'a> Renderer<'a> {
         }
     }
 
-    /// As [`Self::picture`], in tiles of `tile` pixels a side. `go_on` is asked before each tile; when
-    /// it returns false, drawing stops and the result is None. The second value is the distance of
-    /// each pixel's middle along the view, `[row][column]`, internal units, 0 where nothing is; it is
-    /// empty for a renderer without depths.
+    /// As [`Self::picture`], in tiles of `tile` pixels a side. `go_on` is asked before each tile;
+    /// when it returns false, drawing stops and the result is None. The second value is the
+    /// distance of each pixel's middle along the view, `[row][column]`, internal units, 0 where
+    /// nothing is; it is empty for a renderer without depths.
     ///
     /// # Errors
     /// A device that fails.
