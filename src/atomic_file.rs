@@ -1,4 +1,5 @@
-//! Files that are either whole or not there: written beside their place, synced, then renamed into it.
+//! Files that are written completely or not at all: written beside their path, synced, then renamed
+//! to it.
 
 use std::collections::hash_map::RandomState;
 use std::fs::{self, File, OpenOptions};
@@ -9,9 +10,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::{Error, Result};
 
-/// Writes `path` through `fill`, so that a crash, a full disk or an error from `fill` leaves what stood there before.
+/// Writes `path` through `fill`, so that a crash, a full disk or an error from `fill` leaves the
+/// previous file.
 ///
-/// What is no regular file, such as a pipe or `/dev/null`, is written in place: renaming over it would destroy it.
+/// A path that is not a regular file, such as a pipe or `/dev/null`, is written in place: renaming
+/// over it would destroy it.
 pub fn write_atomically(
     path: &Path,
     fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,

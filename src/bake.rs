@@ -1,16 +1,21 @@
-//! From a scene to a solution: the library's main road.
+//! From a scene to a solution: the library's main entry.
 
 use std::sync::Arc;
 
 use crate::elements::Elements;
 use crate::error::Result;
-use crate::meso::Relief;
+use crate::meso::{self, HeightField, Relief};
+use crate::passes::relief_visibility::ReliefVisibility;
 use crate::scene::Scene;
 use crate::solution::Solution;
 use crate::solver::{self, Settings, Solver, Update, Visibility};
 use crate::vk::Device;
 
-/// Bakes a scene. `go_on` sees every step and may stop it; what has been solved by then is a valid solution.
+/// Bakes a scene. `go_on` is called at every step; when it returns false, the bake stops, and what
+/// has been solved by then is a valid solution.
+///
+/// # Errors
+/// Settings out of range; a scene that does not fit the device; a device that fails.
 pub fn bake(
     device: &Arc<Device>,
     scene: &Scene,
@@ -20,7 +25,8 @@ pub fn bake(
     solution(scene, &solve(device, scene, settings, None, go_on)?)
 }
 
-/// The solver of [`bake`] when it is done. With `kept`, what was drawn when the scene was lit otherwise is not drawn again.
+/// As [`bake`], and returns the solver. With `kept`, hemicubes that were drawn under other light
+/// are not drawn again.
 ///
 /// # Errors
 /// `kept` is of another scene or other settings.
@@ -53,7 +59,7 @@ pub fn solve_on(
     Ok(solver)
 }
 
-/// What a solver has found of a scene.
+/// The solution that a solver of `scene` has reached.
 pub fn solution(scene: &Scene, solver: &Solver) -> Result<Solution> {
     let mut report = solver.report().clone();
     report.skipped.degenerate_triangles = scene.dropped_degenerate as u64;
@@ -68,7 +74,22 @@ pub fn solution(scene: &Scene, solver: &Solver) -> Result<Solution> {
 /// The elements of a scene, with their relief where `settings` want it.
 pub fn elements(device: &Arc<Device>, scene: &Scene, settings: &Settings) -> Result<Elements> {
     let mut elements = Elements::new(scene);
-    let relief = Relief::new(device, scene, &elements, &settings.relief)?;
+    let relief = Relief::new(scene, &elements, &settings.relief, &mut marcher(device))?;
     elements.set_relief(relief);
     Ok(elements)
+}
+
+/// Marches height fields on a device. The pass is made at the first call, so that a run that finds
+/// all visibility in its cache makes none.
+pub(crate) fn marcher(
+    device: &Arc<Device>,
+) -> impl FnMut(&HeightField) -> Result<meso::Visibility> {
+    let mut pass = None;
+    move |field| {
+        let pass = match &mut pass {
+            Some(pass) => pass,
+            none => none.insert(ReliefVisibility::new(device)?),
+        };
+        pass.run(field)
+    }
 }

@@ -1,4 +1,5 @@
-//! Bakes kept on disk by what they were made from, so that a scene that is drawn again need not be solved again.
+//! Bakes kept on disk, keyed by their input, so that a scene that is drawn again is not solved
+//! again.
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -11,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::solution::{Bake, Origin, Solution, VERSION};
 use crate::solver::{Settings, StopReason};
 
-/// Bakes that are kept, and their bytes in all; what was used longest ago goes first.
+/// Most bakes that are kept, and most bytes in all; the least recently used are deleted first.
 pub const MOST_BAKES: usize = 16;
 pub const MOST_BYTES: u64 = 1 << 30;
 
@@ -22,15 +23,15 @@ pub struct CachedBake {
 }
 
 impl CachedBake {
-    /// The place of the bake of a scene, whose [`crate::scene::Scene::hash`] is given, by these settings. `maker` names the
-    /// program and the device: another one's bake is not taken.
+    /// The place of the bake of a scene with this [`crate::scene::Scene::hash`] by these settings.
+    /// `maker` identifies the program and the device: the bake of another one is not used.
     pub fn new(folder: &Path, scene_hash: &str, settings: &Settings, maker: &str) -> Self {
         let Settings {
             estimator,
             hemicube,
             emitter_hemicube: _,
             residual,
-            // A bake that it stopped is not kept.
+            // A bake that this stopped is not kept.
             budget: _,
             shots,
             seed,
@@ -38,7 +39,7 @@ impl CachedBake {
             culling,
             merging,
             batch,
-            // It changes nothing.
+            // This does not affect the result.
             list_room: _,
             visibility_memory,
             coupling_memory,
@@ -60,7 +61,7 @@ impl CachedBake {
         }
     }
 
-    /// What is kept there; none if there is nothing.
+    /// The kept bake; None if there is none.
     ///
     /// # Errors
     /// A file that cannot be read or is damaged: the scene is to be baked again.
@@ -72,13 +73,13 @@ impl CachedBake {
         if bake.origin.hash != self.hash {
             return Err(Error::file(&self.path, "a bake of another scene"));
         }
-        // Used just now; where that cannot be written down, it only goes earlier.
+        // Marks the bake as just used; if that fails, it is only deleted earlier.
         let _ = File::open(&self.path).and_then(|file| file.set_modified(SystemTime::now()));
         Ok(Some(bake))
     }
 
-    /// Keeps a solution and lets go of what is beyond [`MOST_BAKES`] and [`MOST_BYTES`]. One that was stopped by the clock or by
-    /// Ctrl-C is not kept; whether it was is returned.
+    /// Keeps a solution and deletes bakes beyond [`MOST_BAKES`] and [`MOST_BYTES`]. A solution that
+    /// was stopped by the clock or by Ctrl-C is not kept. Returns whether it was kept.
     ///
     /// # Errors
     /// A folder or file that cannot be written.
@@ -102,8 +103,8 @@ impl CachedBake {
     }
 }
 
-/// Deletes bakes of the cache, least lately used first, until there are no more than so many, nor more bytes; `newest` stays
-/// in any case. What cannot be looked at or deleted is left: another process may be at the same.
+/// Deletes bakes of the cache, least recently used first, until both limits hold; `newest` always
+/// stays. Files that cannot be read or deleted are left: another process may be doing the same.
 fn trim(folder: &Path, newest: &Path, most: usize, most_bytes: u64) {
     let Ok(entries) = fs::read_dir(folder) else {
         return;

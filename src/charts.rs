@@ -1,4 +1,5 @@
-//! The mesh's connections: neighbours over edges, closed parts, and charts (connected, nearly coplanar regions).
+//! The mesh's connections: neighbours over edges, closed parts, and charts (connected, nearly
+//! coplanar regions).
 
 use std::collections::VecDeque;
 
@@ -6,24 +7,25 @@ use glam::DVec3;
 
 use crate::elements::Elements;
 
-/// Which elements touch over an edge, and which parts they make up.
+/// Elements that touch over an edge, and the connected parts that they form.
 pub struct Connections {
-    /// Per element and edge (corner i to corner i + 1): the element on the other side, if there is exactly one and it runs
-    /// the edge the other way.
+    /// Per element and edge (corner i to corner i + 1): the element on the other side, if there is
+    /// exactly one and it has the edge in the opposite direction.
     pub neighbours: Vec<[Option<u32>; 3]>,
     /// Connected part of each element.
     pub component: Vec<u32>,
-    /// Per part: every edge has its partner, and the volume enclosed is positive (all normals outward).
+    /// Per part: every edge has a partner, and the enclosed volume is positive (all normals
+    /// outward).
     pub closed: Vec<bool>,
-    /// One part is closed about all others, its normals inward, and all others are closed and stand apart: whatever is sent
-    /// arrives.
+    /// One part encloses all others, with its normals inward, and all others are closed and
+    /// disjoint: all light that is sent arrives.
     pub enclosed: bool,
 }
 
 impl Connections {
     pub fn new(elements: &Elements) -> Self {
         let count = elements.len();
-        // (low vertex, high vertex, element, edge): equal vertices stand together once sorted.
+        // (low vertex, high vertex, element, edge): equal edges are adjacent once sorted.
         let mut edges: Vec<(u32, u32, u32, u8)> = Vec::with_capacity(3 * count);
         for (e, corners) in elements.corners.iter().enumerate() {
             for i in 0..3 {
@@ -106,8 +108,9 @@ impl Connections {
     }
 }
 
-/// Whether the boxes about all other parts lie within that of the room and clear of one another. Where bodies cross, elements
-/// count as lit that are half within another, and what arrives is more than was sent.
+/// Whether the boxes about all other parts lie within that of the room and do not overlap. Where
+/// bodies intersect, elements that are half inside another count as fully lit, and more light
+/// arrives than was sent.
 fn apart_within(elements: &Elements, component: &[u32], count: usize, room: usize) -> bool {
     let mut boxes = vec![(DVec3::INFINITY, DVec3::NEG_INFINITY); count];
     for (e, &c) in component.iter().enumerate() {
@@ -130,9 +133,9 @@ fn apart_within(elements: &Elements, component: &[u32], count: usize, room: usiz
 /// Largest angle of a member's normal to its chart's first normal.
 const CHART_ANGLE_COSINE: f64 = 0.93969; // 20°
 
-/// Charts, each a list of elements: grown over edges from the first free element in `order` while the normals stay near
-/// the first one's. Elements that emit never share a chart with those that do not, nor with another
-/// material; nor do elements with a relief with those without.
+/// Charts, each a list of elements: grown over edges from the first free element in `order` while
+/// the normals stay near the first one's. Elements that emit never share a chart with those that do
+/// not, nor with another material; nor do elements with a relief with those without.
 pub fn charts(elements: &Elements, connections: &Connections, order: &[u32]) -> Vec<Vec<u32>> {
     let mut taken = vec![false; elements.len()];
     let mut charts = Vec::new();
@@ -169,7 +172,8 @@ pub fn charts(elements: &Elements, connections: &Connections, order: &[u32]) -> 
     charts
 }
 
-/// Elements along a Morton curve through their centroids: near in space is near in the list, whatever the input's order.
+/// Elements along a Morton curve through their centroids: near in space is near in the list, for
+/// any order of the input.
 pub fn morton_order(elements: &Elements) -> Vec<u32> {
     let spread = |v: f64| {
         // 21 bits of a coordinate in −1..1, two zeros between each.

@@ -1,6 +1,7 @@
 //! The outline of a group of elements: closed loops of corners, straight runs joined.
 //!
-//! By Lambert's formula an inner edge, run both ways, adds nothing to a group's form factor: its outline is enough.
+//! By Lambert's formula an inner edge is traversed in both directions and adds nothing to a group's
+//! form factor: the outline suffices.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +14,7 @@ pub type Loop = Vec<DVec3>;
 
 /// Loops about the elements of a range, counter-clockwise seen from the front, holes clockwise.
 pub fn contour(elements: &Elements, range: std::ops::Range<usize>) -> Vec<Loop> {
-    // Directed edges that no partner cancels, with how often each stands.
+    // Directed edges that no partner cancels, with their multiplicity.
     let mut edges: BTreeMap<(u32, u32), u32> = BTreeMap::new();
     for e in range {
         let corners = elements.corners[e];
@@ -32,7 +33,7 @@ pub fn contour(elements: &Elements, range: std::ops::Range<usize>) -> Vec<Loop> 
     while let Some((&(start, _), _)) = edges.first_key_value() {
         let mut vertices = Vec::new();
         let mut at = start;
-        // As many edges leave a vertex as enter it, so that the walk comes home.
+        // As many edges leave a vertex as enter it, so that every walk closes.
         while let Some((&edge, _)) = edges.range((at, 0)..=(at, u32::MAX)).next() {
             match edges.get_mut(&edge) {
                 Some(n) if *n > 1 => *n -= 1,
@@ -55,7 +56,7 @@ pub fn contour(elements: &Elements, range: std::ops::Range<usize>) -> Vec<Loop> 
     loops
 }
 
-/// Leaves out the corners at which a loop goes straight on.
+/// Removes the corners at which a loop is straight.
 fn straightened(corners: &[DVec3]) -> Loop {
     let mut out: Vec<DVec3> = corners.to_vec();
     let mut i = 0;

@@ -1,4 +1,4 @@
-//! Which corners of a mesh's triangles share a vertex of a smooth surface, and with what weight each counts there.
+//! Corners of a mesh's triangles that share a vertex of a smooth surface, and their weights there.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -8,11 +8,11 @@ use crate::scene::Scene;
 /// Cosine of 35°, the greatest angle between normals that counts as one smooth surface.
 const CREASE_COS: f64 = 0.819_152_044_288_992;
 
-/// Most elements about a vertex that are compared with one another, so that a fan of 100,000 triangles does not cost 10¹⁰
-/// steps. About a vertex of more, every element stands alone.
+/// Most elements about a vertex that are compared with one another, so that a fan of 100,000
+/// triangles does not cost 10¹⁰ steps. About a vertex with more, no elements are joined.
 const MOST_AROUND: usize = 512;
 
-/// The corners about each vertex, ascending, so that a sum over them has one order.
+/// The corners about each vertex, ascending, so that sums over them have a fixed order.
 pub struct Corners {
     /// `[triangle]`, unit.
     pub normals: Vec<DVec3>,
@@ -58,8 +58,9 @@ impl Corners {
         }
     }
 
-    /// The triangles about a vertex of triangle `e` that continue its surface there, itself among them, each with its
-    /// angle at the vertex: weighted so, a fan's diagonals do not matter.
+    /// The triangles about a vertex of triangle `e` that continue its surface there, itself among
+    /// them, each with its angle at the vertex: with these weights the diagonals of a fan do not
+    /// matter.
     pub fn smooth(&self, e: usize, vertex: u32) -> impl Iterator<Item = (usize, f64)> {
         let [from, to] = [vertex, vertex + 1].map(|v| self.first[v as usize] as usize);
         let crowded = to - from > MOST_AROUND;

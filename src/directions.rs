@@ -1,8 +1,9 @@
-//! Directions ↔ slots: the hemisphere about z in K cells of equal solid angle. Pure mathematics in f64;
-//! `shaders/shared/directions.glsl` is the same in f32.
+//! Directions ↔ slots: the hemisphere about z in K cells of equal solid angle. Pure mathematics in
+//! f64; `shaders/shared/directions.glsl` is the same in f32.
 //!
-//! The square −1..1 × −1..1 is laid over the hemisphere by the concentric map (Shirley and Chiu 1997), which keeps areas:
-//! its cells are the slots. The K of the paper are 4 × 4, 4 × 8 and 8 × 8. Slot index: `row · columns + column`.
+//! The square −1..1 × −1..1 is laid over the hemisphere by the concentric map (Shirley and Chiu
+//! 1997), which preserves areas: its cells are the slots. The K of the paper are 4 × 4, 4 × 8 and 8
+//! × 8. Slot index: `row · columns + column`.
 
 use std::f64::consts::{FRAC_PI_4, PI};
 
@@ -10,14 +11,15 @@ use glam::{DVec2, DVec3};
 
 use crate::error::{Error, Result};
 
-/// How the hemisphere is cut into slots.
+/// The division of the hemisphere into slots.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Directions {
     pub columns: u32,
     pub rows: u32,
 }
 
-/// Cells along a side of the square for integrals over slots: every K's cells are whole numbers of them.
+/// Cells along a side of the square for integrals over slots: the cells of every K are unions of
+/// whole ones.
 pub const FINE: u32 = 32;
 
 impl Directions {
@@ -47,7 +49,7 @@ impl Directions {
         (self.columns * self.rows) as usize
     }
 
-    /// The slot of a direction (unit, z up); one below the horizon counts as on it.
+    /// The slot of a direction (unit, z up); a direction below the horizon counts as on it.
     pub fn slot_of(&self, direction: DVec3) -> usize {
         let [column, row] = self.cell_coordinates(direction).to_array();
         let cell = |at: f64, size: u32| (at.max(0.0) as u32).min(size - 1);
@@ -63,8 +65,8 @@ impl Directions {
         ))
     }
 
-    /// The four slots about a direction with their weights, bilinear between the cells' centres and held at the border of
-    /// the square; the weights sum to 1, and one slot may occur twice.
+    /// The four slots about a direction with their weights, bilinear between the cells' centres and
+    /// clamped at the border of the square; the weights sum to 1, and one slot may occur twice.
     pub fn bilinear(&self, direction: DVec3) -> [(usize, f64); 4] {
         let at = self.cell_coordinates(direction) - 0.5;
         let split = |at: f64, size: u32| {
@@ -82,7 +84,7 @@ impl Directions {
         ]
     }
 
-    /// The fine cells with the slot that each lies in.
+    /// The fine cells with their slots.
     pub fn fine(&self) -> impl Iterator<Item = (FineCell, usize)> {
         let each = *self;
         FineCell::all().map(move |cell| {
@@ -92,9 +94,10 @@ impl Directions {
         })
     }
 
-    /// Irradiance of a facet with unit normal `n` from the vector moments of the slots, `[slot]`: n · m_k of a slot above the
-    /// facet's horizon. Of one that the horizon crosses, the share above it of light spread evenly over the slot, since
-    /// the positive part of n · m_k alone loses up to 2.3 % of a uniform sky at K = 32 and 45°.
+    /// Irradiance of a facet with unit normal `n` from the vector moments of the slots, `[slot]`: n
+    /// · m_k of a slot above the facet's horizon. Of one that the horizon crosses, the share above
+    /// it of light spread evenly over the slot, since the positive part of n · m_k alone loses up
+    /// to 2.3 % of a uniform sky at K = 32 and 45°.
     pub fn irradiance(&self, moments: &[DVec3], n: DVec3) -> f64 {
         let mut above = vec![(DVec3::ZERO, 0.0, f64::INFINITY); self.count()];
         for (cell, slot) in self.fine() {
@@ -170,7 +173,7 @@ pub fn from_square(square: DVec2) -> DVec3 {
     DVec3::new(flat * angle.cos(), flat * angle.sin(), 1.0 - r * r)
 }
 
-/// From the hemisphere to the square; a direction below the horizon is taken to the nearest on it.
+/// From the hemisphere to the square; a direction below the horizon is moved to the nearest on it.
 pub fn to_square(direction: DVec3) -> DVec2 {
     let r = (1.0 - direction.z.clamp(0.0, 1.0)).sqrt();
     let angle = direction.y.atan2(direction.x);

@@ -1,8 +1,9 @@
-//! Elements: the scene's triangles with all that the transport needs to know of them.
+//! Elements: the scene's triangles with all data that transport needs.
 //!
-//! Inside, lengths are in *internal units*: the scene moved to its middle and divided by a power of two, so that every
-//! coordinate lies in −1..1. A scene scaled by a power of two is the same scene to the bit, and f32 keeps the shape of one
-//! far from the origin. Radiosity does not depend on the unit.
+//! Inside, lengths are in *internal units*: the scene moved to its middle and divided by a power of
+//! two, so that every coordinate lies in −1..1. A scene scaled by a power of two is the same scene
+//! to the bit, and f32 keeps the shape of one far from the origin. Radiosity does not depend on the
+//! unit.
 
 use std::f64::consts::PI;
 
@@ -12,19 +13,21 @@ use rayon::prelude::*;
 use crate::meso::Relief;
 use crate::scene::Scene;
 
-/// Steps of an internal coordinate in a unit: finer than f32, coarser than what an offset of 10⁶ units leaves of f64, so
-/// that a scene far away is ordered and grouped as the same scene at the origin is.
+/// Steps of an internal coordinate in a unit: finer than f32, and coarser than the precision of f64
+/// at an offset of 10⁶ units, so that a scene far from the origin is ordered and grouped as the
+/// same scene at the origin.
 const STEPS: f64 = (1u64 << 26) as f64;
 
 fn snapped(v: DVec3) -> DVec3 {
     (v * STEPS).round() / STEPS
 }
 
-/// Height of a triangle in steps below which snapping may turn its normal by more than 10⁻³, or leave it none.
+/// Height of a triangle in steps below which snapping may rotate its normal by more than 10⁻³ or
+/// make it zero.
 const LEAST_STEPS: f64 = 1024.0;
 
-/// Normal times twice the area of a triangle whose corners are snapped; of one that is too small or too thin for the steps,
-/// that of its `own` corners.
+/// Normal times twice the area of a triangle with snapped corners; of its `own` corners if it is
+/// too small or too thin for the steps.
 fn cross(snapped: [DVec3; 3], own: impl Fn() -> [DVec3; 3]) -> DVec3 {
     let of = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a);
     let [a, b, c] = snapped;
@@ -36,7 +39,8 @@ fn cross(snapped: [DVec3; 3], own: impl Fn() -> [DVec3; 3]) -> DVec3 {
     }
 }
 
-/// Structure of arrays, `[element]`, in internal order (see [`Elements::permute`]) and internal units.
+/// Structure of arrays, `[element]`, in internal order (see [`Elements::permute`]) and internal
+/// units.
 #[derive(Debug, Clone, Default)]
 pub struct Elements {
     /// Scene position of the internal origin.
@@ -54,9 +58,9 @@ pub struct Elements {
     /// Radiosity from emission πLe, W·m⁻², RGB.
     pub emitted: Vec<Vec3>,
     pub material: Vec<u32>,
-    /// Place of the element in the scene's list of triangles.
+    /// Index of the element in the scene's list of triangles.
     pub input_index: Vec<u32>,
-    /// The relief of those that have one; none where no element has.
+    /// The relief of the elements that have one; None where no element has.
     pub relief: Option<Relief>,
 }
 
@@ -112,7 +116,8 @@ impl Elements {
         self.corners.len()
     }
 
-    /// Gives the elements of each material another emitted radiosity; returns what they had, `[material]`.
+    /// Sets the emitted radiosity of the elements of each material, `[material]`, W·m⁻², RGB;
+    /// returns the values before.
     pub fn emitted_by_material(&mut self, emitted: &[Vec3]) -> Vec<Vec3> {
         let mut before = vec![Vec3::ZERO; emitted.len()];
         for (mine, &material) in self.emitted.iter_mut().zip(&self.material) {
@@ -121,7 +126,7 @@ impl Elements {
         before
     }
 
-    /// Takes the emission of a scene that differs in nothing else from that of these elements.
+    /// Sets the emission to that of `scene`, which is otherwise the scene of these elements.
     pub fn set_emission(&mut self, scene: &Scene) {
         for (e, emitted) in self.emitted.iter_mut().enumerate() {
             let material = &scene.materials[self.material[e] as usize];
@@ -141,8 +146,8 @@ impl Elements {
         self.corners[element].map(|v| self.vertices[v as usize])
     }
 
-    /// Puts the elements in the order given, `order[new] = old`: neighbours together, so that sources and meshlets are
-    /// ranges.
+    /// Reorders the elements by `order[new] = old`: neighbours together, so that sources and
+    /// meshlets are ranges.
     pub fn permute(&mut self, order: &[u32]) {
         fn apply<T: Copy>(values: &mut Vec<T>, order: &[u32]) {
             *values = order.iter().map(|&i| values[i as usize]).collect();
@@ -160,7 +165,7 @@ impl Elements {
         }
     }
 
-    /// Values by internal order brought to the order of the input.
+    /// Values in internal order, reordered to the order of the input.
     pub fn to_input_order<T: Copy + Default>(&self, values: &[T]) -> Vec<T> {
         let mut out = vec![T::default(); values.len()];
         for (value, &input) in values.iter().zip(&self.input_index) {
@@ -178,8 +183,8 @@ impl Elements {
             .fold(0.0, f64::max)
     }
 
-    /// Largest reflectance of any element and colour; of an element with a relief, the largest share of the light from
-    /// any direction that comes back.
+    /// Largest reflectance of any element and colour; of an element with a relief, the largest
+    /// share of light from any direction that is reflected.
     pub fn max_reflectance(&self) -> f32 {
         let plain = (0..self.len())
             .filter(|&e| !self.is_meso(e))
@@ -216,7 +221,8 @@ impl Elements {
             .is_some_and(|relief| relief.is_meso(element))
     }
 
-    /// Gives the elements their relief. What they emit is then the mean of what leaves the tile.
+    /// Sets the elements' relief. Their emission becomes the mean of the light that leaves the
+    /// tile.
     pub fn set_relief(&mut self, relief: Option<Relief>) {
         if let Some(relief) = &relief {
             for (e, emitted) in self.emitted.iter_mut().enumerate() {

@@ -1,12 +1,13 @@
-//! The one error type: everything that a file, a scene, a device or a person can cause.
+//! The one error type: everything that a file, a scene, a device or the user can cause.
 
 use std::path::{Path, PathBuf};
 
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// What a person can cause and mend. The text is one line and names the file, the line or the material.
+/// Errors that the user can cause and fix. The text is one line and names the file, the line or the
+/// material.
 ///
-/// What only a bug can cause is an `assert!` with a sentence instead.
+/// Errors that only a bug can cause are an `assert!` with a sentence.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     #[error("{}: cannot be read: {source}", path.display())]
@@ -34,16 +35,16 @@ pub enum Error {
         material: String,
         what: String,
     },
-    /// A scene that was read well but cannot be baked or drawn.
+    /// A scene that was read correctly but cannot be baked or drawn.
     #[error("scene {scene}: {what}")]
     Scene { scene: String, what: String },
     /// A name or value on the command line.
     #[error("{0}")]
     Usage(String),
-    /// No Vulkan device fits, or the one asked for is not there.
+    /// No Vulkan device is suitable, or the requested one does not exist.
     #[error("{0}")]
     Device(String),
-    /// There is no window to be had.
+    /// No window can be opened.
     #[error("{0}; `mesolux render` draws a picture without a window")]
     Display(String),
     /// A Vulkan call failed.

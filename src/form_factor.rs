@@ -1,12 +1,12 @@
-//! Lambert's formula: form factor from a point to a polygon, clipped to the receiver's horizon. Pure mathematics in f64;
-//! `shaders/shared/lambert.glsl` is the same in f32.
+//! Lambert's formula: form factor from a point to a polygon, clipped to the receiver's horizon.
+//! Pure mathematics in f64; `shaders/shared/lambert.glsl` is the same in f32.
 
 use std::f64::consts::TAU;
 
 use glam::DVec3;
 
-/// Form factor from `p` with unit normal `n` to a closed contour, counter-clockwise seen from its front:
-/// F = 1/(2π) Σ θ_e (n·γ_e) over its edges. Positive where `p` sees the front.
+/// Form factor from `p` with unit normal `n` to a closed contour, counter-clockwise seen from its
+/// front: F = 1/(2π) Σ θ_e (n·γ_e) over its edges. Positive where `p` sees the front.
 pub fn to_polygon(p: DVec3, n: DVec3, contour: &[DVec3]) -> f64 {
     let clipped = clip_to_horizon(p, n, contour);
     let mut sum = 0.0;
@@ -42,7 +42,7 @@ fn clip_to_horizon(p: DVec3, n: DVec3, contour: &[DVec3]) -> Vec<DVec3> {
 mod tests {
     use super::*;
 
-    /// A polygon in the plane z = 1 or beside, wound so that the origin sees its front.
+    /// A polygon in the plane z = 1 or beside it, wound so that the origin sees its front.
     fn seen(corners: &[[f64; 3]]) -> Vec<DVec3> {
         corners
             .iter()
@@ -68,7 +68,7 @@ mod tests {
             f(&[[1., 0., 1.], [0., 1., 1.], [-0.5, -0.5, 1.]]),
             0.21887541274623826
         ));
-        // A wall that dips below the horizon gives what its upper half gives.
+        // A wall that reaches below the horizon has the form factor of its upper half.
         let wall = |low: f64| {
             f(&[
                 [1., -0.5, low],

@@ -1,7 +1,7 @@
 //! The hemicube: five faces, their pixels and exact delta form factors. Pure mathematics in f64.
 //!
-//! A hemicube of N pixels a side is a column of N × 3 N pixels: the top (N × N), then the upper halves of +x, −x, +y, −y
-//! (N × N/2 each), as `shaders/shared/hemicube.glsl` has it.
+//! A hemicube of N pixels a side is a column of N × 3 N pixels: the top (N × N), then the upper
+//! halves of +x, −x, +y, −y (N × N/2 each), as in `shaders/shared/hemicube.glsl`.
 
 use std::f64::consts::PI;
 
@@ -9,7 +9,7 @@ use glam::DVec3;
 
 use crate::constants::FIXED_POINT_BITS;
 
-/// A place in a hemicube's column of pixels.
+/// A pixel in a hemicube's column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Pixel {
     pub column: u32,
@@ -29,7 +29,8 @@ pub fn face_rectangle(face: u32, n: u32) -> [u32; 4] {
     }
 }
 
-/// The pixel that a direction in the source's frame falls in; directions below the horizon take the lowest row.
+/// The pixel that a direction in the source's frame falls in; directions below the horizon fall in
+/// the lowest row.
 pub fn pixel_of(direction: DVec3, n: u32) -> Pixel {
     let a = direction.abs();
     let z = direction.z.max(0.0);
@@ -53,7 +54,8 @@ pub fn pixel_of(direction: DVec3, n: u32) -> Pixel {
     }
 }
 
-/// The face a pixel lies on, and its corners there: (u0, u1, v0, v1), u in −1..1, v in −1..1 on the top and 0..1 on a side.
+/// The face a pixel lies on, and its corners there: (u0, u1, v0, v1), u in −1..1, v in −1..1 on the
+/// top and 0..1 on a side.
 fn face_of(pixel: Pixel, n: u32) -> (u32, [f64; 4]) {
     let step = 2.0 / f64::from(n);
     let u0 = f64::from(pixel.column) * step - 1.0;
@@ -67,7 +69,8 @@ fn face_of(pixel: Pixel, n: u32) -> (u32, [f64; 4]) {
     (face, [u0, u0 + step, v0, v0 + step])
 }
 
-/// The direction through a pixel's centre, in the source's frame, not normalised: its largest component is 1.
+/// The direction through a pixel's centre, in the source's frame, not normalised: its largest
+/// component is 1.
 pub fn direction_of(pixel: Pixel, n: u32) -> DVec3 {
     let (face, [u0, u1, v0, v1]) = face_of(pixel, n);
     let (u, v) = (0.5 * (u0 + u1), 0.5 * (v0 + v1));
@@ -80,8 +83,9 @@ pub fn direction_of(pixel: Pixel, n: u32) -> DVec3 {
     }
 }
 
-/// Exact form factor ΔF of a pixel from the hemicube's centre, whose normal is z: the difference of the antiderivative
-/// at the pixel's corners (Lambert; Cohen and Greenberg 1985 give the integrand). Over all pixels the sum is 1.
+/// Exact form factor ΔF of a pixel from the hemicube's centre, whose normal is z: the difference of
+/// the antiderivative at the pixel's corners (Lambert; Cohen and Greenberg 1985 give the
+/// integrand). Over all pixels the sum is 1.
 pub fn delta_form_factor(pixel: Pixel, n: u32) -> f64 {
     let (face, corners) = face_of(pixel, n);
     let top = |x: f64, y: f64| {
@@ -111,8 +115,8 @@ fn difference([u0, u1, v0, v1]: [f64; 4], f: impl Fn(f64, f64) -> f64) -> f64 {
     f(u1, v1) - f(u0, v1) - f(u1, v0) + f(u0, v0)
 }
 
-/// Every pixel's [`delta_form_factor`], then every pixel's [`solid_angle_share`], `[2][row][column]`, in fixed point of
-/// [`FIXED_POINT_BITS`].
+/// Every pixel's [`delta_form_factor`], then every pixel's [`solid_angle_share`],
+/// `[2][row][column]`, in fixed point of [`FIXED_POINT_BITS`].
 pub fn fixed_point_tables(n: u32) -> Vec<u64> {
     let unit = (1u64 << FIXED_POINT_BITS) as f64;
     let pixels = || (0..3 * n).flat_map(move |row| (0..n).map(move |column| Pixel { column, row }));
@@ -156,7 +160,8 @@ mod tests {
     #[test]
     fn pixels_equal_the_reference_values() {
         let at = |column, row| delta_form_factor(Pixel { column, row }, 64);
-        // shared reference: N = 64, computed two independent ways in f64; the difference of corners loses six digits.
+        // shared reference: N = 64, computed two independent ways in f64; the difference of corners
+        // loses six digits.
         let close = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-10;
         assert!(close(at(32, 32), 0.00031044529885447997));
         assert!(close(at(0, 0), 3.60161392350955e-05));

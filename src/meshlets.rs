@@ -15,17 +15,17 @@ pub struct Meshlet {
     pub radius: f64,
     /// Axis of the cone of normals.
     pub axis: DVec3,
-    /// Sine of the cone's half angle; 2 where the normals leave no side that shows only backs.
+    /// Sine of the cone's half angle; 2 where no direction sees only backs.
     pub cutoff: f64,
     pub first: u32,
     pub count: u32,
     pub component: u32,
 }
 
-/// A new chart starts a new meshlet once this many triangles are in the last one.
+/// A new chart starts a new meshlet if the last one has at least this many triangles.
 const ENOUGH: u32 = MESHLET_TRIANGLES / 3;
 
-/// Cuts the occluders, in order, into meshlets of one part each. `chart` is that of each element.
+/// Cuts the occluders, in order, into meshlets of one connected part each. `chart` is `[element]`.
 pub fn build(
     elements: &Elements,
     connections: &Connections,
@@ -74,7 +74,7 @@ fn bound(
     let cosine = normals().map(|n| n.dot(axis)).fold(1.0, f64::min);
     Meshlet {
         centre,
-        // A little more than it is, for the rounding to f32.
+        // Enlarged slightly for the rounding to f32.
         radius: corners().map(|v| v.distance(centre)).fold(0.0, f64::max) * (1.0 + 1e-5) + 1e-7,
         axis,
         cutoff: if cosine > 0.1 {

@@ -1,9 +1,10 @@
-//! Presets of a bake, from coarse and quick to fine and slow; `mesolux bench pareto` measures error against time.
+//! Presets of a bake's settings, from coarse and quick to fine and slow; `mesolux bench pareto`
+//! measures error against time.
 
 use crate::solver::Settings;
 use crate::sources::Grouping;
 
-/// How good a bake is to be.
+/// Quality of a bake.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Quality {
     Draft,
@@ -48,7 +49,7 @@ pub fn scaled(scale: f64) -> Grouping {
 mod tests {
     use super::*;
 
-    /// Who asks for nothing gets `normal`; a better preset is never coarser.
+    /// The default settings are `normal`; a better preset is never coarser.
     #[test]
     fn presets_are_in_order_about_the_default() {
         let plain = Settings::default();

@@ -91,7 +91,11 @@ fn counts(report: &Report) -> String {
         report.emitters_by_rays,
         report.triangles_drawn,
     );
-    let kept = (report.kept_sources, report.drawn_again, report.gathered_rows);
+    let kept = (
+        report.kept_sources,
+        report.drawn_again,
+        report.gathered_rows,
+    );
     format!("{stopped:?} {drawn:?} {kept:?} {:?}", report.skipped)
 }
 

@@ -214,7 +214,10 @@ fn stops_and_goes_on_in_either_loop() {
         let light = solver.light().expect("the light comes back").irradiance;
         let light = solver.elements.to_input_order(&light);
         // The sums have another order.
-        let apart = light.iter().zip(&whole.irradiance).map(|(a, b)| (a - b).abs().max_element());
+        let apart = light
+            .iter()
+            .zip(&whole.irradiance)
+            .map(|(a, b)| (a - b).abs().max_element());
         let largest = light.iter().map(|e| e.max_element()).fold(0.0, f32::max);
         assert!(apart.fold(0.0, f32::max) <= 1e-5 * largest);
     }

@@ -6,9 +6,8 @@ use common::{Build, assert_silent, device};
 use glam::{DVec3, Vec3};
 use mesolux::bake;
 use mesolux::directions::Directions;
-use mesolux::elements::Elements;
 use mesolux::meso::{Options, Transport};
-use mesolux::solver::{Light, Report, Settings, Solver, Visibility};
+use mesolux::solver::{Light, Report, Settings, Visibility};
 
 /// Unshot light that each solution leaves, as a share of all. It lands on elements as large as any other, and half of it and
 /// the rounding of sums in another order are what two solutions differ by.

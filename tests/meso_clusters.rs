@@ -6,12 +6,22 @@ use common::sheet::{light_on, parallel, sheet};
 use glam::{DVec3, Vec3};
 use mesolux::constants::MOST_CLUSTERS;
 use mesolux::directions::Directions;
-use mesolux::meso::{Cluster, FaceClusters, MesoVertices, NEAR_PARALLEL_COS, clusters};
+use mesolux::meso::{
+    Cluster, CornerLight, Face, FaceClusters, MesoVertices, NEAR_PARALLEL_COS, clusters,
+};
 use mesolux::scene::Scene;
 
 /// What sums of some hundred f32 lose, thrice over.
 const ROUNDING: f64 = 1e-5;
 const UPRIGHT: [Vec3; 3] = [Vec3::X, Vec3::Y, Vec3::Z];
+
+/// Light at a corner whose frame is the world's.
+fn upright(moments: &[[Vec3; 3]]) -> CornerLight<'_> {
+    CornerLight {
+        frame: UPRIGHT,
+        moments,
+    }
+}
 
 type Moments = Vec<[Vec3; 3]>;
 
@@ -61,7 +71,7 @@ fn clusters_carry_the_energy_of_the_vertices() {
         let directions = Directions::new(k).expect("a number of the paper");
         for seed in [0, 1000, 2000] {
             let moments = [0, 1, 2].map(|corner| uneven(&directions, seed + 100_000 * corner));
-            let found = clusters([0, 1, 2].map(|c| (UPRIGHT, &moments[c][..])));
+            let found = clusters([0, 1, 2].map(|c| upright(&moments[c])));
             assert!(found.len() < MOST_CLUSTERS as usize, "{}", found.len());
             let given: DVec3 = moments.iter().map(vector).sum();
             let carried: DVec3 = light_of(&found).iter().sum();
@@ -96,7 +106,10 @@ fn many_directions_are_laid_together() {
         [Vec3::new(c, 0.0, -s), Vec3::Y, Vec3::new(s, 0.0, c)]
     };
     let frames = [-1.3_f32, 0.0, 1.3].map(turn);
-    let found = clusters([0, 1, 2].map(|c| (frames[c], &moments[c][..])));
+    let found = clusters([0, 1, 2].map(|c| CornerLight {
+        frame: frames[c],
+        moments: &moments[c],
+    }));
     assert_eq!(found.len(), MOST_CLUSTERS as usize);
     let given: DVec3 = frames
         .iter()
@@ -115,10 +128,13 @@ fn lit(scene: &Scene, directions: &Directions, towards: DVec3, strength: Vec3) -
     let light = light_on(scene, directions, |frame| {
         parallel(directions, frame, towards, strength)
     });
-    let vertices = MesoVertices::new(scene, &light);
-    let gathered = vertices.gather(directions, &light, &light.incident_moment);
+    let vertices = MesoVertices::new(scene, &light.elements, &light.frames);
+    let gathered = vertices.gather(directions, &light.frames, &light.incident_moment);
     let faces: Vec<_> = (0..light.elements.len() as u32)
-        .map(|m| (m, [0, 1, 2]))
+        .map(|meso| Face {
+            meso,
+            corners: [0, 1, 2],
+        })
         .collect();
     FaceClusters::new(&vertices, directions, &gathered, &faces)
 }
@@ -156,10 +172,10 @@ fn the_threshold_parts_lights() {
             [Vec3::Z; 3],
             [Vec3::new(s as f32, 0.0, c as f32) * 0.5; 3],
         ]];
-        let found = clusters([(UPRIGHT, &moments[0][..]), (UPRIGHT, &[]), (UPRIGHT, &[])]);
+        let found = clusters([upright(&moments[0]), upright(&[]), upright(&[])]);
         assert_eq!(found.len(), count, "{angle} radians apart");
     }
-    assert!(clusters([(UPRIGHT, &[][..]); 3]).is_empty());
+    assert!(clusters([upright(&[]); 3]).is_empty());
 }
 
 #[test]
@@ -167,7 +183,7 @@ fn more_directions_give_more_clusters() {
     let counts = [16, 32, 64].map(|k| {
         let directions = Directions::new(k).expect("a number of the paper");
         let moments = uneven(&directions, 5);
-        clusters([(UPRIGHT, &moments[..]); 3]).len()
+        clusters([upright(&moments); 3]).len()
     });
     println!("clusters of K = 16, 32, 64: {counts:?}");
     // Slots are further apart than the threshold, but for those along the border.

@@ -25,13 +25,13 @@ fn parallel_light_is_the_same_vector_in_every_frame() {
         let light = light_on(&scene, &directions, |frame| {
             parallel(&directions, frame, towards, strength)
         });
-        let vertices = MesoVertices::new(&scene, &light);
+        let vertices = MesoVertices::new(&scene, &light.elements, &light.frames);
         assert_eq!(
             vertices.frames.len(),
             81,
             "one frame a vertex of a smooth sheet"
         );
-        let gathered = vertices.gather(&directions, &light, &light.incident_moment);
+        let gathered = vertices.gather(&directions, &light.frames, &light.incident_moment);
         for (frame, slots) in vertices
             .frames
             .iter()
@@ -69,8 +69,8 @@ fn slots_of_a_plane_stay_apart() {
     for (i, moment) in light.incident_moment.iter_mut().enumerate() {
         moment.iter_mut().for_each(|c| *c *= (i / 64) as f32);
     }
-    let vertices = MesoVertices::new(&scene, &light);
-    let gathered = vertices.gather(&directions, &light, &light.incident_moment);
+    let vertices = MesoVertices::new(&scene, &light.elements, &light.frames);
+    let gathered = vertices.gather(&directions, &light.frames, &light.incident_moment);
     // The middle of the sheet lies on all four cells, two triangles of 45° or one of 90° in each.
     let middle = scene
         .vertices
@@ -105,8 +105,11 @@ fn seams_part_vertices() {
     let directions = Directions::new(16).expect("a number of the paper");
     let up = |_| vec![[Vec3::Z; 3]; 16];
     let whole = sheet(2, 0.0);
-    let count =
-        |scene: &Scene, light: &DirectionalLight| MesoVertices::new(scene, light).frames.len();
+    let count = |scene: &Scene, light: &DirectionalLight| {
+        MesoVertices::new(scene, &light.elements, &light.frames)
+            .frames
+            .len()
+    };
     assert_eq!(count(&whole, &light_on(&whole, &directions, up)), 9);
     let mut other = whole.clone();
     other.materials.push(other.materials[1].clone());

@@ -256,7 +256,7 @@ const DOUBT: f64 = 1e-4;
 
 /// The sources with the most emitted power, ties to the lower index.
 fn strongest(solver: &Solver, count: usize) -> Vec<u32> {
-    let power = |s: &u32| solver.sources.list[*s as usize].emitted_power();
+    let power = |s: &u32| solver.sources.list[*s as usize].emitted_power() as f32;
     let mut order: Vec<u32> = (0..solver.sources.list.len() as u32).collect();
     order.retain(|s| power(s) > 0.0);
     order.sort_by(|a, b| power(b).total_cmp(&power(a)).then(a.cmp(b)));
@@ -282,7 +282,9 @@ fn coupling_equals_its_twin() {
         let light = solver.light().expect("the light comes back");
         let source = strongest(&solver, 1)[0];
         let emitted = solver.sources.list[source as usize].emitted.x;
-        let row: Vec<f32> = (light.irradiance_direct.iter()).map(|e| e.x / emitted).collect();
+        let row: Vec<f32> = (light.irradiance_direct.iter())
+            .map(|e| e.x / emitted)
+            .collect();
         let found = &solver.draw(&[source]).expect("it is drawn").coupling[0];
         let elements = &solver.elements;
         let even = elements.even_reflectance();
@@ -294,7 +296,11 @@ fn coupling_equals_its_twin() {
         let apart = (found.iter().zip(&expected))
             .map(|(&f, &e)| (f64::from(f) - e).abs())
             .fold(0.0, f64::max);
-        println!("{} words: {:.1e} of the largest apart", found.len(), apart / largest);
+        println!(
+            "{} words: {:.1e} of the largest apart",
+            found.len(),
+            apart / largest
+        );
         assert!(largest > 0.0 && apart <= ROUNDING * largest);
     }
     assert!(coloured > 0, "some targets have several reflectances");
@@ -368,9 +374,9 @@ fn estimators_equal_their_twins() {
                         reference::form_factors::gather(elements, source, e, sees)
                     }
                     Estimator::Receiver => {
-                        let drawn = (&items[..], FACE);
-                        let sees =
-                            |p| reference::form_factors::visible(elements, source, drawn, p, e);
+                        let sees = |p| {
+                            reference::form_factors::visible(elements, source, &items, FACE, p, e)
+                        };
                         reference::form_factors::gather(elements, source, e, sees)
                     }
                     Estimator::Pixel => {

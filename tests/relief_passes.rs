@@ -134,11 +134,13 @@ fn sources_send_as_their_twin() {
                     .map(|v| v.as_dvec3())
                     .collect();
                 let twin = send_relief(
-                    (&before.elements, relief),
+                    &before.elements,
+                    relief,
                     source,
                     &light.moments[members],
                     &earlier,
-                    (slot.emitted.as_dvec3(), slot.reflected.as_dvec3()),
+                    slot.emitted.as_dvec3(),
+                    slot.reflected.as_dvec3(),
                 );
                 let row = |part: usize| &sent.exits[(2 * i + part) * directions..][..directions];
                 // Sums of some 64 · 3 products in f32 and their differences from what was sent before.
@@ -310,7 +312,7 @@ fn pixels_bring_light_as_their_twin() {
                     even += 1;
                     Light::Even(slot.emitted.as_dvec3(), slot.reflected.as_dvec3())
                 };
-                twin.add((&now.elements, relief), source, &column, FACE, &light);
+                twin.add(&now.elements, relief, source, &column, FACE, &light);
             }
             let (after, before) = (now.light(), before.light());
             let (after, before) = (after.expect("it comes"), before.expect("it comes"));

@@ -20,14 +20,14 @@ use crate::solution::Solution;
 use crate::solver::Settings;
 use crate::vk::Device;
 
-/// What is to be measured.
+/// What is measured.
 pub struct Options<'a> {
     /// Pixels across and down.
     pub sizes: Vec<(u32, u32)>,
     /// Rounds; in each, every kind of frame is drawn once.
     pub rounds: usize,
-    /// Shots of the bakes. A frame takes as long whatever the light is but for clusters, of which there are as many as slots
-    /// with light.
+    /// Shots of the bakes. The time of a frame does not depend on the light, except for clusters,
+    /// whose number grows with the number of lit slots.
     pub shots: u32,
     pub cache: Option<&'a Path>,
 }
@@ -36,7 +36,7 @@ pub struct Options<'a> {
 #[derive(Debug, Clone, Serialize)]
 pub struct Row {
     pub scene: String,
-    /// The scene's own camera, or `relief`, all of whose frame shows relief.
+    /// The scene's own camera, or `relief`, whose whole frame shows relief.
     pub camera: String,
     pub shading: String,
     /// None for plain triangles.
@@ -92,9 +92,14 @@ pub fn run(
     })?;
     let cameras = [Some(own.clone()), close(scene, &solutions[0], &own)];
     for camera in cameras.into_iter().flatten() {
-        for &size in &options.sizes {
+        for &(width, height) in &options.sizes {
+            let view = View {
+                camera: &camera,
+                width,
+                height,
+            };
             let first = rows.len();
-            measure(device, scene, &solutions, (&camera, size), options, rows)?;
+            measure(device, scene, &solutions, &view, options, rows)?;
             for row in &rows[first..] {
                 println!("{}", line(row, &rows[first..]));
             }
@@ -108,15 +113,10 @@ fn measure(
     device: &Arc<Device>,
     scene: &Scene,
     solutions: &[Solution],
-    (camera, (width, height)): (&Camera, (u32, u32)),
+    view: &View<'_>,
     options: &Options<'_>,
     rows: &mut Vec<Row>,
 ) -> Result<()> {
-    let view = View {
-        camera,
-        width,
-        height,
-    };
     let mut found = Vec::new();
     let mut renderers = Vec::new();
     for (name, shading, direct) in SHADINGS {
@@ -130,14 +130,14 @@ fn measure(
                 cache: options.cache,
                 ..Lighting::from(solution)
             };
-            let renderer = Renderer::new(device, scene, lighting, &view, 1)?;
+            let renderer = Renderer::new(device, scene, lighting, view, 1)?;
             found.push(Row {
                 scene: scene.name.clone(),
-                camera: camera.name.clone(),
+                camera: view.camera.name.clone(),
                 shading: name.into(),
                 directions: (shading != ReliefShading::None).then_some(k),
-                width,
-                height,
+                width: view.width,
+                height: view.height,
                 relief: renderer.relief_coverage()?,
                 median: 0.0,
                 low: 0.0,
@@ -154,9 +154,10 @@ fn measure(
     Ok(())
 }
 
-/// Milliseconds of a frame of each, median and the 10 % and 90 % points over so many rounds.
+/// Milliseconds of a frame of each, median and the 10 % and 90 % points over `rounds` rounds.
 ///
-/// In turns, so that what slows the machine slows all of them; a round before the first warms up.
+/// The renderers take turns, so that disturbances of the machine affect all of them; an extra first
+/// round warms up.
 ///
 /// # Errors
 /// A device that fails.
@@ -197,8 +198,9 @@ fn line(row: &Row, others: &[Row]) -> String {
     )
 }
 
-/// A camera that sees the relief alone: from the scene's camera towards an element near the middle of the relief, narrowed
-/// until a sphere about it of a tenth of the relief's extent fills the frame.
+/// A camera that sees the relief alone: from the scene's camera towards an element near the middle
+/// of the relief, narrowed until a sphere about it of a tenth of the relief's extent fills the
+/// frame.
 fn close(scene: &Scene, solution: &Solution, own: &Camera) -> Option<Camera> {
     let relief = solution.relief.as_ref()?;
     let centroid = |e: u32| {
@@ -270,8 +272,8 @@ pub fn write(rows: &[Row], folder: &Path) -> Result<()> {
     chart(rows).write(&folder.join("frame.svg"))
 }
 
-/// Milliseconds with their spread for K = 64, one group for a scene, camera and size; of the clusters, whose cost grows with K,
-/// for each K.
+/// Milliseconds with their spread for K = 64, one group for a scene, camera and size; of the
+/// clusters, whose cost grows with K, for each K.
 fn chart(rows: &[Row]) -> Bars<'static> {
     const KINDS: [(&str, u32, RGBColor); 8] = [
         ("none", 64, RGBColor(120, 120, 120)),

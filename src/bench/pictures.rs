@@ -1,4 +1,4 @@
-//! `mesolux bench pictures`: how true pictures of relief are, against paths among its geometry.
+//! `mesolux bench pictures`: the error of pictures of relief against path traced geometry.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,15 +17,15 @@ use crate::scene::displace;
 use crate::solver::Settings;
 use crate::vk::Device;
 
-/// What is to be drawn and how.
+/// What is drawn and how.
 pub struct Options<'a> {
     /// Pixels a side.
     pub side: u32,
     /// Paths of each pixel, of direct and of indirect light each.
     pub paths: u32,
-    /// Only this material; all if none.
+    /// Only this material; None draws all.
     pub material: Option<&'a str>,
-    /// Shading, direct light and cache of the pictures; its light does not count.
+    /// Shading, direct light and cache of the pictures; its light is ignored.
     pub lighting: Lighting<'a>,
 }
 
@@ -39,7 +39,7 @@ pub struct Row {
     pub light: &'static str,
     /// [`Comparison::rel_mse`] less `noise`.
     pub rel_mse: f64,
-    /// What the reference's noise adds to relMSE.
+    /// The contribution of the reference's noise to relMSE.
     pub noise: f64,
     pub bias: f64,
     pub rms: f64,
@@ -50,7 +50,7 @@ pub struct Row {
 pub const HEADER: &str =
     "material  angle  light     relMSE    (noise)   bias      rms     HDR-FLIP";
 
-/// The truth but for noise, whose variance is known.
+/// The reference, with the variance of its noise.
 pub struct Reference {
     pub picture: Picture,
     /// RGB, `[pixel]`.
@@ -91,7 +91,7 @@ impl Reference {
         }
     }
 
-    /// What [`Comparison::rel_mse`] tells of a perfect picture.
+    /// [`Comparison::rel_mse`] of a perfect picture against the noisy reference.
     pub fn noise(&self) -> f64 {
         let values = self.picture.radiance.as_flattened();
         let mean = values.iter().map(|&v| f64::from(v)).sum::<f64>() / values.len() as f64;
@@ -104,11 +104,12 @@ impl Reference {
     }
 }
 
-/// Bakes, draws and traces each material, prints a row a picture, writes the pictures beside their reference and difference
-/// into `folder` and keeps `pictures.csv` and `pictures.json` there up to date. `go_on` is asked before each view.
+/// Bakes, draws and traces each material, prints a row a picture, writes the pictures beside their
+/// reference and difference into `folder` and updates `pictures.csv` and `pictures.json` there.
+/// `go_on` is called before each view; false stops.
 ///
 /// # Errors
-/// A material that is not there; a device that fails; files that cannot be written.
+/// An unknown material; a device that fails; files that cannot be written.
 pub fn run(
     device: &Arc<Device>,
     options: &Options<'_>,

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::stress::shapes::Shapes;
+use crate::scene::shapes::Shapes;
 use crate::scene::{Camera, HeightMap, Material, Scene, Texture};
 
 /// Scene units of a repeat of the reliefs.

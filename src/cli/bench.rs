@@ -18,22 +18,27 @@ pub struct Options {
 
 #[derive(Subcommand)]
 enum What {
-    /// Milliseconds a frame of the three scenes, by shading of the relief, number of directions and size
+    /// Milliseconds a frame of the three scenes, by shading of the relief, number of directions and
+    /// size
     Frame(FrameOptions),
     /// Hemicubes a second in the Cornell box, with and without merging and culling, side by side
     Hemicube(HemicubeOptions),
-    /// Irradiance of bakes of one scene, on what has no relief, against path traced irradiance with the relief as geometry
+    /// Irradiance of bakes of one scene, on what has no relief, against path traced irradiance with
+    /// the relief as geometry
     Irradiance(IrradianceOptions),
-    /// Pictures of relief against path traced geometry: relMSE, bias and HDR-FLIP by material, view and part of the light
+    /// Pictures of relief against path traced geometry: relMSE, bias and HDR-FLIP by material, view
+    /// and part of the light
     Pictures(super::bench_pictures::Options),
     /// How time and memory of a bake grow with the number of elements, at one error bound
     Scaling(ScalingOptions),
-    /// Scenes at the ends of what numbers and meshes can do: what was asked, what came out, and the verdict
+    /// Scenes at the ends of what numbers and meshes can do: what was asked, what came out, and the
+    /// verdict
     Stress(StressOptions),
-    /// Error against run time of one scene, for the bake's settings and for other methods, against a path traced reference
+    /// Error against run time of one scene, for the bake's settings and for other methods, against
+    /// a path traced reference
     Pareto(super::pareto::Options),
-    /// The paper's Table 1, minutes and frames a second: three scenes in 16, 32 and 64 directions, without directions, and with
-    /// the relief as geometry
+    /// The paper's Table 1, minutes and frames a second: three scenes in 16, 32 and 64 directions,
+    /// without directions, and with the relief as geometry
     Table1(Table1Options),
 }
 
@@ -51,7 +56,8 @@ struct Table1Options {
     /// Error bound at which a bake is done, as a share of the emitted power
     #[arg(long, value_name = "X", default_value_t = 0.01)]
     residual: f64,
-    /// Rounds over which the frames are measured, 1280x720 pixels; each draws every kind of frame once; 0: no frames
+    /// Rounds over which the frames are measured, 1280x720 pixels; each draws every kind of frame
+    /// once; 0: no frames
     #[arg(long, value_name = "N", default_value_t = 9)]
     frame_rounds: usize,
     /// Leave out the bake of the relief as geometry, which takes longest
@@ -111,7 +117,8 @@ struct ScalingOptions {
     /// Elements of the last size; the full range ends at 1000000
     #[arg(long, value_name = "N", default_value_t = 320_000)]
     largest: usize,
-    /// Most elements of a source, 0 for no limit; may be given again. The program's own and none if not given
+    /// Most elements of a source, 0 for no limit; may be given again. The program's own and none if
+    /// not given
     #[arg(long, value_name = "N")]
     max_elements: Vec<usize>,
     /// Error bound at which a bake is done, as a share of the emitted power
@@ -120,7 +127,7 @@ struct ScalingOptions {
     /// Pixels a side of a hemicube face
     #[arg(long, value_name = "N", default_value_t = 128)]
     hemicube: u32,
-    /// Places at which the path tracer tells the error, 0 for none
+    /// Places at which the path tracer measures the error, 0 for none
     #[arg(long, value_name = "N", default_value_t = 200)]
     samples: usize,
     /// Paths of each place

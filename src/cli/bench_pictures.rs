@@ -12,7 +12,8 @@ use mesolux::render::Lighting;
 
 #[derive(Args)]
 pub struct Options {
-    /// Folder for pictures.csv, pictures.json and each picture beside its reference and their difference
+    /// Folder for pictures.csv, pictures.json and each picture beside its reference and their
+    /// difference
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// Only this material: flat, bricks, bumps or noise

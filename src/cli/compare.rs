@@ -8,21 +8,24 @@ use super::bake::writable;
 use mesolux::error::Result;
 use mesolux::render::{Comparison, FileKind, Flip, Picture, side_by_side};
 
-/// Tell how far a picture is from a reference of the same view
+/// Measure how much a picture differs from a reference of the same view
 ///
-/// Both are OpenEXR files of linear radiance, as `render` writes them. Printed are relMSE (mean of (a - b)^2 / (b^2 + e^2), e a
-/// hundredth of the reference's mean), the bias of the mean, the root mean square difference over the mean, and HDR-FLIP
-/// (Andersson et al. 2021), how different the two look in turns: 0 for alike, 1 at most, the mean over the pixels.
+/// Both are OpenEXR files of linear radiance, as `render` writes them. Printed are relMSE (mean of
+/// (a - b)^2 / (b^2 + e^2), e a hundredth of the reference's mean), the bias of the mean, the root
+/// mean square difference over the mean, and HDR-FLIP (Andersson et al. 2021), how different the
+/// two look in turns: 0 for alike, 1 at most, the mean over the pixels.
 #[derive(Args)]
 pub struct Options {
     #[arg(value_name = "PICTURE.exr")]
     ours: PathBuf,
     #[arg(value_name = "REFERENCE.exr")]
     reference: PathBuf,
-    /// Both and their difference side by side: red where the picture is brighter, blue where it is darker
+    /// Both and their difference side by side: red where the picture is brighter, blue where it is
+    /// darker
     #[arg(short, long, value_name = "IMAGE.png|.exr")]
     output: Option<PathBuf>,
-    /// Where they look different: FLIP of each pixel, black for 0 to pale yellow for 1; as numbers in an .exr
+    /// Where they look different: FLIP of each pixel, black for 0 to pale yellow for 1; as numbers
+    /// in an .exr
     #[arg(long, value_name = "IMAGE.png|.exr")]
     flip: Option<PathBuf>,
 }

@@ -26,10 +26,12 @@ use mesolux::solution::Bake;
 use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::prelude::*;
 
-/// Bake and draw global illumination with Vulkan: progressive radiosity through hemicube item buffers.
+/// Bake and draw global illumination with Vulkan: progressive radiosity through hemicube item
+/// buffers.
 ///
-/// SCENE is a built-in name (cornell, cornell-relief, bowl-and-bunny, fruit-platter), an .obj file, or a scene.toml. Results go to files and stdout, everything else to
-/// stderr. Exit code 2 says that something given was wrong; nothing is written then.
+/// SCENE is a built-in name (cornell, cornell-relief, bowl-and-bunny, fruit-platter), an .obj file,
+/// or a scene.toml. Results go to files and stdout, everything else to stderr. Exit code 2 means
+/// that an input was wrong; nothing is written then.
 #[derive(Parser)]
 #[command(version, about)]
 struct Cli {
@@ -108,10 +110,11 @@ impl Builtin {
     }
 }
 
-/// Which device, and whether it is watched.
+/// The choice of device, and validation.
 #[derive(Args, Clone)]
 struct DeviceOptions {
-    /// Vulkan device by its index or a part of its name (see `mesolux info`); the best one if not given
+    /// Vulkan device by its index or a part of its name (see `mesolux info`); the best one if not
+    /// given
     #[arg(long, value_name = "INDEX|NAME")]
     device: Option<String>,
     /// Watch every Vulkan call with the validation layer
@@ -126,17 +129,18 @@ impl DeviceOptions {
         Ok(device)
     }
 
-    /// Fails when the validation layer had something to say.
+    /// Fails if the validation layer has reported a message.
     fn check(&self) -> Result<()> {
         check_validation()
     }
 }
 
-/// Which devices bake, and whether they are watched.
+/// The choice of baking devices, and validation.
 #[derive(Args, Clone)]
 struct BakingDevices {
-    /// Vulkan device by its index or a part of its name (see `mesolux info`); the best one if not given. Several, as in 0,1, bake
-    /// together, and 0,0 opens a software device twice; the result is the same to the byte as with one of their kind
+    /// Vulkan device by its index or a part of its name (see `mesolux info`); the best one if not
+    /// given. Several, as in 0,1, bake together, and 0,0 opens a software device twice; the result
+    /// is the same to the byte as with one of their kind
     #[arg(long, value_name = "INDEX|NAME[,…]")]
     device: Option<String>,
     /// Watch every Vulkan call with the validation layer

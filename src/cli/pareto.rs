@@ -14,7 +14,8 @@ use mesolux::error::{Error, Result};
 pub struct Options {
     /// A built-in name, an .obj file, or a scene.toml
     scene: String,
-    /// Folder for pareto.csv, pareto.json, pareto.svg, pareto.png, and the reference, which is kept for the next run
+    /// Folder for pareto.csv, pareto.json, pareto.svg, pareto.png, and the reference, which is kept
+    /// for the next run
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// Places that are compared, at random by area
@@ -32,8 +33,8 @@ pub struct Options {
     /// Hemicubes of the pixel estimator
     #[arg(long, value_name = "N,...", value_delimiter = ',', default_value = "64,128,256,512", num_args = 0..)]
     pixel_hemicube: Vec<u32>,
-    /// Sides of the hemicubes of strong emitters over that of all others; 1 draws them as all others, 0 is a bake's default: shadow rays, and
-    /// four times as fine with the pixel estimator
+    /// Sides of the hemicubes of strong emitters over that of all others; 1 draws them as all
+    /// others, 0 is a bake's default: shadow rays, and four times as fine with the pixel estimator
     #[arg(long, value_name = "N,...", value_delimiter = ',', default_value = "0")]
     emitter_scale: Vec<u32>,
     /// Sizes of the sources over the default one

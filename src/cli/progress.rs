@@ -1,4 +1,4 @@
-//! What a long command shows on its way, and how it is stopped.
+//! Progress of long commands, and how they are stopped.
 
 use std::io::IsTerminal;
 use std::sync::Once;
@@ -9,8 +9,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-/// The first Ctrl-C asks what is under way to stop and keep its result, the second ends the program. Asking for this again
-/// forgets a Ctrl-C that has been heeded.
+/// The first Ctrl-C asks the work in progress to stop and keep its result; the second ends the
+/// program. Another call resets a Ctrl-C that has been handled.
 pub fn catch_interrupts() {
     static ONCE: Once = Once::new();
     INTERRUPTED.store(false, Ordering::SeqCst);
@@ -37,7 +37,7 @@ pub struct Bar {
     last: std::cell::Cell<Option<Instant>>,
 }
 
-/// Between two lines of progress where there is no terminal.
+/// Interval between lines of progress where there is no terminal.
 const QUIET: Duration = Duration::from_secs(10);
 
 impl Bar {

@@ -10,12 +10,13 @@ use mesolux::path_tracer::{Film, PathTracer, Settings};
 use mesolux::render::{Light, View};
 use mesolux::scene::{Scene, displace};
 
-/// What the path tracer is asked for.
+/// Options of the path tracer.
 #[derive(Args)]
 pub struct ReferenceOptions {
     /// Trace paths on the CPU instead of baking: unbiased, relief as geometry, no Vulkan device
     ///
-    /// Tells the picture's mean with its 95 % confidence interval. Ctrl-C, or --budget, keeps the paths so far.
+    /// Prints the picture's mean with its 95 % confidence interval. Ctrl-C, or --budget, keeps the
+    /// paths so far.
     #[arg(long, conflicts_with_all = [
         "estimator", "quality", "hemicube", "residual", "source_elements", "source_area", "source_area_near", "source_power", "shots", "visibility_memory", "directions", "transport", "cache", "no_cache", "device", "validate",
     ])]
@@ -51,7 +52,7 @@ pub fn tessellated(scene: Scene) -> Scene {
     fine
 }
 
-/// Traces the picture and tells how sure it is.
+/// Traces the picture and prints its confidence interval.
 pub fn draw(scene: &Scene, view: &View<'_>, settings: &Settings) -> Result<Film> {
     let tracer = PathTracer::new(scene)?;
     catch_interrupts();

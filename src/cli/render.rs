@@ -22,8 +22,9 @@ use mesolux::vk::Device;
 
 /// Draw a scene or a bake to a picture
 ///
-/// A PNG is exposed and tone-mapped; an EXR holds linear radiance. A SCENE is baked first, with the options of `bake`, and the
-/// bake is kept for the next time; or it is path traced with --reference.
+/// A PNG is exposed and tone-mapped; an EXR holds linear radiance. A SCENE is baked first, with the
+/// options of `bake`, and the bake is kept for the next time; or it is path traced with
+/// --reference.
 #[derive(Args)]
 pub struct Options {
     /// A scene (see `bake`) or a bake (.safetensors)
@@ -95,7 +96,7 @@ pub fn run(options: &Options) -> Result<()> {
         settings.check()?;
         (options.builtin.load(&options.input)?, None)
     };
-    // Whatever is wrong with the views is told before the bake.
+    // Errors in the views are reported before the bake.
     let camera = options.camera.of(&scene)?;
     let cameras = options.series.cameras(&scene, &camera)?;
     let device = options.device.open()?;
@@ -130,7 +131,7 @@ pub fn run(options: &Options) -> Result<()> {
     options.device.check()
 }
 
-/// The bake that the cache has, if it has one.
+/// The cached bake, if there is one.
 fn kept_bake(cached: &CachedBake) -> Option<Bake> {
     match cached.load() {
         Ok(found) => {
@@ -146,7 +147,7 @@ fn kept_bake(cached: &CachedBake) -> Option<Bake> {
     }
 }
 
-/// The program as it was built: a rebuilt one may bake otherwise.
+/// Identity of the program's build: a rebuilt one may bake differently.
 fn program() -> String {
     let version = env!("CARGO_PKG_VERSION");
     let built = std::env::current_exe()
@@ -181,7 +182,7 @@ fn run_reference(options: &Options) -> Result<()> {
         None => options.write(&trace(&camera)?, &camera),
         Some(cameras) => series::draw(&options.output, &cameras, options.exposure, |camera| {
             let picture = trace(camera)?;
-            // Fewer paths than the others had would be seen.
+            // Fewer paths than in the other pictures would be visible.
             Ok((!interrupted()).then_some(picture))
         }),
     }

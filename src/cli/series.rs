@@ -13,7 +13,8 @@ use mesolux::scene::{Camera, Scene, camera_path};
 
 #[derive(Args)]
 pub struct SeriesOptions {
-    /// Draw a series of so many pictures, with their number in the name: out-0001.png, out-0002.png, ...
+    /// Draw a series of so many pictures, with their number in the name: out-0001.png,
+    /// out-0002.png, ...
     ///
     /// All have the exposure of the first. Ctrl-C keeps those that are written.
     #[arg(long, value_name = "N")]
@@ -53,7 +54,8 @@ impl SeriesOptions {
     }
 }
 
-/// The file of a picture of the series, counted from 1: as wide as the last number, four digits at least.
+/// The file of a picture of the series, counted from 1, with as many digits as the last number, at
+/// least four.
 fn numbered(output: &Path, number: usize, of: usize) -> PathBuf {
     let stem = output.file_stem().unwrap_or_default().to_string_lossy();
     let ending = output.extension().unwrap_or_default().to_string_lossy();
@@ -61,7 +63,8 @@ fn numbered(output: &Path, number: usize, of: usize) -> PathBuf {
     output.with_file_name(format!("{stem}-{number:0digits$}.{ending}"))
 }
 
-/// Draws and writes the series; `draw` gives the picture from a camera, or none if it was stopped on its way.
+/// Draws and writes the series; `draw` returns the picture from a camera, or None if it was
+/// stopped.
 pub fn draw<'a>(
     output: &Path,
     cameras: &'a [Camera],

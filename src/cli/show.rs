@@ -1,4 +1,4 @@
-//! What of a scene's light is drawn, and how.
+//! Which part of a scene's light is drawn, and how.
 
 use clap::{Args, ValueEnum};
 
@@ -51,8 +51,8 @@ enum LightName {
 enum ShadingName {
     /// Relief mapping, lit by the factors of the relief's response
     Factored,
-    /// Relief mapping, lit as in the paper by a few parallel lights a triangle, each shadowed at each pixel; slower the more
-    /// directions there are, and --direct does nothing
+    /// Relief mapping, lit as in the paper by a few parallel lights a triangle, each shadowed at
+    /// each pixel; slower the more directions there are, and --direct does nothing
     Clusters,
     /// Flat and lit by the relief's response
     Normal,
@@ -82,10 +82,12 @@ enum ViewName {
     Height,
     /// Irradiance over pi, as on a white surface
     Irradiance,
-    /// Each triangle's strongest slot: hue, its direction about the normal (red along u, yellow-green along v); bright,
-    /// near the normal; coloured, most of the light, and grey, light from everywhere
+    /// Each triangle's strongest slot: hue, its direction about the normal (red along u,
+    /// yellow-green along v); bright, near the normal; coloured, most of the light, and grey, light
+    /// from everywhere
     Slots,
-    /// Fragments of prisms that a sample shades, hidden ones too; dark: none, the bar below: from 0 to the printed number
+    /// Fragments of prisms that a sample shades, hidden ones too; dark: none, the bar below: from 0
+    /// to the printed number
     Overdraw,
 }
 
@@ -100,7 +102,7 @@ impl ShowOptions {
         }
     }
 
-    /// A part of the light, shown as asked for.
+    /// A part of the light, shown as the options say.
     pub fn apply<'a>(&self, lighting: Lighting<'a>, part: Light) -> Lighting<'a> {
         Lighting {
             part,

@@ -17,9 +17,10 @@ use mesolux::vk;
 
 /// Show a scene in a window while it bakes, or a bake
 ///
-/// The middle button of the mouse orbits, with Shift it pans, the wheel nears; Alt and the left button stand in for it. The right button looks
-/// about, W A S D Q E fly, Shift faster. 1 2 3: all, direct, indirect light. Tab: the panel, which names the other keys. What is changed of
-/// the lights is shown by form factors that are kept.
+/// The middle button of the mouse orbits, with Shift it pans, the wheel zooms; Alt with the left
+/// button acts as the middle button. The right button looks about, W A S D Q E fly, Shift faster. 1
+/// 2 3: all, direct, indirect light. Tab: the panel, which names the other keys. Changed lights are
+/// shown by kept form factors.
 #[derive(Args)]
 pub struct Options {
     /// A scene (see `bake`) or a bake (.safetensors)
@@ -36,9 +37,10 @@ pub struct Options {
     /// Write the window's last frame, with --frames
     #[arg(long, value_name = "OUT.png", requires = "frames")]
     screenshot: Option<PathBuf>,
-    /// Do what a script says, one step a line, then close: move X Y, press|release left|middle|right, wheel N, key NAME [down|up],
-    /// see front|right|top, resize W H, minimise, restore W H, set SWITCH VALUE, set lamp NAME colour|strength|position N...,
-    /// frames N, wait SECONDS, bake, relit, detail, overlays, screenshot FILE, save FILE, lose-surface, close
+    /// Do what a script says, one step a line, then close: move X Y, press|release
+    /// left|middle|right, wheel N, key NAME [down|up], see front|right|top, resize W H, minimise,
+    /// restore W H, set SWITCH VALUE, set lamp NAME colour|strength|position N..., frames N, wait
+    /// SECONDS, bake, relit, detail, overlays, screenshot FILE, save FILE, lose-surface, close
     #[arg(long, value_name = "FILE")]
     script: Option<PathBuf>,
     #[command(flatten)]

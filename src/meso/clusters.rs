@@ -1,5 +1,6 @@
-//! Clusters of near-parallel light on a face: the paper's way of drawing relief. The light by slots of the face's three
-//! vertices becomes a few parallel lights, each of which one march over the height map shadows.
+//! Clusters of near-parallel light on a face: the paper's way of drawing relief. The light by slots
+//! of the face's three vertices becomes a few parallel lights, each of which one march over the
+//! height map shadows.
 
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
@@ -8,9 +9,10 @@ use super::MesoVertices;
 use crate::constants::{MOST_CLUSTERS, MOST_DIRECTIONS};
 use crate::directions::Directions;
 
-/// Cosine of 12°, the greatest angle between a cluster's strongest moment and the others that join it: above 10°, as far as a
-/// moment of K = 64 strays from its slot's middle, so that a slot's light at the three vertices is one cluster; below 18°,
-/// from middle to middle, so that neighbouring slots stay apart.
+/// Cosine of 12°, the greatest angle between a cluster's strongest moment and the others that join
+/// it. The angle is above 10°, the farthest a moment of K = 64 strays from its slot's middle, so
+/// that a slot's light at the three vertices is one cluster; and below 18°, the angle between
+/// middles of neighbouring slots, so that those stay apart.
 pub const NEAR_PARALLEL_COS: f64 = 0.978_147_600_733_806;
 
 /// A parallel light on a face.
@@ -18,8 +20,8 @@ pub const NEAR_PARALLEL_COS: f64 = 0.978_147_600_733_806;
 pub struct Cluster {
     /// Towards the light, unit, along the world's axes.
     pub towards: Vec3,
-    /// Fluence Φ at the face's corners a, b and c, RGB, W·m⁻²: the light there is Φ · `towards` as a vector. Over the corners and
-    /// colours together this is the very sum of the moments that are in the cluster.
+    /// Fluence Φ at the face's corners a, b and c, RGB, W·m⁻²: the light there is Φ · `towards` as
+    /// a vector. Over all corners and colours, its sum is that of the moments in the cluster.
     pub fluence: [Vec3; 3],
 }
 
@@ -28,14 +30,15 @@ struct Bundle {
     corner: usize,
     /// RGB.
     moment: [DVec3; 3],
-    /// Sum over the colours, and its length.
+    /// Sum over the colours.
     whole: DVec3,
+    /// Length of `whole`.
     strength: f64,
 }
 
-/// A cluster that grows.
+/// A cluster while moments are added to it.
 struct Growing {
-    /// Of the strongest bundle, unit.
+    /// Direction of the strongest bundle, unit.
     leader: DVec3,
     sum: DVec3,
     /// `[corner][colour]`
@@ -69,18 +72,27 @@ impl Growing {
     }
 }
 
-/// The clusters of one face from the vector moments `[slot][colour]` of its corners, each in its own frame (tangent,
-/// bitangent, normal).
+/// Light at one corner of a face.
+#[derive(Debug, Clone, Copy)]
+pub struct CornerLight<'a> {
+    /// Tangent, bitangent and normal.
+    pub frame: [Vec3; 3],
+    /// Vector moments in that frame, `[slot][colour]`, W·m⁻².
+    pub moments: &'a [[Vec3; 3]],
+}
+
+/// The clusters of one face from the light at its corners.
 ///
-/// From the strongest moment to the faintest, each joins the cluster whose strongest is nearest if that is within
-/// [`NEAR_PARALLEL_COS`], and founds one otherwise. Where there are [`MOST_CLUSTERS`], the rest, the faintest, join the nearest
-/// however far: no light is left out.
-pub fn clusters(corners: [([Vec3; 3], &[[Vec3; 3]]); 3]) -> Vec<Cluster> {
+/// From the strongest moment to the faintest, each joins the cluster whose leader (its strongest
+/// moment) is nearest in direction, if that is within [`NEAR_PARALLEL_COS`]; otherwise it starts a
+/// new cluster. Once there are [`MOST_CLUSTERS`], the remaining, faintest moments join the nearest
+/// cluster at any angle, so that no light is left out.
+pub fn clusters(corners: [CornerLight<'_>; 3]) -> Vec<Cluster> {
     let mut bundles = Vec::with_capacity(3 * MOST_DIRECTIONS as usize);
-    for (corner, (frame, moments)) in corners.into_iter().enumerate() {
-        let [t, b, n] = frame.map(Vec3::as_dvec3);
+    for (corner, light) in corners.into_iter().enumerate() {
+        let [t, b, n] = light.frame.map(Vec3::as_dvec3);
         let to_world = DMat3::from_cols(t, b, n);
-        for slot in moments {
+        for slot in light.moments {
             let moment = slot.map(|m| to_world * m.as_dvec3());
             let whole = moment[0] + moment[1] + moment[2];
             let strength = whole.length();
@@ -117,28 +129,41 @@ pub fn clusters(corners: [([Vec3; 3], &[[Vec3; 3]]); 3]) -> Vec<Cluster> {
     growing.iter().filter_map(Growing::finish).collect()
 }
 
-/// The clusters of faces one after the other, with where each face's begin and how many it has.
+/// A meso element whose clusters are wanted.
+#[derive(Debug, Clone, Copy)]
+pub struct Face {
+    /// Index of the meso element.
+    pub meso: u32,
+    /// Its corners in the order of [`Cluster::fluence`].
+    pub corners: [usize; 3],
+}
+
+/// The clusters of faces, one face after the other.
 pub struct FaceClusters {
     pub list: Vec<Cluster>,
-    /// First and count, `[face]`.
+    /// First cluster and number of clusters, `[face]`.
     pub ranges: Vec<(u32, u32)>,
 }
 
 impl FaceClusters {
-    /// Of the meso elements `faces`, corners in the order given, for moments at the vertices as [`MesoVertices::gather`] has them.
+    /// The clusters of `faces` under `moments`, `[vertex][slot][colour]` as from
+    /// [`MesoVertices::gather`].
     pub fn new(
         vertices: &MesoVertices,
         directions: &Directions,
         moments: &[[Vec3; 3]],
-        faces: &[(u32, [usize; 3])],
+        faces: &[Face],
     ) -> Self {
         let k = directions.count();
         let of_faces: Vec<Vec<Cluster>> = faces
             .par_iter()
-            .map(|&(m, order)| {
-                clusters(order.map(|corner| {
-                    let vertex = vertices.corners[m as usize][corner] as usize;
-                    (vertices.frames[vertex], &moments[vertex * k..][..k])
+            .map(|face| {
+                clusters(face.corners.map(|corner| {
+                    let vertex = vertices.corners[face.meso as usize][corner] as usize;
+                    CornerLight {
+                        frame: vertices.frames[vertex],
+                        moments: &moments[vertex * k..][..k],
+                    }
                 }))
             })
             .collect();

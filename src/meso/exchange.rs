@@ -1,17 +1,17 @@
-//! Light between the facets of a tile: G of the response.
+//! Light between the facets of a tile: the matrix G of the response.
 
 use super::Visibility;
 use super::visibility::RAYS;
 use crate::constants::NONE;
 
-/// Rays that land on a facet, by the facet hit: whence they come and with which weight.
+/// Rays by the facet that they hit, each with the facet it comes from and its weight.
 pub(super) struct Exchange {
     first: Vec<u32>,
     from: Vec<(u32, f32)>,
 }
 
 impl Exchange {
-    /// The blocked part of each facet's view, 1 − sky, shared among the rays that land.
+    /// The blocked part of each facet's view, 1 − sky, is shared among its rays that hit a facet.
     pub(super) fn new(visibility: &Visibility, sky: &[f64]) -> Self {
         let landed = |hits: &[u32]| hits.iter().filter(|&&h| h != NONE).count();
         let rows = || visibility.hits.chunks_exact(RAYS).enumerate();
@@ -20,7 +20,7 @@ impl Exchange {
             for &h in hits.iter().filter(|&&h| h != NONE) {
                 first[h as usize + 1] += 1;
             }
-            // With no ray to tell where the blocked part leads it leads to the facet's own surroundings: itself.
+            // If no ray hits a facet, the blocked part is assigned to the facet itself.
             if landed(hits) == 0 {
                 first[q + 1] += 1;
             }

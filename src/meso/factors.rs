@@ -1,8 +1,10 @@
-//! Light on the texels of a relief as a short sum of products: E_q = Σ_r a_qr β_r, with the factors a of the relief alone
-//! and the coefficients β of the incident light alone. What a frame costs then does not depend on the number of slots.
+//! Light on the texels of a relief as a short sum of products: E_q = Σ_r a_qr β_r, where the
+//! factors a depend only on the relief and the coefficients β only on the incident light. The cost
+//! of a frame then does not depend on the number of slots.
 //!
-//! The rows of the transfer, what a facet takes of the light in each slot, are all nearly combinations of a few: those with
-//! the greatest singular values. A row is measured by its values over the directions, not by its coefficients.
+//! The rows of the transfer, a facet's response to the light in each slot, are approximately
+//! combinations of a few rows: those with the greatest singular values. Rows are compared by their
+//! values over the directions, not by their coefficients.
 
 use std::ops::Range;
 
@@ -23,17 +25,18 @@ pub struct Factors {
     pub rank: usize,
     /// β_r = Σ_k basis_rk · m_k for the vector moments of each colour, `[rank][slot]`.
     pub basis: Vec<Vec3>,
-    /// Irradiance of each corner of each cell for a unit of β, `[cell][corner][rank]`, corners (0, 0), (1, 0), (0, 1), (1, 1) in
-    /// u and v: RGB by light from elsewhere in the relief, and w by light from outside.
+    /// Irradiance of each corner of each cell for a unit of β, `[cell][corner][rank]`, corners (0,
+    /// 0), (1, 0), (0, 1), (1, 1) in u and v: RGB by light from elsewhere in the relief, and w by
+    /// light from outside.
     pub corners: Vec<Vec4>,
-    /// Root mean square, over facets and directions, of what the sum leaves out of the light that arrives directly, over
-    /// that of the light.
+    /// Rms error of the light that arrives directly, over facets and directions, relative to the
+    /// rms of the light.
     pub error: f64,
 }
 
 /// Corners of a cell.
 pub const CORNERS: usize = 4;
-/// Ranks are whole multiples of this.
+/// Ranks are multiples of this.
 pub const RANK_STEP: usize = 4;
 
 const CONVERGED: f32 = 1e-5;
@@ -115,7 +118,8 @@ impl Factors {
         })
     }
 
-    /// Irradiance at a place in cells, bilinear between the corners of its cell, for coefficients `[rank]`.
+    /// Irradiance at a place in cells, bilinear between the corners of its cell, for coefficients
+    /// `[rank]`.
     pub fn irradiance(&self, field: &HeightField, at: DVec2, coefficients: &[Vec3]) -> Vec3 {
         let low = at.floor();
         let f = (at - low).as_vec2();
@@ -143,9 +147,9 @@ impl Factors {
 
 /// A corner of a cell, seen from inside the cell.
 struct Corner {
-    /// Facets of the cell that have it.
+    /// Facets of the cell at this corner.
     facets: Range<usize>,
-    /// Of the bilinear surface over the cell.
+    /// Normal of the bilinear surface over the cell.
     normal: DVec3,
 }
 
@@ -166,7 +170,8 @@ impl Corner {
         }
     }
 
-    /// What it takes of the light from each fine cell: what its facets see, by its own normal or by the map's.
+    /// Its response to the light from each fine cell: its facets' visibility, with its own normal
+    /// or the map's.
     fn transfer(&self, sight: &Sight<'_>, shading: &Shading, scale: &[f32]) -> Vec<f32> {
         let normal = if shading.from_map {
             let sum: DVec3 = self.facets.clone().map(|q| shading.normals[q]).sum();

@@ -1,7 +1,9 @@
-//! Which part of a tile each element shows, where the texture's repeat is larger than the element.
+//! The part of a tile that each element shows, where a repeat of the texture is larger than the
+//! element.
 //!
-//! Elements that show the same texels share a footprint, whatever repeat they lie in. Where a tile has more footprints than
-//! it may have responses, those whose middles lie in one cell of a grid are joined.
+//! Elements that show the same texels share a footprint, in any repeat of the texture. Where a tile
+//! has more footprints than it may have responses, those whose middles lie in one cell of a grid
+//! are merged.
 
 use std::collections::BTreeMap;
 
@@ -12,21 +14,22 @@ use crate::constants::NONE;
 
 /// Corners of texture coordinates this close, in repeats, are the same place.
 const SAME: f64 = 1.0 / 4096.0;
-/// Samples a texel along a side of a triangle, and along a side at most.
+/// Samples per texel along a side of a triangle, and most samples along a side.
 const SAMPLES: f64 = 2.0;
 const MOST_SAMPLES: u32 = 256;
-/// Footprints of one tile overlap by no more than this on the mean, which bounds the work for their responses.
+/// Largest mean overlap of the footprints of one tile, which bounds the work for their responses.
 const MOST_OVERLAP: f64 = 8.0;
 
 /// The footprints of a tile's elements.
 #[derive(Debug, Clone)]
 pub struct Footprints {
-    /// `[element given]`; NONE for an element that shows a whole tile or more.
+    /// Footprint of each element given, `[element given]`; NONE for one that shows a whole tile or
+    /// more.
     pub of: Vec<u32>,
     /// `[footprint]`.
     cells: Vec<Cells>,
-    /// Footprints over each cell of the height field, `[row · columns + column]`, with their density: the mean of one
-    /// footprint's over the tile is 1.
+    /// Footprints over each cell of the height field, `[row · columns + column]`, with their
+    /// density: that of each footprint has the mean 1 over the tile.
     pub(super) over: Vec<Vec<(u32, f32)>>,
     size: [u32; 2],
     aspect: f64,
@@ -36,8 +39,8 @@ pub struct Footprints {
 type Cells = BTreeMap<u32, f64>;
 
 impl Footprints {
-    /// Of triangles given by their texture coordinates, at most `most` footprints and at least one where a triangle is
-    /// smaller than the tile.
+    /// The footprints of triangles with these texture coordinates, `[triangle][corner]`: at most
+    /// `most`, and at least one where a triangle is smaller than the tile.
     pub fn new(field: &HeightField, triangles: &[[DVec2; 3]], most: usize) -> Self {
         let most = most.max(1);
         let mut kinds: BTreeMap<Vec<[i64; 2]>, u32> = BTreeMap::new();
@@ -74,7 +77,8 @@ impl Footprints {
             size: [field.columns, field.rows],
             aspect: field.aspect,
         };
-        // Each shape by itself if they are few, else by ever coarser grids; the last joins all.
+        // Each shape by itself if they are few, else merged by coarser and coarser grids; the last
+        // merges all.
         let mut side = usize::MAX;
         loop {
             let class = if side == usize::MAX {
@@ -113,8 +117,8 @@ impl Footprints {
         self.cells.len()
     }
 
-    /// The cell of the mesh's plane through which a facet is seen from a direction whose tangents to the normal, along u
-    /// and v in widths of a cell, are `slope`.
+    /// The cell of the mesh's plane through which a facet is seen from a direction whose tangents
+    /// to the normal, along u and v in widths of a cell, are `slope`.
     pub(super) fn window(&self, facet: &Facet, slope: DVec2) -> usize {
         let at = |place: f64, size: u32| {
             let cut = place as i32;
@@ -126,7 +130,7 @@ impl Footprints {
         at(y, rows) as usize * columns as usize + at(x, columns) as usize
     }
 
-    /// Shares of the facets in a footprint as the mesh's plane shows it, `[facet]`; they sum to 1.
+    /// Shares of the facets in a footprint projected to the mesh's plane, `[facet]`; they sum to 1.
     pub fn shares(&self, footprint: usize) -> Vec<f32> {
         let mut shares = vec![0.0; 2 * self.over.len()];
         for (&cell, &share) in &self.cells[footprint] {
@@ -136,7 +140,7 @@ impl Footprints {
         shares
     }
 
-    /// Mean over a footprint of values of the facets, `[facet]`.
+    /// Mean over a footprint of the facets' `values`, `[facet]`.
     pub(super) fn mean(&self, footprint: usize, of_facet: &[Vec3]) -> Vec3 {
         self.cells[footprint]
             .iter()
@@ -147,7 +151,7 @@ impl Footprints {
             .sum()
     }
 
-    /// Footprints over a cell, on the mean.
+    /// Mean number of footprints over a cell.
     fn overlap(&self) -> f64 {
         let covered: usize = self.cells.iter().map(BTreeMap::len).sum();
         covered as f64 / f64::from(self.size[0] * self.size[1])
@@ -162,10 +166,10 @@ fn area(uv: &[DVec2; 3]) -> f64 {
     0.5 * (uv[1] - uv[0]).perp_dot(uv[2] - uv[0]).abs()
 }
 
-/// The cells that a triangle covers, by samples in the middles of equal parts of it.
+/// The cells that a triangle covers, by samples at the centroids of equal parts of it.
 fn covered(field: &HeightField, uv: &[DVec2; 3]) -> Cells {
     let size = DVec2::new(f64::from(field.columns), f64::from(field.rows));
-    // A point of the field stands for the middle of its texel.
+    // A point of the field is the middle of its texel.
     let [a, b, c] = uv.map(|p| p * size - 0.5);
     let longest = (b - a).length().max((c - b).length()).max((a - c).length());
     let parts = ((SAMPLES * longest).ceil() as u32).clamp(2, MOST_SAMPLES);
@@ -173,7 +177,7 @@ fn covered(field: &HeightField, uv: &[DVec2; 3]) -> Cells {
     let mut cells = Cells::new();
     for i in 0..parts {
         for j in 0..parts - i {
-            // The upright part at (i, j), and the one upside down beside it.
+            // The upright part at (i, j), and the inverted one beside it.
             for (third, exists) in [(1.0 / 3.0, true), (2.0 / 3.0, i + j + 1 < parts)] {
                 if exists {
                     let s = (f64::from(i) + third) / f64::from(parts);
@@ -190,7 +194,7 @@ fn covered(field: &HeightField, uv: &[DVec2; 3]) -> Cells {
     cells
 }
 
-/// Numbers of the cells of a grid over the tile that hold the middles of the shapes, empty ones left out.
+/// Numbers of the grid cells that contain the middles of the shapes, counted without empty cells.
 fn by_grid(shapes: &[[DVec2; 3]], side: usize) -> Vec<u32> {
     let mut numbers: BTreeMap<[i64; 2], u32> = BTreeMap::new();
     shapes
@@ -203,7 +207,7 @@ fn by_grid(shapes: &[[DVec2; 3]], side: usize) -> Vec<u32> {
         .collect()
 }
 
-/// The footprints of classes of shapes, by the area of each shape.
+/// The footprints of classes of shapes, weighted by the area of each shape.
 fn joined(class: &[u32], count: usize, shapes: &[Cells], weights: &[f64]) -> Vec<Cells> {
     let mut whole = vec![0.0; count];
     for (&class, weight) in class.iter().zip(weights) {

@@ -4,14 +4,16 @@ use glam::{DVec2, DVec3};
 
 use crate::scene::{HeightMap, Material};
 
-/// Points along a side of the grid, at most; a larger map is averaged down. 128² points are 32,768 facets.
+/// Most points along a side of the grid; a larger map is averaged down. 128² points are 32,768
+/// facets.
 pub const MOST_POINTS: u32 = 128;
 
-/// Heights at the points of a periodic grid and the facets between them, mean height 0. Lengths are in widths of a cell:
-/// what a relief does to light does not depend on its scale.
+/// Heights at the points of a periodic grid and the facets between them, mean height 0. Lengths are
+/// in widths of a cell: the effect of a relief on light does not depend on its scale.
 ///
-/// Point (i, j) stands at x = i along u and y = j · aspect along v. The cell above it holds two facets, cut along
-/// the diagonal from (i + 1, j) to (i, j + 1): `2 · (j · columns + i)` below the diagonal, and one more above it.
+/// Point (i, j) stands at x = i along u and y = j · aspect along v. The cell above it has two
+/// facets, cut along the diagonal from (i + 1, j) to (i, j + 1): `2 · (j · columns + i)` below the
+/// diagonal, and one more above it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeightField {
     pub columns: u32,
@@ -32,8 +34,8 @@ pub struct Facet {
 }
 
 impl HeightField {
-    /// The relief of a material on a surface where a repeat of the texture is `tile` scene units wide and high.
-    /// None where the material has none.
+    /// The relief of a material on a surface where a repeat of the texture is `tile` scene units
+    /// wide and high. None for a material without relief.
     pub fn new(material: &Material, tile: DVec2) -> Option<Self> {
         let map = material
             .map_height
@@ -132,7 +134,7 @@ impl HeightField {
     }
 }
 
-/// Mean of the texels that point (i, j), counted from the bottom, stands for.
+/// Mean of the texels of point (i, j), rows counted from the bottom.
 fn average(map: &HeightMap, columns: u32, rows: u32, i: u32, j: u32) -> f64 {
     let range = |at: u32, points: u32, size: u32| {
         let edge = |at: u32| (u64::from(at) * u64::from(size) / u64::from(points)) as u32;

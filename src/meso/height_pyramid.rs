@@ -1,4 +1,5 @@
-//! A height map's maxima over ever larger blocks, by which a ray passes over what it cannot touch.
+//! A height map's maxima over larger and larger blocks, with which a ray skips blocks that it
+//! cannot hit.
 
 use std::iter::successors;
 
@@ -7,19 +8,20 @@ use crate::scene::HeightMap;
 /// The texels of a periodic height map and the maxima of its bilinear surface, level by level, for
 /// `shaders/shared/height_march.glsl`.
 ///
-/// Cell (i, j) lies between the centres of the texels (i, j), (i + 1, j), (i, j + 1) and (i + 1, j + 1), each index modulo
-/// the map's size, so that a period has as many cells as texels. A bilinear surface is highest in a corner: level 0 is
-/// the greatest of the four texels. Level n holds the maxima over blocks of 2ⁿ × 2ⁿ cells, counted from cell (0, 0); the
-/// last block of a row or column ends at the period's border, whatever is left for it. The last level is one block.
+/// Cell (i, j) lies between the centres of the texels (i, j), (i + 1, j), (i, j + 1) and
+/// (i + 1, j + 1), each index modulo the map's size, so that a period has as many cells as texels.
+/// A bilinear surface is highest in a corner: level 0 is the greatest of the four texels. Level n
+/// holds the maxima over blocks of 2ⁿ × 2ⁿ cells, counted from cell (0, 0); the last block of a row
+/// or column ends at the period's border and may be smaller. The last level is one block.
 ///
-/// A maximum is the greatest of stored f32 values, so that nothing is rounded and no bound is too low.
+/// A maximum is one of the stored f32 values, so that no bound is rounded down.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeightPyramid {
     /// Texels.
     pub width: u32,
     pub height: u32,
-    /// `[row][column]` of the texels as the map has them (rows from the top, heights in the map's units), then
-    /// `[level][row][column]` of the maxima.
+    /// `[row][column]` of the texels as the map has them (rows from the top, heights in the map's
+    /// units), then `[level][row][column]` of the maxima.
     pub values: Vec<f32>,
     /// Where each level starts in `values`.
     pub offsets: Vec<usize>,

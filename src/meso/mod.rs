@@ -1,8 +1,8 @@
-//! Relief: height fields, what they see of themselves, and what they do to light.
+//! Relief: height fields, their visibility, and their response to light.
 //!
 //! ```text
-//! height map ─► height field ─► visibility (GPU, cached) ─► response ─► relief of the elements
-//! solution ─► vertices ─► clusters
+//! height map ─► height field ─► visibility (cached) ─► response ─► relief of the elements
+//! light by direction ─► vertices ─► clusters
 //! ```
 
 mod clusters;
@@ -19,13 +19,12 @@ mod transfer;
 mod vertices;
 mod visibility;
 
-pub use clusters::{Cluster, FaceClusters, NEAR_PARALLEL_COS, clusters};
+pub use clusters::{Cluster, CornerLight, Face, FaceClusters, NEAR_PARALLEL_COS, clusters};
 pub use factors::{CORNERS, Factors, RANK_STEP};
 pub use footprints::Footprints;
 pub use height_field::{Facet, HeightField};
 pub use height_pyramid::HeightPyramid;
-pub(crate) use relief::visibility;
-pub use relief::{Class, MOST_FOOTPRINTS, Options, Relief, Transport};
+pub use relief::{Class, MOST_FOOTPRINTS, March, Options, Relief, Transport, visibility};
 pub use response::{Block, Response, slot_shares};
 pub use scattering::Scattering;
 pub use tiles::{Frame, Shading, Tile, tiles};

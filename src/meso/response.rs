@@ -1,20 +1,21 @@
-//! What a relief does to light: from the vector moments of the slots to the light sent into each slot.
+//! The response of a relief to light: from the vector moments of the slots to the light sent into
+//! each slot.
 //!
-//! A facet q of the tile receives E_q = Σ_k a_qk · m_k, where a_qk is the linear fit, over slot k, of V_q(ω)(n_q·ω)⁺: what
-//! the facet takes of light from ω, V being the relief's visibility. Light bounces inside, B = ρ(E + G B) + e, and slot j is
-//! sent the mean Σ_q W_jq B_q of what is seen from its directions. So the response is one matrix,
-//! R_jk = W (1 − ρG)⁻¹ ρ a, and H = W (1 − ρG)⁻¹ 1 for light that the relief emits.
+//! A facet q of the tile receives E_q = Σ_k a_qk · m_k, where a_qk is the linear fit, over slot k,
+//! of V_q(ω)(n_q·ω)⁺: the facet's response to light from ω, with V the relief's visibility. Light
+//! bounces inside, B = ρ(E + G B) + e, and slot j receives the mean Σ_q W_jq B_q of the facets seen
+//! from its directions. The response is thus one matrix, R_jk = W (1 − ρG)⁻¹ ρ a, and H = W (1 −
+//! ρG)⁻¹ 1 for light that the relief emits.
 //!
-//! Energy is kept to rounding: for every direction the facets together receive exactly what falls on the tile, the fit
-//! gives back linear functions and the sum over a slot exactly, the rows of W and those of G with the sky sum to 1.
+//! Energy is conserved up to rounding: for every direction the facets together receive exactly the
+//! light that falls on the tile; the fit is exact for linear functions and for the sum over a slot;
+//! the rows of W, and those of G with the sky, sum to 1.
 
 use glam::{DVec3, Vec3};
 
-use super::scattering::Scattering;
-use super::{HeightField, Visibility};
 use crate::directions::Directions;
 
-/// A slot's colour-by-vector block: `[colour]` rows that multiply a moment's vector of that colour.
+/// A slot's block: `[colour]` rows, each of which multiplies the moment of that colour.
 pub type Block = [Vec3; 3];
 
 /// The response of one relief, sent light as radiosity πL.
@@ -24,13 +25,14 @@ pub struct Response {
     pub matrix: Vec<Block>,
     /// Radiosity of the tile for the moment of each slot, `[in]`: Σ_j c_j R_j.
     pub albedo: Vec<Block>,
-    /// H, sent light for an emitted radiosity of 1, `[out]`, RGB.
+    /// H, light sent for an emitted radiosity of 1, `[out]`, RGB.
     pub emission: Vec<Vec3>,
     /// Σ_j c_j H_j: emitted radiosity of the tile for one of 1 on its facets.
     pub mean_emission: Vec3,
 }
 
-/// Share of a uniform sender's power that each slot carries when light is looked up bilinearly: c_j, which sum to 1.
+/// c_j: share of each slot in the power of a uniform sender when light is looked up bilinearly;
+/// they sum to 1.
 pub fn slot_shares(directions: &Directions) -> Vec<f64> {
     let mut shares = vec![0.0; directions.count()];
     for (cell, _) in directions.fine() {
@@ -43,20 +45,10 @@ pub fn slot_shares(directions: &Directions) -> Vec<f64> {
 }
 
 impl Response {
-    /// `physical` transport. `reflectance` and the normals that shade are given `[facet]`.
-    pub fn physical(
-        directions: &Directions,
-        field: &HeightField,
-        visibility: &Visibility,
-        normals: &[DVec3],
-        reflectance: &[Vec3],
-    ) -> Self {
-        Scattering::new(directions, field, visibility, normals, reflectance).whole()
-    }
-
-    /// `paper` transport, equations (3) and (4): a pixel's irradiance, whatever its direction, leaves with its albedo in
-    /// every direction less than 90° from its normal. The facets are seen as the flat element shows them, each alike.
-    /// `shares` of the facets in what is seen sum to 1; where none are given, all facets are seen alike.
+    /// `paper` transport, equations (3) and (4): a pixel's irradiance from any direction leaves,
+    /// times its albedo, in every direction less than 90° from its normal. The facets are weighted
+    /// as on the flat element. `shares` are the facets' weights and sum to 1; None weights all
+    /// facets equally.
     pub fn paper(
         directions: &Directions,
         normals: &[DVec3],
@@ -79,7 +71,7 @@ impl Response {
         Self::new(directions, &columns, emission)
     }
 
-    /// From the columns, `[out]` of `[in]`, and the emission, `[out]`.
+    /// From columns `[in][out]` and the emission, `[out]`.
     pub(super) fn new(
         directions: &Directions,
         columns: &[Vec<Block>],
@@ -125,7 +117,8 @@ impl Response {
         sent
     }
 
-    /// Radiosity that parallel light from a direction (z up) leaves with, for an irradiance of 1 on the element.
+    /// Radiosity under parallel light from a direction (z up), for an irradiance of 1 on the
+    /// element.
     pub fn directional_albedo(&self, directions: &Directions, from: DVec3) -> Vec3 {
         let moment = (from / from.z).as_vec3();
         let block = self.albedo[directions.slot_of(from)];
@@ -136,7 +129,7 @@ impl Response {
         )
     }
 
-    /// Share of a uniform sky's light that leaves again.
+    /// Share of a uniform sky's light that leaves the relief again.
     pub fn mean_albedo(&self, directions: &Directions) -> Vec3 {
         let cells: Vec<_> = directions.fine().collect();
         let total: f64 = cells.iter().map(|(cell, _)| cell.direction.z).sum();

@@ -1,10 +1,12 @@
-//! From what the facets of a tile take and see of each other to the response of the tile and of its footprints.
+//! The responses of a tile and of its footprints, from what its facets receive and see of each
+//! other.
 //!
-//! What leaves through a part of the mesh's plane towards ω comes from the facets that are seen through it: facet q at
-//! height h through the place h tan θ aside. A footprint's response is therefore W' (1 − ρG)⁻¹ ρ a with the rows of W cut to
-//! the footprint, window by window, and made to sum to 1 again. Light enters at all facets, as if the footprint's
-//! neighbours were lit as it is: what falls on one footprint may leave by another, and the power of a tile under even
-//! light is kept, not that of each footprint.
+//! Light that leaves a part of the mesh's plane towards ω comes from the facets seen through it:
+//! facet q at height h is seen through the place shifted by h tan θ. A footprint's response is
+//! therefore W' (1 − ρG)⁻¹ ρ a, where the rows of W are restricted to the facets seen through the
+//! footprint and normalised to sum to 1. Light enters at all facets, as if the footprint's
+//! neighbours were lit as it is: light that falls on one footprint may leave through another. Under
+//! even light the power of the tile is conserved, but not that of each footprint.
 
 use glam::{DVec2, DVec3, Vec3};
 use nalgebra::{DMatrix, DMatrixView, DVectorView};
@@ -20,15 +22,17 @@ use crate::directions::{Directions, FineCell};
 /// Bounces stop when the largest change is this share of the largest value.
 const CONVERGED: f32 = 1e-6;
 const MOST_BOUNCES: usize = 2_000;
-/// Share of the whole tile in what is seen of a footprint: all of it where no facet is seen through the footprint.
+/// Weight of the whole tile that is mixed into the view of a footprint. Where no facet is seen
+/// through the footprint, the view is that of the whole tile.
 const OF_TILE: f64 = 1e-3;
 
-/// A tile ready to respond.
+/// A tile with its internal light solved.
 pub struct Scattering<'a> {
     directions: Directions,
     field: &'a HeightField,
     facets: Facets,
-    /// (1 − ρG)⁻¹ ρ a: radiosity of the facets for the moment of each slot, a column for each facet of `[in][axis][colour]`.
+    /// (1 − ρG)⁻¹ ρ a: radiosity of the facets for the moment of each slot, one column
+    /// `[in][axis][colour]` for each facet.
     lit: DMatrix<f32>,
     /// (1 − ρG)⁻¹ 1: for light that each facet emits, `[facet]`.
     glowing: Vec<Vec3>,
@@ -36,8 +40,22 @@ pub struct Scattering<'a> {
     looks: DMatrix<f32>,
 }
 
+impl Response {
+    /// The response of a whole tile by `physical` transport. `reflectance` and the shading normals
+    /// are `[facet]`.
+    pub fn physical(
+        directions: &Directions,
+        field: &HeightField,
+        visibility: &Visibility,
+        normals: &[DVec3],
+        reflectance: &[Vec3],
+    ) -> Self {
+        Scattering::new(directions, field, visibility, normals, reflectance).whole()
+    }
+}
+
 impl<'a> Scattering<'a> {
-    /// `reflectance` and the normals that shade are given `[facet]`.
+    /// `reflectance` and the shading normals are `[facet]`.
     pub fn new(
         directions: &Directions,
         field: &'a HeightField,
@@ -81,7 +99,7 @@ impl<'a> Scattering<'a> {
         }
     }
 
-    /// Of the whole tile.
+    /// The response of the whole tile.
     pub fn whole(&self) -> Response {
         let transfer = DMatrixView::from_slice(&self.facets.transfer, CELLS, self.glowing.len());
         let mut seen = transfer.tr_mul(&self.looks);
@@ -96,11 +114,12 @@ impl<'a> Scattering<'a> {
         Response::new(&self.directions, &blocks(&(&self.lit * seen)), emission)
     }
 
-    /// `[footprint]`; `tile` is the response of the whole.
+    /// The responses of the footprints, `[footprint]`; `tile` is that of the whole tile.
     pub fn of_footprints(&self, footprints: &Footprints, tile: &Response) -> Vec<Response> {
         let k = self.directions.count();
         let seen = self.seen_through(footprints);
-        // What fills the view of a tile fills that of a footprint: their densities have the same mean.
+        // The facets seen fill the view of a tile, and equally that of a footprint: their densities
+        // have the same mean.
         let plane = 0.5 * self.field.aspect * self.field.facet_count() as f64;
         let rest: Vec<f64> = (self.looks.column_iter())
             .map(|looks| {
@@ -152,7 +171,7 @@ impl<'a> Scattering<'a> {
             .collect()
     }
 
-    /// H of facets with their shares in what is seen, `[facet][out]`.
+    /// H of facets with their shares in the view, `[facet][out]`.
     fn emission(
         &self,
         shares: &DMatrix<f32>,
@@ -165,9 +184,9 @@ impl<'a> Scattering<'a> {
         shares.column_iter().map(of_column).collect()
     }
 
-    /// What is seen through each footprint, facets in order: `[part of the facets][footprint]`.
+    /// The facets seen through each footprint, in order: `[part of the facets][footprint]`.
     fn seen_through(&self, footprints: &Footprints) -> Vec<Vec<Vec<Seen>>> {
-        // With the slope of the view in the field's lengths.
+        // The slope of the view in the field's units of length.
         let slopes: Vec<DVec2> = FineCell::all()
             .map(|cell| cell.direction.truncate() / cell.direction.z)
             .collect();
@@ -198,19 +217,19 @@ impl<'a> Scattering<'a> {
     }
 }
 
-/// Facets that one thread looks at in one go.
+/// Facets per task of a thread.
 const PART: usize = 512;
 
-/// A facet as it is seen through a footprint from a fine cell.
+/// A facet seen through a footprint from a fine cell.
 #[derive(Clone, Copy)]
 struct Seen {
     facet: u32,
     cell: u32,
-    /// Projected.
+    /// Projected area.
     area: f32,
 }
 
-/// How much of each fine cell a bilinear look-up takes from each slot, `[fine cell][slot]`.
+/// Weight of each slot in a bilinear look-up at each fine cell, `[fine cell][slot]`.
 fn slots_of_cells(directions: &Directions) -> DMatrix<f32> {
     let mut looks = DMatrix::zeros(CELLS, directions.count());
     for (i, cell) in FineCell::all().enumerate() {
@@ -221,7 +240,7 @@ fn slots_of_cells(directions: &Directions) -> DMatrix<f32> {
     looks
 }
 
-/// Columns of sums over `[in][axis][colour]`, as blocks: `[out]` of `[in]`.
+/// Turns columns `[in][axis][colour]` into blocks, `[in][out]`.
 fn blocks(sums: &DMatrix<f32>) -> Vec<Vec<Block>> {
     let column = |sums: DVectorView<'_, f32>| -> Vec<Block> {
         (sums.as_slice().chunks_exact(9))
@@ -231,7 +250,8 @@ fn blocks(sums: &DMatrix<f32>) -> Vec<Vec<Block>> {
     sums.column_iter().map(column).collect()
 }
 
-/// Radiosity of the facets with all bounces inside the relief, for what they send at first: B = b + ρ G B.
+/// Radiosity B of the facets with all bounces inside the relief, for their initial radiosity b: B =
+/// b + ρ G B.
 fn bounced(exchange: &Exchange, first: Vec<Vec3>, reflectance: &[Vec3]) -> Vec<Vec3> {
     let mut total = first.clone();
     let mut bounce = first;

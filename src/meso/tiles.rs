@@ -1,4 +1,4 @@
-//! Elements with a relief by the tile that they show: a material at one size of its texture's repeat.
+//! Elements with a relief grouped by tile: a material at one size of its texture's repeat.
 
 use std::collections::BTreeMap;
 
@@ -9,16 +9,16 @@ use crate::elements::Elements;
 use crate::error::{Error, Result};
 use crate::scene::{Material, Scene};
 
-/// Octaves that the width or height of a tile may vary within a class.
+/// Octaves by which the width or height of a tile may vary within a class.
 const CLASS_OCTAVES: f64 = 0.5;
-/// A steeper relief is a mistake in the scale of its heights.
+/// Steepest rms slope accepted: a steeper relief is a mistake in the scale of its heights.
 const MOST_SLOPE: f64 = 1e3;
 
 /// One material at one size of its tiles.
 pub struct Tile {
     /// Index into the scene's materials.
     pub material: u32,
-    /// Scene units that a repeat of the texture is wide and high, the mean over the members.
+    /// Width and height of a repeat of the texture, mean over the members, scene units.
     pub size: DVec2,
     /// Elements.
     pub members: Vec<usize>,
@@ -26,10 +26,11 @@ pub struct Tile {
     pub shading: Shading,
 }
 
-/// The tiles of a scene and the frames of its elements, `[element]`; of an element without relief none.
+/// The tiles of a scene and the frames of its elements, `[element]`, None for an element without
+/// relief.
 ///
 /// # Errors
-/// A relief too steep to be meant.
+/// A relief whose scale is implausibly steep.
 pub fn tiles(scene: &Scene, elements: &Elements) -> Result<(Vec<Tile>, Vec<Option<Frame>>)> {
     let frames: Vec<Option<Frame>> = (0..elements.len())
         .map(|e| Frame::new(scene, elements, e))
@@ -80,7 +81,7 @@ pub fn tiles(scene: &Scene, elements: &Elements) -> Result<(Vec<Tile>, Vec<Optio
 pub struct Frame {
     pub tangent: DVec3,
     pub bitangent: DVec3,
-    /// Scene units of a repeat of the texture along tangent and bitangent.
+    /// Length of a repeat of the texture along tangent and bitangent, scene units.
     pub tile: DVec2,
 }
 
@@ -114,7 +115,7 @@ impl Frame {
 pub struct Shading {
     pub normals: Vec<DVec3>,
     pub reflectance: Vec<Vec3>,
-    /// Whether the normals are a normal map's.
+    /// Whether the normals come from a normal map.
     pub from_map: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What the facets of a tile take of the sky's light, and its fit over the slots.
+//! The facets' response to light from the sky, and its fit over the slots.
 
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
@@ -7,21 +7,22 @@ use super::visibility::Azimuth;
 use super::{HeightField, Visibility};
 use crate::directions::{Directions, FINE, FineCell};
 
-/// The facets of a tile with what of the sky each sees, `[facet]`, all rows over the fine cells.
+/// The facets of a tile with the visibility of the sky, `[facet]`; rows are over the fine cells.
 pub(super) struct Facets {
     /// Irradiance for a unit of radiance and solid angle from each fine cell, `[facet][fine cell]`.
     pub(super) transfer: Vec<f32>,
     pub(super) area: Vec<f64>,
-    /// Share of a uniform sky's light that arrives.
+    /// Share of a uniform sky's light that arrives at the facet.
     pub(super) sky: Vec<f64>,
-    /// What brings the light from each direction to what falls on the tile, `[fine cell]`.
+    /// Factor that makes the light received from each direction equal to the light that falls on
+    /// the tile, `[fine cell]`.
     pub(super) scale: Vec<f32>,
 }
 
-/// How much of each fine cell of the sky a facet sees, 0..=1.
+/// Share of each fine cell of the sky that a facet sees, 0..=1.
 pub(super) struct Sight<'a> {
     pub(super) cells: Vec<FineCell>,
-    /// Of each cell, as [`Visibility::horizon`] takes it.
+    /// Azimuth of each cell, for [`Visibility::horizon`].
     azimuths: Vec<Azimuth>,
     visibility: &'a Visibility,
 }
@@ -49,8 +50,8 @@ impl<'a> Sight<'a> {
 
 /// Fine cells.
 pub(super) const CELLS: usize = (FINE * FINE) as usize;
-/// How far the light on a tile from one direction may be scaled to be what falls there: only grazing light, of which few
-/// facets see anything, needs more.
+/// Largest factor of the light from one direction: only grazing light, which few facets see, would
+/// need a larger one.
 const MOST_SCALE: f64 = 4.0;
 
 impl Facets {
@@ -68,7 +69,7 @@ impl Facets {
                     row[i] = (sight.of(q, i) * normals[q].dot(cell.direction).max(0.0)) as f32;
                 }
             });
-        // What falls on the tile from each direction must arrive on its facets.
+        // The light that falls on the tile from each direction must arrive at its facets.
         let tile = 0.5 * field.aspect * count as f64;
         let mut arriving = vec![0.0; CELLS];
         for (row, area) in transfer.chunks(CELLS).zip(&area) {
@@ -98,8 +99,8 @@ impl Facets {
     }
 }
 
-/// For each slot, the map from values at its fine cells to the vector whose dot product with a direction fits them best
-/// among those that keep their sum.
+/// For each slot, the linear map from values at its fine cells to the vector whose dot product with
+/// the direction fits them best, among the vectors that preserve their sum.
 pub(super) struct Fit {
     /// `[slot][member]`: fine cell and its column of the map.
     columns: Vec<Vec<(usize, DVec3)>>,

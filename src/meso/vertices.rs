@@ -1,5 +1,5 @@
-//! Light by direction at the vertices of a surface with a relief, gathered from the elements about them: the paper's
-//! Figure 1, from slots to slots between the frames of neighbours.
+//! Light by direction at the vertices of a surface with a relief, gathered from the elements about
+//! them: the paper's Figure 1, from slots to slots between the frames of neighbours.
 
 use std::collections::HashMap;
 
@@ -9,38 +9,38 @@ use rayon::prelude::*;
 use crate::corners::Corners;
 use crate::directions::Directions;
 use crate::scene::Scene;
-use crate::solution::DirectionalLight;
 
-/// Cosine of 45°: elements whose tangents are further apart meet in a seam of their texture coordinates.
+/// Cosine of 45°: between elements whose tangents are further apart there is a seam of the texture
+/// coordinates.
 const SEAM_COS: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// The vertices that meso elements share where one's surface and texture continue the other's.
+/// The vertices of meso elements, shared by elements whose surface and texture continue each other.
 pub struct MesoVertices {
-    /// Tangent, bitangent and normal, `[vertex]`: those of the elements about it, by angle, made orthonormal; alike on
-    /// both sides of a shared edge.
+    /// Tangent, bitangent and normal, `[vertex]`: mean of the elements' about it weighted by angle,
+    /// made orthonormal; the same on both sides of a shared edge.
     pub frames: Vec<[Vec3; 3]>,
-    /// The vertex of each corner, `[meso element][corner]`, meso elements as in [`DirectionalLight::elements`].
+    /// The vertex of each corner, `[meso element][corner]`.
     pub corners: Vec<[u32; 3]>,
     /// Meso elements about each vertex, with weights that sum to 1.
     around: Vec<Vec<(u32, f64)>>,
 }
 
 impl MesoVertices {
-    pub fn new(scene: &Scene, light: &DirectionalLight) -> Self {
-        let meso: HashMap<usize, u32> = (0..)
-            .zip(&light.elements)
-            .map(|(m, &e)| (e as usize, m))
-            .collect();
+    /// The vertices of the meso elements that are the triangles `elements` of the scene; `frames`
+    /// are their tangents, bitangents and normals. Both are `[meso element]`.
+    pub fn new(scene: &Scene, elements: &[u32], frames: &[[Vec3; 3]]) -> Self {
+        let meso: HashMap<usize, u32> =
+            (0..).zip(elements).map(|(m, &e)| (e as usize, m)).collect();
         let neighbours = Corners::new(scene);
-        let frame = |m: u32| light.frames[m as usize].map(Vec3::as_dvec3);
+        let frame = |m: u32| frames[m as usize].map(Vec3::as_dvec3);
         let turn = |[t, b, n]: [DVec3; 3]| t.cross(b).dot(n) > 0.0;
         let mut known: HashMap<(u32, Vec<u32>), u32> = HashMap::new();
         let mut vertices = Self {
             frames: Vec::new(),
-            corners: Vec::with_capacity(light.elements.len()),
+            corners: Vec::with_capacity(elements.len()),
             around: Vec::new(),
         };
-        for (m, &e) in (0_u32..).zip(&light.elements) {
+        for (m, &e) in (0_u32..).zip(elements) {
             let triangle = &scene.triangles[e as usize];
             let own = frame(m);
             let corners = triangle.vertices.map(|vertex| {
@@ -104,8 +104,9 @@ impl MesoVertices {
         self.frames.len() as u32 - 1
     }
 
-    /// Means at the vertices of values by slot, `[vertex][slot]`, of those of the elements, `[meso element][slot]`, whose frames
-    /// are taken for the vertex's.
+    /// Weighted means at the vertices, `[vertex][slot]`, of the elements' `values`,
+    /// `[meso element][slot]`. The elements' frames are taken for the vertex's. `k` is the number
+    /// of slots.
     pub fn mean(&self, values: &[Vec3], k: usize) -> Vec<Vec3> {
         self.around
             .par_iter()
@@ -120,15 +121,17 @@ impl MesoVertices {
             .collect()
     }
 
-    /// Vector moments at the vertices, `[vertex][slot][colour]`, of those of the elements, `[meso element][slot][colour]`,
-    /// W·m⁻², each in its own frame.
+    /// Vector moments at the vertices, `[vertex][slot][colour]`, from those of the elements,
+    /// `[meso element][slot][colour]`, W·m⁻². `frames` are the elements', as given to
+    /// [`Self::new`].
     ///
-    /// A moment is turned as a vector from the element's frame into the vertex's and counts in the slot that it points
-    /// into, so that the light as a vector is kept. What then lies below the vertex's horizon is laid onto it.
+    /// A moment is turned as a vector from the element's frame into the vertex's and is added to
+    /// the slot that it then points into, so that the light as a vector is kept. A moment below the
+    /// vertex's horizon is projected onto the horizon.
     pub fn gather(
         &self,
         directions: &Directions,
-        light: &DirectionalLight,
+        frames: &[[Vec3; 3]],
         moments: &[[Vec3; 3]],
     ) -> Vec<[Vec3; 3]> {
         let k = directions.count();
@@ -143,7 +146,7 @@ impl MesoVertices {
                 let to_vertex = columns(frame).transpose();
                 let mut sums = vec![[DVec3::ZERO; 3]; k];
                 for &(m, weight) in around {
-                    let turn = to_vertex * columns(&light.frames[m as usize]);
+                    let turn = to_vertex * columns(&frames[m as usize]);
                     for moment in &moments[m as usize * k..][..k] {
                         // One slot for the colours: they are fitted together.
                         let turned = moment.map(|c| turn * c.as_dvec3());

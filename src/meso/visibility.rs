@@ -9,23 +9,25 @@ use crate::atomic_file::write_atomically;
 use crate::constants::{AZIMUTHS, RAY_STRATA};
 use crate::error::Result;
 
-/// What each facet of a [`HeightField`] sees of the sky and of the relief.
+/// The parts of the sky and of the relief that each facet of a [`HeightField`] sees.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Visibility {
-    /// Tangent of the elevation of the horizon, `[facet][azimuth]`, azimuth a at 2π a / AZIMUTHS from u towards v.
+    /// Tangent of the elevation of the horizon, `[facet][azimuth]`, azimuth a at 2π a / AZIMUTHS
+    /// from u towards v.
     pub horizons: Vec<f32>,
-    /// The facet that each ray lands on, NONE for the sky, `[facet][ray]`; the rays are cosine-weighted about the normal.
+    /// The facet that each ray lands on, NONE for the sky, `[facet][ray]`; the rays are
+    /// cosine-weighted about the normal.
     pub hits: Vec<u32>,
 }
 
-/// Changes when the shaders' results do.
+/// Incremented when the shaders' results change.
 const VERSION: &str = "relief visibility 1";
 
 /// Rays from each facet.
 pub const RAYS: usize = (RAY_STRATA * RAY_STRATA) as usize;
 
 impl Visibility {
-    /// The file of a height field in the cache: its content decides.
+    /// The file of a height field in the cache, named by a hash of its content.
     fn file(field: &HeightField, cache: &Path) -> PathBuf {
         let mut hash = Sha256::new();
         hash.update(VERSION);
@@ -42,7 +44,7 @@ impl Visibility {
         cache.join(format!("relief-{name}.bin"))
     }
 
-    /// What the cache holds for a height field; none if there is nothing or if it is damaged.
+    /// The cached visibility of a height field; None if there is none or its file is damaged.
     pub fn load(field: &HeightField, cache: &Path) -> Option<Self> {
         let bytes = std::fs::read(Self::file(field, cache)).ok()?;
         let facets = field.facet_count();
@@ -73,7 +75,7 @@ impl Visibility {
         write_atomically(&Self::file(field, cache), |out| out.write_all(&bytes))
     }
 
-    /// Tangent of the horizon of a facet towards an azimuth, linear between the kept ones.
+    /// Tangent of the horizon of a facet towards an azimuth, linear between the stored azimuths.
     pub(super) fn horizon(&self, facet: usize, azimuth: &Azimuth) -> f64 {
         let kept = &self.horizons[facet * AZIMUTHS as usize..][..AZIMUTHS as usize];
         let [low, high] = azimuth.between.map(|i| f64::from(kept[i]));
@@ -81,11 +83,11 @@ impl Visibility {
     }
 }
 
-/// An azimuth between two of those that visibility is kept for.
+/// An azimuth between two stored ones.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Azimuth {
     between: [usize; 2],
-    /// Of the second.
+    /// Weight of the second.
     share: f64,
 }
 

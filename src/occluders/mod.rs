@@ -1,8 +1,9 @@
 //! Occluders: the triangles that item buffers are drawn from.
 //!
-//! The `receiver` estimator asks an item for its plane alone. So neighbouring elements of one plane are drawn as the few
-//! triangles that their outline needs, each as one element of that plane. The outline keeps all its corners, those at which it goes
-//! straight on as well: neighbours share whole edges, no crack opens, and the same pixels are covered.
+//! The `receiver` estimator needs only the plane of an item. Neighbouring elements of one plane are
+//! therefore drawn as the few triangles that fill their outline, each drawn as one element of that
+//! plane. The outline keeps all its corners, also those on a straight line: neighbours share whole
+//! edges, no crack opens, and the same pixels are covered.
 
 mod outline;
 mod region;
@@ -16,14 +17,21 @@ use crate::elements::Elements;
 use outline::outlines;
 use region::{Region, regions};
 
+/// A region with the triangles that are drawn in place of its members.
+struct Merged {
+    region: Region,
+    /// Corners, as of [`Elements::corners`].
+    triangles: Vec<[u32; 3]>,
+}
+
 /// Structure of arrays, `[occluder]`.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Occluders {
     /// Corners, as of [`Elements::corners`].
     pub corners: Vec<[u32; 3]>,
-    /// The element that each is drawn as, in whose plane and connected part it lies.
+    /// The element that each is drawn as; both lie in the same plane and connected part.
     pub items: Vec<u32>,
-    /// How many, at the beginning, are elements as they are, in their order.
+    /// Number of occluders at the beginning of the list that are single elements, in their order.
     pub own: usize,
 }
 
@@ -37,7 +45,7 @@ impl Occluders {
         }
     }
 
-    /// Elements of one plane merged, wherever that gives fewer triangles.
+    /// Elements of one plane merged where that gives fewer triangles.
     pub fn merged(elements: &Elements, connections: &Connections) -> Self {
         let regions = regions(elements, connections);
         let outlines = outlines(elements, connections, &regions);
@@ -46,19 +54,15 @@ impl Occluders {
             .zip(outlines)
             .filter_map(|(region, outline)| {
                 let triangles = triangulate::triangulate(elements, &region, &outline)?;
-                Some((region, triangles))
+                Some(Merged { region, triangles })
             })
             .collect();
         Self::from_regions(elements, connections, &drawn)
     }
 
-    fn from_regions(
-        elements: &Elements,
-        connections: &Connections,
-        drawn: &[(Region, Vec<[u32; 3]>)],
-    ) -> Self {
+    fn from_regions(elements: &Elements, connections: &Connections, drawn: &[Merged]) -> Self {
         let mut merged = vec![false; elements.len()];
-        for &e in drawn.iter().flat_map(|(region, _)| &region.members) {
+        for &e in drawn.iter().flat_map(|m| &m.region.members) {
             merged[e as usize] = true;
         }
         let mut items: Vec<_> = (0..elements.len() as u32)
@@ -69,10 +73,10 @@ impl Occluders {
             .map(|&e| elements.corners[e as usize])
             .collect();
         let own = items.len();
-        // Part by part, for meshlets are of one part each.
-        let mut pairs: Vec<_> = drawn.iter().collect();
-        pairs.sort_by_key(|(region, _)| connections.component[region.item as usize]);
-        for (region, triangles) in pairs {
+        // By connected part, because a meshlet holds elements of one part only.
+        let mut by_part: Vec<_> = drawn.iter().collect();
+        by_part.sort_by_key(|m| connections.component[m.region.item as usize]);
+        for Merged { region, triangles } in by_part {
             items.extend(std::iter::repeat_n(region.item, triangles.len()));
             corners.extend(triangles);
         }

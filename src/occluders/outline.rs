@@ -6,9 +6,9 @@ use crate::elements::Elements;
 
 use super::region::Region;
 
-/// The edges about a region, from vertex to vertex, its inside on the left seen from the front: every edge that no other member
-/// shares. What is drawn from it covers the same pixels as the members do, for their outline is rounded to pixels at the same
-/// corners.
+/// The edges about a region, from vertex to vertex, the inside on the left seen from the front:
+/// every edge that no other member shares. Triangles of this outline cover the same pixels as the
+/// members do, because both have the same corners along it.
 pub struct Outline {
     pub edges: Vec<(u32, u32)>,
 }

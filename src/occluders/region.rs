@@ -8,22 +8,25 @@ use crate::elements::Elements;
 
 /// Elements of one plane.
 pub struct Region {
-    /// The member whose plane is meant.
+    /// The member whose plane the region lies in.
     pub item: u32,
     /// Two or more, ascending.
     pub members: Vec<u32>,
 }
 
-/// Farthest that a corner may lie from the item's plane: a fifth of what passes tell heights apart by, for heights in f32 take
-/// their share of that.
+/// Farthest that a corner may lie from the item's plane: a fifth of the least height that passes
+/// distinguish, because heights in f32 use up part of that.
 const PLANE: f64 = 2e-7;
-/// Largest sine of the angle between a member's normal and the item's, beside what rounding explains.
+/// Largest sine of the angle between a member's normal and the item's, beyond the effect of
+/// rounding.
 const SINE: f64 = 1e-6;
-/// How far two corners' rounding (see [`crate::elements`]) may lift one over the other: √3 steps of 2⁻²⁶, and some room.
+/// How far two corners' rounding (see [`crate::elements`]) may lift one over the other: √3 steps of
+/// 2⁻²⁶, and a margin.
 const ROUNDING: f64 = 4e-8;
 
-/// All regions of two elements or more, by their first members; none overlaps another. Each member fits the plane of the
-/// item itself, not that of the neighbour it was reached from: no bend is too gentle to end a region.
+/// All regions of two or more elements, in order of their first members; they do not overlap. Each
+/// member is compared with the item's plane, not with that of the neighbour it was reached from, so
+/// that even a gentle bend ends a region.
 pub fn regions(elements: &Elements, connections: &Connections) -> Vec<Region> {
     let mut growth = Growth {
         elements,
@@ -34,7 +37,7 @@ pub fn regions(elements: &Elements, connections: &Connections) -> Vec<Region> {
     };
     let mut regions = Vec::new();
     for e in 0..elements.len() as u32 {
-        // A better item may leave the first one out.
+        // A region about a better item may not include element e.
         while !growth.taken[e as usize] {
             let (item, mut members) = growth.best(e);
             for &m in &members {
@@ -54,14 +57,15 @@ struct Growth<'a> {
     elements: &'a Elements,
     connections: &'a Connections,
     taken: Vec<bool>,
-    /// In which round each was reached last.
+    /// Round in which each element was last reached.
     reached: Vec<u32>,
     round: u32,
 }
 
 impl Growth<'_> {
-    /// The item and the members of the region about an element. Normals of small elements are rough where no axis is at right
-    /// angles to them: the member whose normal is nearest to the mean is tried until the region grows no more.
+    /// The item and the members of the region about an element. Normals of small elements are
+    /// imprecise unless they are along an axis: the member whose normal is nearest to the mean
+    /// becomes the item until the region grows no more.
     fn best(&mut self, seed: u32) -> (u32, Vec<u32>) {
         let normal = |e: u32| self.elements.normal[e as usize];
         let area = |e: u32| self.elements.area[e as usize];

@@ -1,7 +1,7 @@
 //! Triangles of a region from its outline.
 //!
-//! By a constrained Delaunay triangulation, since it keeps the corners at which an outline goes straight on; ear clipping drops
-//! them.
+//! A constrained Delaunay triangulation keeps the corners where an outline is straight; ear
+//! clipping would drop them.
 
 use std::collections::HashSet;
 
@@ -11,11 +11,11 @@ use super::outline::Outline;
 use super::region::Region;
 use crate::elements::Elements;
 
-/// Largest difference of the triangles' area from the elements', as a share.
+/// Largest relative difference of the triangles' area from the elements'.
 const AREA: f64 = 1e-6;
 
-/// Triangles over the outline's vertices, each as its region winds; none where the outline crosses itself or their area is not
-/// the region's.
+/// Triangles over the outline's vertices, wound as the region's elements. None where the outline
+/// crosses itself or the area differs from the region's.
 pub fn triangulate(
     elements: &Elements,
     region: &Region,
@@ -50,7 +50,7 @@ pub fn triangulate(
     if crossed || mesh.num_vertices() != vertices.len() || mesh.num_constraints() != count {
         return None;
     }
-    // From the left of the outline's edges to all that no edge of it cuts off.
+    // Flood fill from the left of the outline's edges, bounded by its edges.
     let mut inside = vec![false; mesh.num_all_faces()];
     let mut faces = Vec::new();
     for edge in mesh.directed_edges() {

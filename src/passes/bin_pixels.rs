@@ -101,10 +101,7 @@ impl BinPixels {
             &rows.occupied,
         ];
         let rows = self.rows.bind("pixel rows", &to_rows.map(Bind::Buffer))?;
-        Ok(Bound {
-            bin,
-            rows,
-        })
+        Ok(Bound { bin, rows })
     }
 
     /// After a barrier between earlier readers of the rows and transfers.

@@ -54,13 +54,7 @@ impl Keep {
     ) -> Result<Bound> {
         let bytes = u64::from(slot_count) * size_of::<KeptRow>() as u64;
         let rows = Buffer::new(device, "rows of a batch", bytes, BufferUse::Storage)?;
-        let allocate = [
-            slots,
-            &fresh.occupied,
-            &rows,
-            &kept.table,
-            &kept.state,
-        ];
+        let allocate = [slots, &fresh.occupied, &rows, &kept.table, &kept.state];
         let keep = [slots, &rows, &kept.table, &fresh.plain, &fresh.meso];
         Ok(Bound {
             allocate: (self.allocate).bind("allocate", &allocate.map(Bind::Buffer))?,
@@ -71,13 +65,7 @@ impl Keep {
     }
 
     /// `scratch`: which of the [`super::kept_rows::SCRATCH`] chunks takes the rows without room.
-    pub fn record(
-        &self,
-        cmd: &Commands,
-        bound: &Bound,
-        kept: &KeptRows,
-        scratch: u32,
-    ) {
+    pub fn record(&self, cmd: &Commands, bound: &Bound, kept: &KeptRows, scratch: u32) {
         let shape = kept.shape;
         let allocate = [
             bound.slot_count,

@@ -40,13 +40,7 @@ impl Normalise {
         )
     }
 
-    pub fn record(
-        &self,
-        cmd: &Commands,
-        set: &DescriptorSet,
-        batch: &Batch,
-        rows: &FreshRows,
-    ) {
+    pub fn record(&self, cmd: &Commands, set: &DescriptorSet, batch: &Batch, rows: &FreshRows) {
         let counts = [rows.shape.plain_count, rows.shape.meso_count];
         cmd.dispatch(&self.pipeline, set, &counts, [batch.slot_count, 1, 1]);
     }

@@ -110,10 +110,7 @@ impl PixelsRelief {
             .map(Bind::Buffer),
         );
         let to = self.to.bind("pixels to relief", &binds)?;
-        Ok(Bound {
-            from,
-            to,
-        })
+        Ok(Bound { from, to })
     }
 
     /// Slot after slot, some rows at a time; elements without relief and those with one are different elements.

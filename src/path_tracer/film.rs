@@ -1,4 +1,4 @@
-//! A picture on the way: sums of independent batches, from which its own error follows.
+//! A picture in progress: sums of independent batches, which give its error.
 
 use std::time::Duration;
 
@@ -10,8 +10,8 @@ use crate::render::Picture;
 /// Standard errors on each side of a mean that hold 95 % of a normal distribution.
 pub(crate) const NORMAL_95: f64 = 1.959_964;
 
-/// What paths have found. Every pass of [`PathTracer::render`](super::PathTracer::render) is one batch, independent of the
-/// others.
+/// What paths have found. Every pass of [`PathTracer::render`](super::PathTracer::render) is one
+/// batch, independent of the others.
 #[derive(Debug, Clone)]
 pub struct Film {
     pub width: u32,
@@ -26,11 +26,11 @@ pub struct Film {
 
 #[derive(Debug, Clone, Copy)]
 struct Pixel {
-    /// Mean radiance of the batches, and the sum of their squared deviations from it, RGB: by Welford's update (1962), in
-    /// which equal batches have no spread at all.
+    /// Mean radiance of the batches, and the sum of their squared deviations from it, RGB: by
+    /// Welford's update (1962), which gives equal batches a spread of exactly 0.
     mean: DVec3,
     deviations: DVec3,
-    /// Whether it has shown fronts alone, and none that emits.
+    /// Whether all paths hit fronts that do not emit.
     metered: bool,
 }
 
@@ -58,7 +58,7 @@ impl Film {
         }
     }
 
-    /// Adds one batch of so many paths to every pixel; `batch` is given column and row.
+    /// Adds one batch of `paths` paths to every pixel; `batch` takes column and row.
     pub(super) fn add(&mut self, paths: u32, batch: impl Fn(u32, u32) -> Batch + Sync) {
         let width = self.width as usize;
         let count = f64::from(self.passes + 1);
@@ -78,13 +78,14 @@ impl Film {
         self.passes += 1;
     }
 
-    /// Mean radiance of each pixel, `[row][column]` from the top left, W·m⁻²·sr⁻¹, linear RGB. Unbiased.
+    /// Mean radiance of each pixel, `[row][column]` from the top left, W·m⁻²·sr⁻¹, linear RGB.
+    /// Unbiased.
     pub fn radiance(&self) -> Vec<DVec3> {
         self.pixels.iter().map(|p| p.mean).collect()
     }
 
-    /// Standard error of each pixel's radiance, `[row][column]`, RGB: s/√n of the n batches. From so few batches it is itself
-    /// uncertain by about 1/√(2n − 2).
+    /// Standard error of each pixel's radiance, `[row][column]`, RGB: s/√n of the n batches. From
+    /// so few batches it is itself uncertain by about 1/√(2n − 2).
     pub fn standard_error(&self) -> Vec<DVec3> {
         self.pixels.iter().map(|p| self.error_of(p)).collect()
     }
@@ -102,7 +103,8 @@ impl Film {
         (sum / count, NORMAL_95 * error)
     }
 
-    /// The root of the mean over all pixels that are not black of squared standard error / squared radiance.
+    /// The root of the mean of squared standard error / squared radiance over all pixels that are
+    /// not black.
     pub fn relative_error(&self) -> f64 {
         let (mut sum, mut count) = (0.0, 0);
         for pixel in &self.pixels {
@@ -119,7 +121,7 @@ impl Film {
         }
     }
 
-    /// The picture as it is, to be exposed and written.
+    /// The picture so far.
     pub fn picture(&self) -> Picture {
         let radiance: Vec<_> = self
             .pixels
@@ -135,7 +137,7 @@ impl Film {
     }
 }
 
-/// Of a mean of so many independent values with this sum of squared deviations.
+/// Standard error of a mean of `count` independent values with this sum of squared deviations.
 pub(super) fn standard_error(deviations: DVec3, count: f64) -> DVec3 {
     let squared = deviations.max(DVec3::ZERO) / ((count - 1.0) * count);
     DVec3::from_array(squared.to_array().map(f64::sqrt))

@@ -13,21 +13,24 @@ use rayon::prelude::*;
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 
-/// What a ray starts above its surface, internal units: far above the rounding of f64, also 10⁶ units from the origin, far
-/// below any shape. As near behind a front, a back is its own surface's other side.
+/// Distance of a ray's start above its surface, internal units: far above the rounding of f64, also
+/// 10⁶ units from the origin, and far below any shape. A back this close behind a front counts as
+/// the front's other side.
 pub const ABOVE: f64 = 1.0 / (1u64 << 30) as f64;
 
-/// Boxes and their rays are so many times larger than internal units. obvhs passes over a box that a ray leaves within its
-/// own 10⁻⁴: here no box is so thin beyond its triangle, see `BOX_MARGIN`.
+/// Scale of boxes and their rays over internal units. obvhs skips a box that a ray leaves within
+/// its own 10⁻⁴: at this scale every box reaches further beyond its triangle, see `BOX_MARGIN`.
 const BOX_SCALE: f64 = 1024.0;
 
-/// What boxes are wider than their triangles: 2⁻¹⁷ internal units, more than rays of length 4 in f32 miss a place by.
+/// Margin of boxes about their triangles: 2⁻¹⁷ internal units, more than the error in f32 of rays
+/// of length 4.
 const BOX_MARGIN: f32 = BOX_SCALE as f32 / (1u32 << 17) as f32;
 
 /// Half side of the cube, about the scene's own of 1, at which a ray from outside begins.
 const CUBE: f64 = 1.0 + 1.0 / 16.0;
 
-/// The scene's triangles in internal units: about the scene's middle, coordinates in −1..1, as [`crate::elements`] has them.
+/// The scene's triangles in internal units: about the scene's middle, coordinates in −1..1, as
+/// [`crate::elements`] has them.
 pub struct Geometry {
     pub origin: DVec3,
     /// Scene units of one internal unit.
@@ -46,7 +49,7 @@ pub struct Hit {
     pub place: DVec3,
     /// Unit normal of the front.
     pub normal: DVec3,
-    /// Whether the ray came from there.
+    /// Whether the ray came from the front.
     pub front: bool,
     pub distance: f64,
     /// Barycentric weights of the corners.
@@ -54,7 +57,7 @@ pub struct Hit {
 }
 
 impl Hit {
-    /// The value at the hit of what is linear over the triangle.
+    /// Interpolates the corners' values at the hit.
     pub fn interpolate(&self, corners: [DVec2; 3]) -> DVec2 {
         (0..3).map(|k| corners[k] * self.weights[k]).sum()
     }
@@ -73,7 +76,7 @@ impl Boundable for Bounds<'_> {
 
 impl Geometry {
     /// # Errors
-    /// A scene without triangles, or with corners that are missing or no numbers.
+    /// A scene without triangles, or with corners that are missing or not finite.
     pub fn new(scene: &Scene) -> Result<Self> {
         let refuse = |what: &str| {
             Err(Error::Scene {
@@ -99,7 +102,7 @@ impl Geometry {
             .par_iter()
             .map(|t| scene.corners(t).map(|p| (p - origin) / unit))
             .collect();
-        // A corner that is no number would be lost in the bounds of a box.
+        // A NaN corner would be lost in the bounds of a box.
         if !corners.iter().flatten().all(|p| p.is_finite()) {
             return refuse("a corner is not finite");
         }
@@ -133,8 +136,8 @@ impl Geometry {
         self.corners[triangle]
     }
 
-    /// The nearest surface from `from` along the unit vector `direction`. Of a front and a back in one place it is the side
-    /// that faces the ray.
+    /// The nearest surface from `from` along the unit vector `direction`. Where a front and a back
+    /// coincide, it is the side that faces the ray.
     pub fn hit(&self, from: DVec3, direction: DVec3) -> Option<Hit> {
         let skipped = distance_to_cube(from, direction)?;
         let start = from + skipped * direction;
@@ -186,7 +189,7 @@ impl Geometry {
     }
 }
 
-/// A ray that finds boxes.
+/// A ray in the scale of the boxes.
 fn box_ray(start: DVec3, direction: DVec3) -> Ray {
     let start = (start * BOX_SCALE).as_vec3a();
     Ray::new(start, direction.as_vec3a(), 0.0, f32::INFINITY)
@@ -199,7 +202,8 @@ struct Crossing {
 }
 
 impl Crossing {
-    /// Both sides of an edge find the same volume with the opposite sign, to the bit: no ray passes between two triangles.
+    /// The two triangles of an edge compute the same volume with opposite signs, to the bit: no ray
+    /// passes between them.
     fn of(corners: &[DVec3; 3], from: DVec3, direction: DVec3) -> Option<Self> {
         let [a, b, c] = corners.map(|p| p - from);
         let volumes = [
@@ -226,7 +230,8 @@ impl Crossing {
     }
 }
 
-/// Distance to the cube about the scene, 0 from within it; none for a ray that misses it or is no ray.
+/// Distance to the cube about the scene, 0 from within it; None for a ray that misses it or is not
+/// finite.
 fn distance_to_cube(from: DVec3, direction: DVec3) -> Option<f64> {
     if !from.is_finite() || !direction.is_normalized() {
         return None;
@@ -253,8 +258,8 @@ mod tests {
     use crate::path_tracer::sampling::{Random, cosine_direction};
     use crate::scene::{Material, Triangle};
 
-    /// Groups of triangles of every size about one place, half of them square to an axis, and rays from their surfaces: the
-    /// same as by trying every triangle.
+    /// Groups of triangles of every size about one place, half of them perpendicular to an axis,
+    /// and rays from their surfaces: the same as by trying every triangle.
     #[test]
     fn boxes_lose_nothing() {
         let mut random = Random::new(0, 0, 0);

@@ -1,5 +1,6 @@
-//! Instant radiosity (Keller 1997): light paths leave virtual point lights where they meet the scene, and irradiance is the
-//! sum of the lights that a place sees. On the CPU, with the path tracer's own geometry and rays; a peer to measure against.
+//! Instant radiosity (Keller 1997): light paths leave virtual point lights where they meet the
+//! scene, and irradiance is the sum of the lights that a place sees. On the CPU, with the path
+//! tracer's own geometry and rays; a peer to measure against.
 
 use std::f64::consts::PI;
 
@@ -11,19 +12,20 @@ use super::geometry::ABOVE;
 use super::lights::Start;
 use super::sampling::{Random, cosine_direction, radical_inverse, sphere_direction};
 
-/// Bases of the first random numbers of a path; later ones are pseudo-random, since high bases need many paths to be even.
+/// Bases of the first random numbers of a path. Later numbers are pseudo-random, since high bases
+/// need many paths to become even.
 const BASES: [u32; 8] = [2, 3, 5, 7, 11, 13, 17, 19];
 
-/// Most chance of a path to go on: a closed white room would otherwise be walked for ever.
+/// Highest probability of continuing a path: in a closed white room it would never end otherwise.
 const MOST_CHANCE: f64 = 0.98;
 
 /// A virtual point light, internal units.
 #[derive(Debug, Clone, Copy)]
 struct Light {
     place: DVec3,
-    /// Unit normal of the surface that it stands on; none of a point light, which shines everywhere.
+    /// Unit normal of its surface; None for a point light, which emits in all directions.
     normal: Option<DVec3>,
-    /// Radiant flux that it sends out, RGB; of a point light radiant intensity.
+    /// Radiant flux, RGB; of a point light radiant intensity.
     power: DVec3,
 }
 
@@ -31,7 +33,7 @@ struct Light {
 pub struct VirtualLights<'a> {
     tracer: &'a PathTracer<'a>,
     lights: Vec<Light>,
-    /// Area of surface, internal units, that a light stands for.
+    /// Area of surface that a light represents, internal units.
     share: f64,
 }
 
@@ -58,8 +60,9 @@ impl Numbers {
 }
 
 impl<'a> VirtualLights<'a> {
-    /// Walks `paths` light paths. Each leaves a light where it starts and wherever it is reflected; it goes on with the
-    /// chance of the largest reflectance there, so that lights differ little in power.
+    /// Traces `paths` light paths. Each leaves a virtual light at its start and at each reflection.
+    /// It continues with the probability of the largest reflectance there, so that lights differ
+    /// little in power.
     pub fn new(tracer: &'a PathTracer<'a>, paths: u32, seed: u64) -> Self {
         let count = f64::from(paths.max(1));
         let walks: Vec<Vec<Light>> = (0..paths.max(1))
@@ -94,8 +97,9 @@ impl<'a> VirtualLights<'a> {
 
     /// Irradiance at a place (scene units) about a unit normal, W·m⁻², RGB.
     ///
-    /// A light on a surface counts as a small disc of the area that it stands for, Φ cosθ cosθ' / (π d² + a): near a corner
-    /// the formula of a point would have no bound, and with ever more lights the disc vanishes.
+    /// A light on a surface counts as a small disc of the area a that it represents, Φ cosθ cosθ' /
+    /// (π d² + a). The formula of a point is unbounded near a corner; the area of the disc goes to
+    /// 0 with more lights.
     pub fn irradiance(&self, point: DVec3, normal: DVec3) -> Vec3 {
         let place = self.tracer.geometry.inside(point);
         let above = place + ABOVE * normal;

@@ -1,4 +1,4 @@
-//! What shines of itself, and light straight from it.
+//! Emitters and point lights, and the light straight from them.
 
 use std::f64::consts::PI;
 
@@ -38,7 +38,7 @@ pub struct Start {
     pub place: DVec3,
     /// Of the emitter; none of a point light, which the path leaves in any direction.
     pub normal: Option<DVec3>,
-    /// Radiant flux over the chance of this start, RGB.
+    /// Radiant flux over the probability of this start, RGB.
     pub power: DVec3,
 }
 
@@ -80,8 +80,8 @@ impl Lights {
         }
     }
 
-    /// The start of a light path, chosen by power among emitters and point lights; none where nothing shines. `choice` in 0..1
-    /// picks the light, `at` the place on it.
+    /// The start of a light path, chosen by power among emitters and point lights; None where
+    /// nothing emits. `choice` in 0..1 picks the light, `at` the place on it.
     pub fn start(&self, choice: f64, at: DVec2) -> Option<Start> {
         // An emitter sends π Le A, a point light 4π I.
         let (areas, points) = (PI * self.areas.total(), 4.0 * PI * self.points.total());
@@ -120,8 +120,9 @@ impl Lights {
         }
     }
 
-    /// One sample of the irradiance at `place` from point lights, and of that from emitters weighted by the balance
-    /// heuristic (Veach 1997) against a direction of density cos θ / π.
+    /// One sample of the irradiance at `place` from point lights, and of that from emitters
+    /// weighted by the balance heuristic (Veach 1997) against sampling directions with density cos
+    /// θ / π.
     pub fn sample(
         &self,
         geometry: &Geometry,
@@ -154,7 +155,7 @@ impl Lights {
         sum
     }
 
-    /// The balance heuristic's weight of an emitter met by a direction of density cos θ / π.
+    /// The balance heuristic's weight of an emitter hit by a direction of density cos θ / π.
     pub fn weight_when_met(&self, hit: &Hit, direction: DVec3, cosine: f64) -> f64 {
         let place = self.emitter_of[hit.triangle];
         if place == NONE {

@@ -1,9 +1,11 @@
-//! The reference: an unbiased path tracer on the CPU that knows its own error. Slow, and independent of all that bakes.
+//! The reference: an unbiased path tracer on the CPU with an estimate of its own error. Slow, and
+//! independent of the baking code.
 //!
-//! A front shows L = Le + ρ/π · E, a back is black and blocks; light leaves fronts alone (Kajiya 1986, diffuse). At each place
-//! of a path emitters and point lights are sampled, and emitters that the path itself meets count by the balance heuristic
-//! (Veach 1997); Russian roulette ends a path, no depth does. Relief is drawn as it is in the scene: give it the geometry of
-//! [`scene::displace`](crate::scene::displace) to see it.
+//! A front shows L = Le + ρ/π · E; a back is black and blocks light; only fronts send light (Kajiya
+//! 1986, diffuse). Emitters and point lights are sampled at each vertex of a path, and emitters
+//! that the path itself hits are weighted by the balance heuristic (Veach 1997). Paths end by
+//! Russian roulette only. Height maps are ignored: to include relief, pass the geometry of
+//! [`scene::displace`](crate::scene::displace).
 //!
 //! ```text
 //! scene ─► geometry (bounding volume hierarchy) ─┐
@@ -39,19 +41,23 @@ use sampling::Random;
 /// Most pixels of a picture: 64 Mi take 3.5 GiB of sums.
 pub const MOST_PIXELS: u64 = 1 << 26;
 
-/// Most paths of a pixel: far below the ends of u32 once they are rounded up to whole passes.
+/// Most paths of a pixel: far below the limit of u32 when rounded up to whole passes.
 pub const MOST_PATHS: u32 = 1 << 30;
 
-/// Batches that [`Settings::paths`] are split into at least, where there are as many: fewer tell little of their spread.
+/// Least batches that [`Settings::paths`] are split into, if there are as many paths: the spread of
+/// fewer is too uncertain.
 const LEAST_PASSES: u32 = 8;
 
-/// Most strata along a side of a pixel: beyond 4, what is left is noise of the paths and not of the pixel's edges.
+/// Most strata along a side of a pixel: beyond 4, the remaining noise is that of the paths and not
+/// of edges within the pixel.
 const MOST_STRATA: u32 = 4;
 
-/// Paths of a pass, about, unless it has more pixels: a few seconds, after which it can be stopped.
+/// Approximate paths of a pass, unless the picture has more pixels: a few seconds, after which
+/// tracing can be stopped.
 const PASS_PATHS: u64 = 1 << 20;
 
-/// Paths that are summed by one thread at a time: fixed, so that the sum does not depend on the threads.
+/// Paths that one thread sums at a time: fixed, so that the sum does not depend on the number of
+/// threads.
 const CHUNK: u32 = 1024;
 
 /// How a picture is traced.
@@ -59,9 +65,9 @@ const CHUNK: u32 = 1024;
 pub struct Settings {
     /// Paths of each pixel, at least 2; rounded up to whole passes.
     pub paths: u32,
-    /// No pass is begun that would probably end after it; two are made in any case.
+    /// No pass is begun that would probably end after it; two are always made.
     pub budget: Option<Duration>,
-    /// Another seed is another, independent picture.
+    /// Another seed gives an independent picture.
     pub seed: u64,
     pub light: Light,
 }
@@ -77,10 +83,10 @@ impl Default for Settings {
     }
 }
 
-/// How far a picture is.
+/// Progress of a picture.
 #[derive(Debug, Clone, Copy)]
 pub struct Progress {
-    /// Paths of each pixel so far, and in the end.
+    /// Paths of each pixel so far, and in total.
     pub paths: u32,
     pub of: u32,
     pub elapsed: Duration,
@@ -106,12 +112,13 @@ impl<'a> PathTracer<'a> {
         })
     }
 
-    /// Traces a picture: box filter over the pixel, jittered strata. The same settings give the same bits, whatever the
-    /// threads. `go_on` is asked after each pass from the second on; at its no, what there is, is the result.
+    /// Traces a picture: box filter over the pixel, jittered strata. The same settings give the
+    /// same bits for any number of threads. `go_on` is called after each pass from the second on;
+    /// when it returns false, the picture so far is the result.
     ///
     /// # Errors
-    /// Paths not in 2..=[`MOST_PATHS`]; a size of 0, above [`crate::render::MOST_PIXELS`] a side or above [`MOST_PIXELS`]; a
-    /// camera that looks nowhere.
+    /// Paths not in 2..=[`MOST_PATHS`]; a size of 0, above [`crate::render::MOST_PIXELS`] a side or
+    /// above [`MOST_PIXELS`]; a camera that looks nowhere.
     pub fn render(
         &self,
         view: &View<'_>,
@@ -181,11 +188,11 @@ impl<'a> PathTracer<'a> {
         Ok(film)
     }
 
-    /// Irradiance at a place of the scene (scene units) about a unit normal, and its standard error, W·m⁻², RGB; zero about no
-    /// direction. At least two paths are traced.
+    /// Irradiance at a place of the scene (scene units) about a unit normal, and its standard
+    /// error, W·m⁻², RGB; zero about no direction. At least two paths are traced.
     ///
-    /// An independent check of the radiosity solver: at a place on an element, with its normal, it is what `irradiance` of
-    /// the solution tells of the element there.
+    /// An independent check of the radiosity solver: at a place on an element, with its normal, it
+    /// is the `irradiance` that the solution has of the element there.
     pub fn irradiance(
         &self,
         point: DVec3,

@@ -9,10 +9,11 @@ use super::geometry::{ABOVE, Hit};
 use super::sampling::{Random, cosine_direction};
 use crate::render::Light;
 
-/// Bounces before roulette: most of the light has been found by then.
+/// Bounces before Russian roulette: most of the light has been found by then.
 const SURE_BOUNCES: u32 = 3;
 
-/// Most chance to go on after that: a closed white room would otherwise be walked for ever.
+/// Highest probability of continuing after that: a path in a closed white room would never end
+/// otherwise.
 const MOST_CHANCE: f64 = 0.98;
 
 impl PathTracer<'_> {
@@ -42,7 +43,7 @@ impl PathTracer<'_> {
     ) -> DVec3 {
         let (mut place, mut normal) = (place, normal);
         let mut sum = DVec3::ZERO;
-        // What irradiance here counts for where the path began.
+        // Weight of irradiance here at the start of the path.
         let mut carried = DVec3::ONE;
         for bounce in 0_u32.. {
             let counts = match light {
@@ -59,7 +60,7 @@ impl PathTracer<'_> {
                         .lights
                         .sample(&self.geometry, place, normal, choices, at);
             }
-            // Go on in a direction of density cos θ / π
+            // Continue in a direction of density cos θ / π
             let direction = cosine_direction(normal, random.square());
             let Some(hit) = self.geometry.hit(place + ABOVE * normal, direction) else {
                 break;

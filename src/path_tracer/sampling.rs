@@ -1,11 +1,11 @@
-//! Random numbers, and directions and places chosen by them.
+//! Random numbers, directions and places.
 
 use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
-/// SplitMix64 (Steele et al. 2014), a stream for each sample: what a path meets depends on its number alone, not on the
-/// threads.
+/// SplitMix64 (Steele et al. 2014), a stream for each sample: a path depends only on its number,
+/// not on the threads.
 pub struct Random(u64);
 
 impl Random {
@@ -50,7 +50,8 @@ pub fn sphere_direction(at: DVec2) -> DVec3 {
     DVec3::new(flat * cos, flat * sin, height)
 }
 
-/// The digits of `index` in a base, mirrored at the point (van der Corput): in 0..1, evenly spread for any first indices.
+/// The digits of `index` in a base, mirrored at the point (van der Corput): in 0..1, evenly spread
+/// over any first indices.
 pub fn radical_inverse(base: u32, index: u64) -> f64 {
     let base = u64::from(base);
     let (mut left, mut scale, mut sum) = (index, 1.0, 0.0);
@@ -68,7 +69,7 @@ pub fn on_triangle([a, b, c]: [DVec3; 3], at: DVec2) -> DVec3 {
     a * (1.0 - root) + b * (root * (1.0 - at.y)) + c * (root * at.y)
 }
 
-/// Chooses among things by weight.
+/// Chooses an index with probability proportional to its weight.
 #[derive(Debug, Clone, Default)]
 pub struct Choice {
     /// Sums of the weights so far, the last one the total.
@@ -87,7 +88,7 @@ impl Choice {
         Self { sums }
     }
 
-    /// The chance of being chosen.
+    /// The probability of an index.
     pub fn probability(&self, index: usize) -> f64 {
         let before = if index == 0 {
             0.0
@@ -97,14 +98,14 @@ impl Choice {
         (self.sums[index] - before) / self.total()
     }
 
-    /// A thing and the chance of having chosen it; none where there is nothing of any weight.
+    /// An index and its probability; None where all weights are 0.
     pub fn choose(&self, at: f64) -> Option<(usize, f64)> {
         let target = at * self.total();
         let index = self.sums.partition_point(|&sum| sum <= target);
         (index < self.sums.len()).then(|| (index, self.probability(index)))
     }
 
-    /// Of all weights.
+    /// Sum of all weights.
     pub fn total(&self) -> f64 {
         self.sums.last().copied().unwrap_or(0.0)
     }

@@ -5,8 +5,9 @@ use crate::elements::Elements;
 use crate::hemicube::{Pixel, delta_form_factor, solid_angle_share};
 use crate::sources::Source;
 
-/// Form factor from a source to each element, equation (1): the sum of the delta form factors of its pixels. For a point
-/// light, the element's share of half the sphere. A back blocks light and takes none.
+/// Form factor from a source to each element, equation (1): the sum of the delta form factors of
+/// its pixels. For a point light, the element's share of half the sphere. A back blocks light and
+/// receives none.
 pub fn form_factors(elements: &Elements, source: &Source, items: &[u32], n: u32) -> Vec<f64> {
     let mut sums = vec![0.0; elements.len()];
     for (i, &item) in items.iter().enumerate() {
@@ -29,8 +30,8 @@ pub fn form_factors(elements: &Elements, source: &Source, items: &[u32], n: u32)
     sums
 }
 
-/// Irradiance of an element of area `area` from a unit of radiosity (for a point light, of intensity) of the source,
-/// equation (2).
+/// Irradiance of an element of area `area` from a unit of radiosity (for a point light, of
+/// intensity) of the source, equation (2).
 pub fn irradiance(source: &Source, form_factor: f64, area: f64) -> f64 {
     match source.kind {
         KIND_POINT => std::f64::consts::TAU * form_factor / area,

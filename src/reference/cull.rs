@@ -1,4 +1,5 @@
-//! Twin of the culling pass: which items a hemicube's item buffer shows. Whatever is culled, these must be drawn.
+//! Twin of the culling pass: the items that a hemicube's item buffer shows. The pass must not cull
+//! them.
 
 use std::collections::BTreeSet;
 

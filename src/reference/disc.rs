@@ -1,15 +1,15 @@
-//! Twin of `shaders/shared/disc.glsl`: a source seen wide, as an ellipse of even radiance of which only the vector of its light
-//! is known.
+//! Twin of `shaders/shared/disc.glsl`: a wide source, approximated by an ellipse of even radiance
+//! from the vector of its light alone.
 
 use glam::{DVec2, DVec3};
 
 const WIDE: f64 = 0.01;
 const WIDEST: f64 = 0.1;
-/// Between points that follow one another: the golden angle.
+/// Angle between successive points: the golden angle.
 const TURN: f64 = 2.399_963_23;
 
-/// Shares of `f`, ∫ ω dω / π over the source in the element's frame, by direction: they sum to `f`, and none lies below the
-/// horizon.
+/// Shares of `f`, ∫ ω dω / π over the source in the element's frame, by direction: they sum to `f`,
+/// and none lies below the horizon.
 pub fn points(f: DVec3) -> Vec<DVec3> {
     let size = f.length();
     let pairs = match size {
@@ -63,7 +63,7 @@ mod tests {
         }
     }
 
-    /// Second moments tell how wide the light is spread: ∫ z² dω, of a cone (1 − cos³ θ) · 2π / 3.
+    /// Second moments measure the spread of the light: ∫ z² dω, for a cone (1 − cos³ θ) · 2π / 3.
     #[test]
     fn points_are_spread_as_the_source_is() {
         let second = |f: DVec3, along: DVec3| -> f64 {
@@ -82,8 +82,8 @@ mod tests {
                 "{degrees}°: {got} for {want}"
             );
         }
-        // The quarter of a sphere on one side of a wall that stands on the horizon, ∫ x² dω = ∫ y² dω = ∫ z² dω = π / 3:
-        // sixteen points miss the ends of its arc, not its height.
+        // The quarter of a sphere on one side of a wall that rises from the horizon, ∫ x² dω = ∫ y²
+        // dω = ∫ z² dω = π / 3: sixteen points miss the ends of its arc, not its height.
         let quarter = DVec3::new(0.5, 0.0, 0.5);
         for (along, most_off) in [(DVec3::X, 0.15), (DVec3::Y, 0.4), (DVec3::Z, 0.15)] {
             let got = 3.0 * second(quarter, along);

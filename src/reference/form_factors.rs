@@ -1,4 +1,5 @@
-//! Twin of the receiver estimator: form factors and visibility of one source for every element, in f64.
+//! Twin of the receiver estimator: form factors and visibility of one source for every element, in
+//! f64.
 
 use glam::DVec3;
 
@@ -10,10 +11,11 @@ use crate::sources::Source;
 
 /// Rounding of a plane's height at a point, as in the shader.
 const HEIGHT_EPSILON: f64 = 1e-6;
-/// Pixels' footprints that two points of one surface may lie apart, as in the shader.
+/// Largest distance between two points of one surface, in footprints of a pixel, as in the shader.
 const REACH: f64 = 1.5;
 
-/// Mean over an element of form factor times visibility, which `seen` tells of a place: irradiance from a unit of the source's radiosity.
+/// Mean over an element of form factor times visibility: irradiance from a unit of the source's
+/// radiosity. `seen` says whether the source sees a place.
 pub fn gather(
     elements: &Elements,
     source: &Source,
@@ -45,17 +47,19 @@ pub fn gather(
         .sum()
 }
 
-/// Cosine of the angle from which on two surfaces are not level, as in the shader.
+/// Cosine of the largest angle between surfaces that count as parallel, as in the shader.
 const LEVEL: f64 = 0.99;
 
-/// As in the shader: whether a place lies in the plane of a plane source with which its surface is level.
+/// As in the shader: whether a place lies in the plane of a plane source and its surface is
+/// parallel to it.
 fn lies_in_plane(p: DVec3, normal: DVec3, source: &Source) -> bool {
     let level = normal.dot(source.normal).abs() >= LEVEL;
     let plane = source.kind != KIND_POINT && source.cone == 0.0;
     plane && level && (p - source.centroid).dot(source.normal) <= HEIGHT_EPSILON
 }
 
-/// As in the shader: a place in the plane of a source with which its surface is not level, a little before it.
+/// As in the shader: moves a place that lies in the plane of a source, on a surface not parallel to
+/// it, slightly in front of the plane.
 fn before_plane(p: DVec3, normal: DVec3, source: &Source) -> DVec3 {
     let height = (p - source.centroid).dot(source.normal);
     let plane = source.kind != KIND_POINT && source.cone == 0.0;
@@ -66,7 +70,7 @@ fn before_plane(p: DVec3, normal: DVec3, source: &Source) -> DVec3 {
     }
 }
 
-/// Form factor from a point of an element to the source, as if nothing stood between.
+/// Form factor from a point of an element to the source, without occlusion.
 fn form_factor(elements: &Elements, source: &Source, p: DVec3, element: usize) -> f64 {
     let normal = elements.normal[element];
     if source.kind == KIND_POINT {
@@ -94,7 +98,7 @@ fn form_factor(elements: &Elements, source: &Source, p: DVec3, element: usize) -
             .sum::<f64>()
             .max(0.0);
     }
-    // Curved: every member that shows its front, by itself.
+    // A curved source: the sum over the members whose fronts face the point.
     (source.first_element..source.first_element + source.element_count)
         .map(|m| m as usize)
         .filter(|&m| m != element && (p - elements.centroid[m]).dot(elements.normal[m]) > 0.0)
@@ -102,11 +106,13 @@ fn form_factor(elements: &Elements, source: &Source, p: DVec3, element: usize) -
         .sum()
 }
 
-/// Whether the source's item buffer, of n pixels a side, says that it sees a place on an element.
+/// Whether the source sees a place `p` on an element, by its item buffer `items`, `[row][column]`
+/// of a hemicube of `n` pixels a side.
 pub fn visible(
     elements: &Elements,
     source: &Source,
-    (items, n): (&[u32], u32),
+    items: &[u32],
+    n: u32,
     p: DVec3,
     element: usize,
 ) -> bool {
@@ -142,7 +148,8 @@ pub fn visible(
     apart <= REACH * footprint && depth <= apart * normal.cross(plane).length() + HEIGHT_EPSILON
 }
 
-/// Sample points of a triangle (two barycentric coordinates, weight): the centroid; degree 2; Radon's degree 5.
+/// Sample points of a triangle (two barycentric coordinates, weight): the centroid; degree 2;
+/// Radon's degree 5.
 const POINTS: [[f64; 3]; 11] = [
     [1.0 / 3.0, 1.0 / 3.0, 1.0],
     [1.0 / 6.0, 1.0 / 6.0, 1.0 / 3.0],

@@ -9,19 +9,21 @@ use crate::hemicube::{Pixel, direction_of};
 use crate::occluders::Occluders;
 use crate::sources::Source;
 
-/// Distance of the near plane, as in the pass; a ray's largest component in the source's frame is 1.
+/// Distance of the near plane, as in the pass; a ray's largest component in the source's frame is
+/// 1.
 const NEAR: f64 = 1e-6;
 
-/// Where a ray meets the plane of a triangle.
+/// Intersection of a ray with the plane of a triangle.
 #[derive(Debug, Clone, Copy)]
 pub struct Hit {
-    /// Distance along the ray, in its own lengths.
+    /// Distance along the ray, in lengths of the ray vector.
     pub along: f64,
     /// Least barycentric coordinate: below 0 outside the triangle, 0 on an edge.
     pub inside: f64,
 }
 
-/// The plane of a triangle met by the ray from `origin`; none where they are parallel or it lies behind.
+/// Intersection of the ray from `origin` with the plane of a triangle; None where they are parallel
+/// or the plane is behind.
 pub fn intersect(origin: DVec3, ray: DVec3, [a, b, c]: [DVec3; 3]) -> Option<Hit> {
     let (u, v) = (b - a, c - a);
     let p = ray.cross(v);
@@ -81,7 +83,8 @@ fn first(
         .map_or(NONE, |(_, i)| occluders.items[i])
 }
 
-/// Whether an occluder can be seen at all: it rises above the source's own plane and is none that every face leaves out.
+/// Whether an occluder can be seen at all: it rises above the source's own plane, and not every
+/// face leaves it out.
 fn above(
     elements: &Elements,
     connections: &Connections,
@@ -94,8 +97,9 @@ fn above(
         && occluders.triangle(elements, i).iter().any(rises)
 }
 
-/// Whether an occluder is drawn in no face, culled or not: it lies in one plane with the eye on the part that it stands on, or is a back
-/// of that part where it is closed.
+/// Whether an occluder is left out of all faces even without culling: it lies in one plane with the
+/// eye and belongs to the eye's own connected part, or it is a back of that part and the part is
+/// closed.
 pub fn is_left_out(
     elements: &Elements,
     connections: &Connections,
@@ -113,12 +117,13 @@ pub fn is_left_out(
     edge_on || own_back
 }
 
-/// How far outside a triangle, in pixels, a pixel's centre may lie and still be drawn: a rasteriser with 4 subpixel bits
-/// moves a corner by at most 1/32 of a pixel.
+/// How far outside a triangle, in pixels, a pixel's centre may lie and still be drawn: a rasteriser
+/// with 4 subpixel bits moves a corner by at most 1/32 of a pixel.
 const SNAP: f64 = 1.0 / 16.0;
 
-/// Pixels of an item buffer that are wrong, each with the element that its ray meets first and the one drawn. A pixel is
-/// right also with the element that some ray within a rasteriser's rounding of its centre meets first.
+/// Pixels of an item buffer that are wrong, each with the element that its ray meets first and the
+/// one drawn. A pixel is right also with the element that some ray within a rasteriser's rounding
+/// of its centre meets first.
 pub fn disagreements(
     elements: &Elements,
     connections: &Connections,
@@ -143,8 +148,8 @@ pub fn disagreements(
         .collect()
 }
 
-/// Whether rounding explains that a pixel shows `got` where its centre's ray meets `want`: some ray within [`SNAP`] of the
-/// centre meets `got` first.
+/// Whether rounding explains that a pixel shows `got` where its centre's ray meets `want`: some ray
+/// within [`SNAP`] of the centre meets `got` first.
 fn explained(
     elements: &Elements,
     connections: &Connections,

@@ -5,13 +5,13 @@ use glam::{Vec2, Vec3};
 const ZERO: u32 = (127 - 43) << 10;
 const SHIFT: u32 = 13;
 
-/// A form factor, at least 0, in 16 bits: 6 of exponent from 2⁻⁴³ up, 10 behind the leading one.
+/// A form factor, at least 0, in 16 bits: 6 of exponent from 2⁻⁴³ up, and 10 of mantissa.
 pub fn factor_code(f: f32) -> u32 {
     let rounded = (f.max(0.0).to_bits() + (1 << (SHIFT - 1))) >> SHIFT;
     (rounded.max(ZERO) - ZERO).min(0xffff)
 }
 
-/// What a code stands for.
+/// The value of a code.
 pub fn kept_factor(code: u32) -> f32 {
     match code {
         0 => 0.0,

@@ -1,4 +1,4 @@
-//! The slow, obviously right twin of each GPU pass, in f64 on the CPU.
+//! A slow, simple twin of each GPU pass, in f64 on the CPU.
 
 pub mod bin_pixels;
 pub mod couple;

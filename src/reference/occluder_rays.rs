@@ -1,4 +1,5 @@
-//! Twin of the walk from a source's eye through the tree of what hides places from it: every occluder, in f64, without a tree.
+//! Twin of the traversal of the tree of occluders from a source's eye: every occluder, in f64,
+//! without a tree.
 
 use glam::DVec3;
 
@@ -10,11 +11,12 @@ use crate::sources::Source;
 /// Rounding of a plane's height at a point, as in the shader.
 const HEIGHT_EPSILON: f64 = 1e-6;
 
-/// How far behind a plane a place must lie to be hidden, as in the shader.
+/// Least distance behind a plane at which a place is hidden, as in the shader.
 const HIDDEN: f64 = 4e-6;
 
-/// How clearly a place is hidden: the greatest over all occluders of the least of how far within the ray meets it, in barycentric shares,
-/// and of how far behind it the place lies, in thousands of what hides it at least. Positive: hidden; the nearer to 0 the less surely.
+/// How clearly a place is hidden: the maximum over all occluders of the margin, which is the least
+/// of the barycentric coordinates of the ray's hit and of the place's depth behind it, in thousands
+/// of the least hiding depth. Positive where hidden; near 0 the answer is uncertain.
 pub fn hidden(occluders: &[ShadowOccluder], source: &Source, p: DVec3) -> f64 {
     let depth = |o: &ShadowOccluder| depth(o, source, p).unwrap_or(f64::NEG_INFINITY);
     occluders

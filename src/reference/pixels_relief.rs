@@ -1,4 +1,5 @@
-//! Twin of the pixel estimator where light has directions: the paper's equations (2) to (4), pixel by pixel.
+//! Twin of the pixel estimator where light has directions: the paper's equations (2) to (4), pixel
+//! by pixel.
 
 use glam::{DVec2, DVec3};
 
@@ -8,13 +9,24 @@ use crate::hemicube::{Pixel, delta_form_factor, direction_of, solid_angle_share}
 use crate::meso::{Relief, slot_shares};
 use crate::sources::Source;
 
-/// A grazing pixel's light counts as coming from no lower than this.
+/// Least cosine that the light of a grazing pixel is taken to come from.
 const LEAST_HEIGHT: f64 = 1e-3;
 
-/// What one source sends: the same in all directions, or by direction of the hemicube's frame, `[direction]`; W·m⁻².
+/// What one source sends: the same in all directions, or by direction of the hemicube's frame,
+/// `[direction]`; W·m⁻².
 pub enum Light<'a> {
     Even(DVec3, DVec3),
     ByDirection(&'a [DVec3], &'a [DVec3]),
+}
+
+/// What one pixel brings to the element that it shows.
+struct Beam {
+    /// Of the source, internal units.
+    eye: DVec3,
+    /// From the eye through the pixel, unit, along the world's axes.
+    ray: DVec3,
+    /// Irradiance, W·m⁻², RGB.
+    brought: DVec3,
 }
 
 /// What the elements receive, W·m⁻², RGB; meso elements are the last ones.
@@ -26,7 +38,7 @@ pub struct Received {
     pub moments: Vec<[DVec3; 3]>,
     /// Radiosity, `[meso element]`.
     pub reflected: Vec<DVec3>,
-    /// `paper` transport alone: light sent by direction, `[meso element][slot]`.
+    /// Light sent by direction, `[meso element][slot]`; only for `paper` transport.
     pub outgoing: Vec<DVec3>,
 }
 
@@ -43,10 +55,12 @@ impl Received {
         }
     }
 
-    /// Adds what `source` brings to the elements in its item buffer, `[row][column]` of a hemicube of `n` pixels a side.
+    /// Adds what `source` brings to the elements in its item buffer, `[row][column]` of a hemicube
+    /// of `n` pixels a side.
     pub fn add(
         &mut self,
-        (elements, relief): (&Elements, &Relief),
+        elements: &Elements,
+        relief: &Relief,
         source: &Source,
         items: &[u32],
         n: u32,
@@ -56,7 +70,7 @@ impl Received {
         let axes = [source.tangent, source.bitangent, source.normal];
         for (i, &item) in items.iter().enumerate() {
             let e = item as usize;
-            // A back blocks light and takes none.
+            // A back blocks light and receives none.
             if item == NONE || (source.eye - elements.centroid[e]).dot(elements.normal[e]) <= 0.0 {
                 continue;
             }
@@ -82,31 +96,20 @@ impl Received {
             self.direct[e] += weight * emitted;
             self.indirect[e] += weight * reflected;
             if relief.is_meso(e) {
-                let world = axes[0] * ray.x + axes[1] * ray.y + axes[2] * ray.z;
-                let brought = weight * (emitted + reflected);
-                self.reflect(
-                    (elements, relief),
-                    e,
-                    first_meso,
-                    source.eye,
-                    world,
-                    brought,
-                );
+                let beam = Beam {
+                    eye: source.eye,
+                    ray: axes[0] * ray.x + axes[1] * ray.y + axes[2] * ray.z,
+                    brought: weight * (emitted + reflected),
+                };
+                self.reflect(elements, relief, e, e - first_meso, &beam);
             }
         }
     }
 
-    /// Light along `ray` on a meso element.
-    fn reflect(
-        &mut self,
-        (elements, relief): (&Elements, &Relief),
-        e: usize,
-        first_meso: usize,
-        eye: DVec3,
-        ray: DVec3,
-        brought: DVec3,
-    ) {
-        let (m, k) = (e - first_meso, relief.directions.count());
+    /// Adds a beam's light on element `e`, which is meso element `m`.
+    fn reflect(&mut self, elements: &Elements, relief: &Relief, e: usize, m: usize, beam: &Beam) {
+        let Beam { eye, ray, brought } = *beam;
+        let k = relief.directions.count();
         let frame = [
             relief.tangent[e].as_dvec3(),
             relief.bitangent[e].as_dvec3(),
@@ -124,7 +127,7 @@ impl Received {
             self.reflected[m] += DVec3::from_array(albedo) * relief.scale[e].as_dvec3() * brought;
             return;
         };
-        // The place in the texture that the pixel shows, by areas of the parts of the triangle.
+        // The place in the texture that the pixel shows, by barycentric areas.
         let [a, b, c] = elements.triangle(e);
         let n = elements.normal[e];
         let p = eye + ray * (n.dot(a - eye) / n.dot(ray));

@@ -1,4 +1,4 @@
-//! Twin of the march over a height map: from cell to cell, in f64, without a pyramid.
+//! Twin of the march over a height map: cell by cell, in f64, without a pyramid.
 
 use glam::{DVec2, DVec3};
 
@@ -13,8 +13,9 @@ pub struct Hit {
     pub gradient: DVec2,
 }
 
-/// The smallest t in 0..=1 where the straight segment between two places (u, v, height) goes from above or on the
-/// bilinear surface to below it, 0 where it starts below it; and the number of cells visited.
+/// The smallest t in 0..=1 where the straight segment between two places (u, v, height) goes from
+/// above or on the bilinear surface to below it, 0 where it starts below it; and the number of
+/// cells visited.
 pub fn march(map: &HeightMap, from: DVec3, to: DVec3) -> (Option<Hit>, u32) {
     let mut cells = 0;
     for piece in pieces(map, from, to) {
@@ -32,7 +33,7 @@ pub fn march(map: &HeightMap, from: DVec3, to: DVec3) -> (Option<Hit>, u32) {
     (None, cells)
 }
 
-/// The least height of the segment above the surface, below it negative.
+/// The least height of the segment above the surface; negative below it.
 pub fn clearance(map: &HeightMap, from: DVec3, to: DVec3) -> f64 {
     pieces(map, from, to)
         .map(|piece| {
@@ -51,7 +52,8 @@ pub fn clearance(map: &HeightMap, from: DVec3, to: DVec3) -> f64 {
 struct Piece {
     from: f64,
     to: f64,
-    /// Its start, in texels from the cell's low corner, and its height; where it ends, less that.
+    /// Its start, in texels from the cell's low corner, with its height; and its end less its
+    /// start.
     at: DVec3,
     along: DVec3,
     /// The patch: corner + slope · p + twist p.x p.y.
@@ -71,7 +73,8 @@ impl Piece {
         ]
     }
 
-    /// The first r where it goes below: 0 if it is below there, else a root of the polynomial where that falls.
+    /// The first r where it goes below: 0 if it starts below, else the root at which the polynomial
+    /// decreases.
     fn crossing(&self) -> Option<f64> {
         let [a, b, c] = self.polynomial();
         if c < 0.0 {
@@ -84,7 +87,8 @@ impl Piece {
         if discriminant < 0.0 || a > 0.0 && discriminant == 0.0 {
             return None;
         }
-        // Falls where 2 a r + b = −√(b² − 4 a c); the root's other form where that cancels.
+        // The polynomial decreases where 2 a r + b = −√(b² − 4 a c); the other form of the root
+        // avoids cancellation.
         let root = discriminant.sqrt();
         let r = if b >= 0.0 {
             -(b + root) / (2.0 * a)
@@ -95,7 +99,7 @@ impl Piece {
     }
 }
 
-/// The segment cut where it passes over rows or columns of texel centres.
+/// The segment cut where it crosses rows or columns of texel centres.
 fn pieces(map: &HeightMap, from: DVec3, to: DVec3) -> impl Iterator<Item = Piece> + '_ {
     let (width, height) = (i64::from(map.width), i64::from(map.height));
     // To texels, rows downward.
@@ -145,7 +149,7 @@ fn pieces(map: &HeightMap, from: DVec3, to: DVec3) -> impl Iterator<Item = Piece
     })
 }
 
-/// Where a coordinate is whole on its way, each t in 0..1 in order; nowhere if it stays.
+/// Each t in 0..1 where a coordinate is a whole number, in order; none if it is constant.
 fn lines(start: f64, step: f64) -> impl Iterator<Item = f64> {
     let first = if step > 0.0 {
         start.floor() + 1.0

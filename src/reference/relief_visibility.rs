@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use crate::constants::{AZIMUTHS, NONE, RAY_STRATA};
 use crate::meso::HeightField;
 
-/// Slopes below this are not looked for, as in the shader.
+/// Horizons below this slope are not searched for, as in the shader.
 const LEAST_SLOPE: f64 = 0.01;
 const MOST_CROSSINGS: usize = 4096;
 
@@ -28,7 +28,7 @@ pub fn horizon(field: &HeightField, facet: usize, azimuth: u32) -> f64 {
     slope
 }
 
-/// Where a ray of a facet lands, NONE for the sky.
+/// The facet that a facet's ray hits, NONE for the sky.
 pub fn exchange(field: &HeightField, index: usize, ray: u32) -> u32 {
     let facet = field.facet(index);
     let direction = ray_direction(facet.normal, index as u32, ray);
@@ -52,7 +52,8 @@ pub fn exchange(field: &HeightField, index: usize, ray: u32) -> u32 {
     NONE
 }
 
-/// The direction of a ray: cosine-weighted about the normal, one in each cell of a grid with an offset of the facet's own.
+/// The direction of a ray: cosine-weighted about the normal, one in each cell of a grid with an
+/// offset of the facet's own.
 pub fn ray_direction(n: DVec3, facet: u32, ray: u32) -> DVec3 {
     let strata = f64::from(RAY_STRATA);
     let u = (f64::from(ray % RAY_STRATA) + random(facet, 0)) / strata;

@@ -10,18 +10,21 @@ use crate::sources::Source;
 pub struct Sent {
     pub emitted: Vec<DVec3>,
     pub reflected: Vec<DVec3>,
-    /// All reflected light that the source has been given to send, this included.
+    /// All reflected light that the source has been given to send so far, this included.
     pub kept: Vec<DVec3>,
 }
 
-/// What `source` sends of its unshot emitted and reflected radiosity. `moments` are those of its members, `[member][slot]
-/// [colour]`; `before` is what it had been given to send up to now, `[direction]`.
+/// What `source` sends of its unshot emitted and reflected radiosity, W·m⁻². `moments` are those of
+/// its members, `[member][slot][colour]`; `before` is [`Sent::kept`] of its last turn,
+/// `[direction]`.
 pub fn send_relief(
-    (elements, relief): (&Elements, &Relief),
+    elements: &Elements,
+    relief: &Relief,
     source: &Source,
     moments: &[[Vec3; 3]],
     before: &[DVec3],
-    (emitted, reflected): (DVec3, DVec3),
+    emitted: DVec3,
+    reflected: DVec3,
 ) -> Sent {
     let directions = &relief.directions;
     let k = directions.count();
@@ -96,7 +99,8 @@ fn power(values: &[DVec3], shares: &[f64]) -> DVec3 {
     values.iter().zip(shares).map(|(v, &s)| *v * s).sum()
 }
 
-/// Brings a distribution to the power that it must have: scaled, or where less than half of it is there, shifted.
+/// Gives a distribution the wanted power: by scaling, or where it has less than half of it, by
+/// adding a constant.
 fn with_power(mut values: Vec<DVec3>, shares: &[f64], wanted: DVec3) -> Vec<DVec3> {
     let power = power(&values, shares);
     for value in &mut values {

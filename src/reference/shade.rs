@@ -7,12 +7,12 @@ use glam::{DVec3, Vec3};
 use crate::render::{SAMPLES, View, corner_irradiance};
 use crate::scene::Scene;
 
-/// Distance, in pixels, that a rasteriser with 8 subpixel bits and the rounding of positions to f32 may move an edge, with
-/// much to spare.
+/// Distance, in pixels, that a rasteriser with 8 subpixel bits and the rounding of positions to f32
+/// may move an edge, with a wide margin.
 const EDGE: f64 = 1.0 / 16.0;
 
-/// Mean radiance of each pixel, `[row][column]` from the top left, W·m⁻²·sr⁻¹; none where a sample lies within 1/16 of a
-/// pixel of an edge, where the rasteriser may see another element.
+/// Mean radiance of each pixel, `[row][column]` from the top left, W·m⁻²·sr⁻¹; none where a sample
+/// lies within 1/16 of a pixel of an edge, where the rasteriser may see another element.
 pub fn shade(scene: &Scene, irradiance: &[Vec3], view: &View<'_>) -> Vec<Option<DVec3>> {
     let corners = corner_irradiance(scene, irradiance);
     let camera = view.camera;

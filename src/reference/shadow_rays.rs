@@ -1,11 +1,12 @@
-//! Twin of the walk through the tree of what casts shadows: every triangle, in f64, without a tree.
+//! Twin of the traversal of the shadow tree: every triangle, in f64, without a tree.
 
 use glam::{DVec3, Vec3};
 
 use crate::passes::types::{ShadowRay, ShadowTriangle};
 
-/// How clearly something stands on the way: the greatest over all triangles of the least of the shares, barycentric and of
-/// the way to both of its ends, by which the crossing lies within. Positive: blocked; the nearer to 0 the less surely.
+/// How clearly a segment is blocked: the maximum over all triangles of the margin of the crossing,
+/// which is the least of its barycentric coordinates and of its relative distances to the two ends
+/// of the segment. Positive where blocked; near 0 the answer is uncertain.
 pub fn blocked(triangles: &[ShadowTriangle], ray: &ShadowRay) -> f64 {
     let depth = |t: &ShadowTriangle| depth(t, ray).unwrap_or(f64::NEG_INFINITY);
     triangles

@@ -1,4 +1,4 @@
-//! How far one picture is from another of the same view.
+//! Difference of two pictures of the same view.
 
 use super::Picture;
 use super::tone::luminance;
@@ -15,9 +15,9 @@ pub struct Comparison {
     pub rms: f64,
 }
 
-/// Below this share of the mean a pixel counts as dark: its relative error is not told.
+/// Below this share of the mean a pixel counts as dark, and its relative error is not reported.
 const DARK: f64 = 0.01;
-/// A difference of this share of the reference's mean is shown fully coloured.
+/// Share of the reference's mean at which a difference is shown in full colour.
 const FULL_COLOUR: f32 = 0.25;
 
 impl Comparison {
@@ -44,8 +44,8 @@ impl Comparison {
     }
 }
 
-/// Ours, the reference and their difference side by side: red where ours is brighter, blue where it is darker, white where
-/// they are alike.
+/// Ours, the reference and their difference side by side: red where ours is brighter, blue where it
+/// is darker, white where they are alike.
 ///
 /// # Errors
 /// Pictures of different sizes.
@@ -58,7 +58,7 @@ pub fn side_by_side(ours: &Picture, reference: &Picture) -> Result<Picture> {
         .map(|&r| luminance(r))
         .sum::<f32>()
         / (width * height) as f32;
-    // What the tone curve shows as nearly white.
+    // Radiance that the tone curve maps to nearly white.
     let white = 1.0 / reference.automatic_exposure.exp2();
     let difference = |a: [f32; 3], b: [f32; 3]| {
         let apart = ((luminance(a) - luminance(b)) / (FULL_COLOUR * mean)).clamp(-1.0, 1.0);

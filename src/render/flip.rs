@@ -1,9 +1,10 @@
-//! ꟻLIP: how different two pictures look that are shown in turns at the same place, per pixel and in 0..=1.
+//! ꟻLIP: the perceived difference of two pictures shown in alternation, per pixel and in 0..=1.
 //!
-//! LDR-ꟻLIP is Andersson et al., *ꟻLIP: A Difference Evaluator for Alternating Images* (HPG 2020): colours blurred as the eye
-//! blurs them, their distance, and that of edges and points, which make a difference conspicuous. HDR-ꟻLIP is Andersson et al.,
-//! *Visualizing Errors in Rendered High Dynamic Range Images* (Eurographics 2021): the largest LDR-ꟻLIP of each pixel over all
-//! exposures at which the reference is neither too bright nor too dark to be judged.
+//! LDR-ꟻLIP is Andersson et al., *ꟻLIP: A Difference Evaluator for Alternating Images* (HPG 2020):
+//! the distance of colours blurred as by the eye, amplified by the difference of edges and points.
+//! HDR-ꟻLIP is Andersson et al., *Visualizing Errors in Rendered High Dynamic Range Images*
+//! (Eurographics 2021): the largest LDR-ꟻLIP of each pixel over all exposures at which the
+//! reference is neither too bright nor too dark.
 
 use std::f32::consts::{FRAC_1_SQRT_2, PI};
 use std::path::Path;
@@ -17,23 +18,27 @@ use super::picture::{FileKind, write_png};
 use super::tone::{luminance, magma};
 use crate::error::Result;
 
-/// Pixels to a degree of the visual angle: a screen 0.7 m wide of 3840 pixels, seen from 0.7 m, as in the papers.
+/// Pixels to a degree of the visual angle: a screen 0.7 m wide of 3840 pixels, seen from 0.7 m, as
+/// in the papers.
 pub const PIXELS_PER_DEGREE: f32 = 3840.0 * PI / 180.0;
 
-/// The eye's contrast sensitivity for luminance, red to green, and the two terms of blue to yellow: weight a and width b of
-/// a √(π/b) exp(−π² x²/b), x in degrees.
+/// The eye's contrast sensitivity for luminance, red to green, and the two terms of blue to yellow:
+/// weight a and width b of a √(π/b) exp(−π² x²/b), x in degrees.
 const SENSITIVITY: [[f32; 2]; 4] = [[1.0, 0.0047], [1.0, 0.0053], [34.1, 0.04], [13.5, 0.025]];
 /// Exponents of the differences of colours and of features.
 const COLOUR_EXPONENT: f32 = 0.7;
 const FEATURE_EXPONENT: f32 = 0.5;
-/// This share of the largest colour difference is mapped to the second number, what is above to the rest.
+/// This share of the largest colour difference is mapped to the second number; larger ones are
+/// mapped to the rest.
 const KNEE: [f32; 2] = [0.4, 0.95];
-/// Width of an edge that is seen best, degrees.
+/// Width of the most visible edge, degrees.
 const EDGE_WIDTH: f32 = 0.082;
 
-/// Rational tone curve of the ACES film (Narkowicz 2015, scaled by 0.6): (a x² + b x) / (c x² + d x + e).
+/// Rational tone curve of the ACES film (Narkowicz 2015, scaled by 0.6):
+/// (a x² + b x) / (c x² + d x + e).
 const ACES: [f32; 5] = [0.36 * 2.51, 0.6 * 0.03, 0.36 * 2.43, 0.6 * 0.59, 0.14];
-/// What the tone curve shows as bright: the exposures bring the reference's brightest and its median there.
+/// Tone-mapped value to which the exposures bring the reference's brightest and its median
+/// luminance.
 const BRIGHT: f32 = 0.85;
 
 /// The difference of two pictures of radiance.
@@ -49,7 +54,8 @@ pub struct Flip {
 }
 
 impl Flip {
-    /// HDR-ꟻLIP of a picture from its reference. The exposures come from the reference, so that the two cannot be swapped.
+    /// HDR-ꟻLIP of a picture from its reference. The exposures come from the reference, so that the
+    /// measure is not symmetric.
     ///
     /// # Errors
     /// Pictures of different sizes.
@@ -80,12 +86,13 @@ impl Flip {
         })
     }
 
-    /// The mean over the pixels, the number by which the papers judge a picture.
+    /// The mean over the pixels, the papers' measure of a picture.
     pub fn mean(&self) -> f64 {
         self.error.iter().map(|&e| f64::from(e)).sum::<f64>() / self.error.len() as f64
     }
 
-    /// Writes the difference: `.png` in the magma colours, black for 0 and pale yellow for 1, or `.exr` as the numbers.
+    /// Writes the difference: `.png` in the magma colours, black for 0 and pale yellow for 1, or
+    /// `.exr` as the numbers.
     ///
     /// # Errors
     /// Another ending; a file that cannot be written.
@@ -105,8 +112,8 @@ impl Flip {
     }
 }
 
-/// Exposures, powers of two, that bring the brightest and the median luminance to [`BRIGHT`]. Black pixels do not count where
-/// they would be the median; a black picture is shown as it is.
+/// Exposures, powers of two, that bring the brightest and the median luminance to [`BRIGHT`]. Black
+/// pixels are left out if the median would be black; a black picture is shown unexposed.
 fn exposures(radiance: &[[f32; 3]]) -> [f32; 2] {
     let [a, b, c, d, e] = ACES;
     let [a, b, c] = [a - BRIGHT * c, b - BRIGHT * d, -BRIGHT * e];
@@ -126,7 +133,7 @@ fn exposures(radiance: &[[f32; 3]]) -> [f32; 2] {
         median(lit)
     };
     match lit.last() {
-        // Whatever the radiance, the scale is a number.
+        // The scale is finite for any radiance.
         Some(most) => [most, &middle].map(|l| (bright / l).log2().clamp(-126.0, 126.0)),
         None => [0.0; 2],
     }
@@ -137,7 +144,8 @@ fn aces(x: f32) -> f32 {
     (a * x + b) * x / ((c * x + d) * x + e)
 }
 
-/// LDR-ꟻLIP of two pictures of linear RGB in 0..=1, `[row][column]`, each pixel in 0..=1. Symmetric in the two.
+/// LDR-ꟻLIP of two pictures of linear RGB in 0..=1, `[row][column]`, each pixel in 0..=1. Symmetric
+/// in the two.
 pub fn ldr(ours: &[[f32; 3]], reference: &[[f32; 3]], width: u32) -> Vec<f32> {
     assert_eq!(ours.len(), reference.len(), "pictures of one size");
     let width = width as usize;
@@ -158,13 +166,13 @@ pub fn ldr(ours: &[[f32; 3]], reference: &[[f32; 3]], width: u32) -> Vec<f32> {
             let [edges, points] =
                 [0, 1].map(|k| (ours.features[i][k] - reference.features[i][k]).abs());
             let feature = (FRAC_1_SQRT_2 * edges.max(points)).powf(FEATURE_EXPONENT);
-            // Rounding of the largest difference may pass 1.
+            // Rounding may bring the largest difference above 1.
             colour.powf(1.0 - feature).min(1.0)
         })
         .collect()
 }
 
-/// A picture as the eye takes it in.
+/// A picture filtered as by the eye.
 struct Seen {
     /// L*a*b* of the blurred colours, their chroma after Hunt.
     colour: Vec<Vec3>,
@@ -181,7 +189,8 @@ impl Seen {
         let plane = |c: usize| -> Vec<f32> { opponent.iter().map(|p| p[c]).collect() };
         let blurred = |plane: &[f32], kernel: &[f32]| filter(plane, width, kernel, kernel);
         let [y, red, yellow, blue] = SENSITIVITY.map(|[_, b]| sensitivity(b));
-        // The sum of two Gaussians does not separate: each is filtered by itself, by its share of the volume.
+        // The sum of two Gaussians is not separable: each is filtered by itself and weighted by its
+        // share of the volume.
         let volume = |i: usize, (_, sum): &(Vec<f32>, f32)| {
             let [a, b] = SENSITIVITY[i];
             a * (PI / b).sqrt() * sum * sum
@@ -217,7 +226,8 @@ impl Seen {
     }
 }
 
-/// Weights of a Gaussian of the eye's sensitivity, their sum 1, and what it was. All have the radius of the widest.
+/// Weights of a Gaussian of the eye's sensitivity, normalised to the sum 1, and their sum before.
+/// All have the radius of the widest.
 fn sensitivity(b: f32) -> (Vec<f32>, f32) {
     let widest = SENSITIVITY.iter().fold(0.0_f32, |most, s| most.max(s[1]));
     let radius = (3.0 * (widest / (2.0 * PI * PI)).sqrt() * PIXELS_PER_DEGREE).ceil() as i32;
@@ -231,7 +241,8 @@ fn sensitivity(b: f32) -> (Vec<f32>, f32) {
     (weights.iter().map(|w| w / sum).collect(), sum)
 }
 
-/// A Gaussian whose weights sum to 1, and its first and second derivative, whose weights of one sign sum to ±1.
+/// A Gaussian whose weights sum to 1, and its first and second derivative, whose weights of one
+/// sign sum to ±1.
 fn feature_kernels() -> [Vec<f32>; 3] {
     let deviation = 0.5 * EDGE_WIDTH * PIXELS_PER_DEGREE;
     let radius = (3.0 * deviation).ceil() as i32;
@@ -256,7 +267,7 @@ fn feature_kernels() -> [Vec<f32>; 3] {
     [kernel(&|_| 1.0), kernel(&|x| -x), kernel(&|x| x * x - 1.0)]
 }
 
-/// A plane filtered along rows and down columns; the border goes on outside.
+/// A plane filtered along rows and columns; its border is repeated outside.
 fn filter(plane: &[f32], width: usize, across: &[f32], down: &[f32]) -> Vec<f32> {
     let height = plane.len() / width;
     let taps = |kernel: &[f32], at: usize, most: usize, value: &dyn Fn(usize) -> f32| -> f32 {
@@ -316,7 +327,7 @@ impl Colours {
         )
     }
 
-    /// The way back.
+    /// The inverse.
     fn linear(&self, opponent: Vec3) -> Vec3 {
         let y = (opponent.x + 16.0) / 116.0;
         self.from_xyz * Vec3::new(y + opponent.y / 500.0, y, y - opponent.z / 200.0)

@@ -6,17 +6,17 @@ use super::picture::{self, Picture, SAMPLES, Samples};
 use super::projection::Tile;
 use super::tone;
 
-/// A pixel keeps its samples where a channel's lowest is below this share of its highest: nearer together, the tone curve is
-/// straight enough that the mean alone gives the same code.
+/// A pixel keeps its samples if a channel's lowest is below this share of its highest. Otherwise
+/// the tone curve is so nearly linear over them that their mean gives the same code.
 const CONTRAST: f32 = 0.8;
 
-/// What has been drawn so far.
+/// The part of a picture drawn so far.
 pub struct Gathered {
     width: u32,
     height: u32,
     radiance: Vec<[f32; 3]>,
     contrasts: Vec<(u32, Samples)>,
-    /// Luminance of the pixels that an exposure meter looks at.
+    /// Luminance of the metered pixels.
     metered: Vec<f32>,
 }
 
@@ -31,7 +31,7 @@ impl Gathered {
         }
     }
 
-    /// Takes a tile's samples, rows of `stride`.
+    /// Adds a tile's samples, in rows of `stride`.
     pub fn add(&mut self, tile: Tile, samples: &[[f32; 4]], stride: usize) {
         let side = SAMPLES as usize;
         let rows: Vec<Vec<(Samples, bool)>> = (0..tile.height as usize)

@@ -18,9 +18,9 @@ pub enum Light {
     /// All of it.
     #[default]
     Global,
-    /// What emitters show of themselves, and what has come straight from them and from point lights.
+    /// Emission, and light straight from emitters and point lights, reflected once.
     Direct,
-    /// The rest: what has been reflected more than once.
+    /// The rest: light reflected more than once.
     Indirect,
 }
 
@@ -49,8 +49,9 @@ pub enum ReliefShading {
     /// Relief mapping, lit by the factors of the relief's response.
     #[default]
     Factored,
-    /// Relief mapping, lit as in the paper: by parallel lights, the clusters of near-parallel slots, each shadowed at each pixel;
-    /// light inside the relief by the factors. Light straight from emitters is in the slots, whatever [`Direct`] says.
+    /// Relief mapping, lit as in the paper: by parallel lights, the clusters of near-parallel
+    /// slots, each shadowed at each pixel; light inside the relief by the factors. Light straight
+    /// from emitters is always in the slots: [`Direct`] is ignored.
     Clusters,
     /// Flat, lit by the relief's response: normal mapping, with its shadows and inner light.
     Normal,
@@ -70,7 +71,7 @@ impl ReliefShading {
         }
     }
 
-    /// By rays through the height map.
+    /// Whether it is drawn by rays through the height map.
     pub(super) fn is_displaced(self) -> bool {
         self.code() == Some(SHADING_RELIEF)
     }
@@ -101,7 +102,8 @@ pub enum Show {
     Irradiance,
     /// The strongest slot of each triangle, see [`super::slot_colour`].
     Slots,
-    /// How many fragments of prisms are shaded, see [`super::Overdraw`]; plain triangles are left out.
+    /// How many fragments of prisms are shaded, see [`super::Overdraw`]; plain triangles are left
+    /// out.
     Overdraw,
 }
 
@@ -119,12 +121,12 @@ impl Show {
     }
 }
 
-/// A solution as it is to be shown; values `[triangle]` in the order of the input.
+/// A solution and how it is shown; values `[triangle]` in the order of the input.
 #[derive(Clone, Copy)]
 pub struct Lighting<'a> {
     /// W·m⁻², RGB, direct and indirect.
     pub irradiance: &'a [Vec3],
-    /// Of this what comes straight from emitters and point lights; needed for parts of the light.
+    /// The part straight from emitters and point lights; needed to draw parts of the light.
     pub irradiance_direct: Option<&'a [Vec3]>,
     /// Light by direction; without it relief is drawn as plain triangles.
     pub relief: Option<&'a DirectionalLight>,
@@ -132,8 +134,8 @@ pub struct Lighting<'a> {
     pub shading: ReliefShading,
     pub direct: Direct,
     pub show: Show,
-    /// Whether samples of plain triangles that nothing stands between and the lights follow no ways to light points: quicker,
-    /// and the same picture.
+    /// Whether samples of plain triangles with nothing between them and the lights skip the shadow
+    /// rays: quicker, and the same picture.
     pub skip_open: bool,
     /// Folder that keeps the visibility of reliefs from run to run.
     pub cache: Option<&'a Path>,
@@ -158,8 +160,8 @@ impl<'a> Lighting<'a> {
         self.relief.zip(self.shading.code())
     }
 
-    /// Whether light straight from emitters and point lights is shown by their points: only where the rest of the light is
-    /// known apart from it.
+    /// Whether light straight from emitters and point lights is drawn from light points: only where
+    /// the direct and the indirect light are known separately.
     pub(super) fn sharp(&self) -> bool {
         self.direct == Direct::Sharp
             && self.part != Light::Indirect
@@ -189,8 +191,9 @@ impl<'a> Lighting<'a> {
         }
     }
 
-    /// What elements with relief reflect by direction of the part of the light that is shown, `[meso element][slot]`, as
-    /// radiosity. A part's share of it is taken to be its share of the irradiance.
+    /// Radiosity that elements with relief reflect of the light that is shown,
+    /// `[meso element][slot]`, W·m⁻², RGB. The share of a part of the light is taken to be its
+    /// share of the irradiance.
     pub(super) fn exits(&self, scene: &Scene, light: &DirectionalLight) -> Vec<Vec3> {
         let k = light.directions.len();
         let shown = self.irradiance();

@@ -1,10 +1,12 @@
-//! Points that emitters and point lights are taken for where their light is drawn sharply, and what casts shadows there.
+//! Light points that represent emitters and point lights where their light is drawn sharply, and
+//! the shadow casters.
 
 use std::sync::Arc;
 
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::seen_scene::SeenScene;
 use super::shafts::Shafts;
 use super::{Lighting, Projection};
 use crate::constants::{KIND_POINT, KIND_SURFACE, LIGHT_POINTS, LIGHT_SETS};
@@ -18,16 +20,17 @@ use crate::vk::Device;
 /// A light point in scene units.
 struct Shining {
     position: DVec3,
-    /// Of an emitter; none of a point light.
+    /// Normal of an emitter; None for a point light.
     normal: Option<DVec3>,
     area: f64,
     strength: DVec3,
 }
 
-/// LIGHT_SETS sets of LIGHT_POINTS points on the emitters, if there are any, each by their power, then the point lights.
+/// LIGHT_SETS sets of LIGHT_POINTS points on the emitters, distributed by power, if there are
+/// emitters; then the point lights.
 fn shining(scene: &Scene) -> Vec<Shining> {
     let mut whole = 0.0;
-    // Each with the power of all up to it.
+    // Each with the cumulative power up to and including it.
     let emitters: Vec<(usize, DVec3, f64)> = scene
         .triangles
         .iter()
@@ -41,7 +44,7 @@ fn shining(scene: &Scene) -> Vec<Shining> {
         .collect();
     let share = whole / f64::from(LIGHT_POINTS);
     let mut points = Vec::new();
-    // Points that each emitter has by now: those of the next set fall between them.
+    // Number of points that each emitter has so far: those of the next set fall between them.
     let mut taken = vec![0; emitters.len()];
     for i in 0..LIGHT_SETS * LIGHT_POINTS {
         let (set, i_in_set) = (i / LIGHT_POINTS, i % LIGHT_POINTS);
@@ -72,14 +75,15 @@ fn shining(scene: &Scene) -> Vec<Shining> {
     points
 }
 
-/// Place i of a sequence in a triangle whose first 4ⁿ places lie in all of the 4ⁿ triangles like it that it is cut into: the
-/// triangular van der Corput sequence of Basu and Owen 2015, its digits turned by those before them: in rows, places
-/// would pass the edge of what casts a shadow many at a time.
+/// Place i of a sequence in a triangle. If the triangle is cut into 4ⁿ similar ones, each of the
+/// first 4ⁿ places lies in another of them: the triangular van der Corput sequence of Basu and Owen
+/// 2015, with each digit permuted by those before it. Without the permutation places lie in rows,
+/// and many would pass a shadow's edge at once.
 fn spread(corners: [DVec3; 3], i: u32) -> DVec3 {
     let [mut a, mut b, mut c] = corners;
     let mut digits = i;
     let mut turn = 0_u32;
-    // Digits of any i, and some zeros, which halve a triangle in place.
+    // All digits of any i, and zeros, which shrink the triangle towards its centroid.
     for _ in 0..16 {
         let (ab, bc, ca) = ((a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0);
         let child = (digits % 4 + (turn >> 30)) % 4;
@@ -112,19 +116,24 @@ impl Shining {
     }
 }
 
-/// The scene's light points and what casts shadows before them, on the device and, where any light is drawn sharply, as shafts.
+/// The scene's light points and shadow casters on the device, and, where any light is drawn
+/// sharply, the shafts.
 ///
-/// All is taken from the eye, rounded as what is drawn is: a place that is drawn is as near to what casts its shadow as to
-/// itself.
+/// All positions are relative to the eye and rounded like those of the drawn triangles, so that
+/// casters and drawn places agree exactly.
 ///
 /// # Errors
 /// A device without the memory.
 pub fn light_buffers(
     device: &Arc<Device>,
-    scene: &Scene,
-    lighting: &Lighting<'_>,
-    projection: &Projection,
+    seen: &SeenScene<'_>,
 ) -> Result<(LightBuffers, Option<Shafts>)> {
+    let SeenScene {
+        scene,
+        lighting,
+        projection,
+        ..
+    } = *seen;
     let points: Vec<_> = if lighting.sharp() {
         shining(scene)
             .iter()
@@ -171,7 +180,8 @@ fn casters(scene: &Scene, lighting: &Lighting<'_>, projection: &Projection) -> V
 mod tests {
     use super::*;
 
-    /// Of 4³ places in a row, one lies in each of the 64 parts; and their mean is the middle, each part's being its own.
+    /// Of 4³ places in a row, one lies in each of the 64 parts; and their mean is the middle, each
+    /// part's being its own.
     #[test]
     fn places_are_spread_evenly() {
         let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
@@ -185,7 +195,7 @@ mod tests {
             found.insert((x as u32, y as u32, upper));
         }
         assert_eq!(found.len(), 64);
-        // Half of a part, on the side that its own place is shifted to.
+        // Half the size of a part: the most by which the mean place can be shifted.
         const SHIFT: f64 = 1.0 / 16.0;
         assert!((mean - DVec3::new(1.0, 1.0, 0.0) / 3.0).length() < SHIFT);
     }

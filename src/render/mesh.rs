@@ -1,15 +1,16 @@
-//! What the shade pass draws: fronts by material, and backs.
+//! The triangles of the shade pass: fronts by material, and backs.
 
 use std::sync::Arc;
 
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::flat_relief::FlatRelief;
 use super::projection::{self, Projection, Tile};
-use super::relief_mesh::FlatRelief;
+use super::seen_scene::SeenScene;
 use super::shafts::Shafts;
 use super::textures::Bound;
-use super::{Light, Lighting, corner_irradiance};
+use super::{Light, corner_irradiance};
 use crate::corners::Corners;
 use crate::error::Result;
 use crate::passes::buffers::upload;
@@ -22,41 +23,67 @@ use crate::vk::{Buffer, BufferUse, Device};
 pub struct Mesh {
     pub vertices: Buffer,
     pub indices: Buffer,
-    /// As light points light them, `[drawn triangle]`; none where they do not.
+    /// Input of the lighting by light points, `[drawn triangle]`; empty where there is none.
     pub lit: Buffer,
-    /// Of the lit triangles those that nothing stands between and the lights, and all.
+    /// Number of lit triangles with nothing between them and the lights, and of all lit triangles.
     pub open: [usize; 2],
-    /// First vertex, count.
-    ranges: Vec<(Kind, u32, u32)>,
+    ranges: Vec<KindRange>,
 }
 
-/// What triangles are drawn alike, with their material.
+/// Drawn triangles of one kind.
+struct KindRange {
+    kind: Kind,
+    /// First vertex.
+    first: u32,
+    /// Number of vertices.
+    count: u32,
+}
+
+/// A drawn triangle; ordered by kind, then by index.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Drawn {
+    kind: Kind,
+    /// Index in the scene.
+    triangle: usize,
+}
+
+/// Triangles that are drawn by one draw, with their material.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Kind {
     Front(u32),
-    /// With a relief that is too far to be told: what it sends stands at the corners.
+    /// Fronts whose relief is too far to be resolved: the vertices hold the light that it sends.
     Far(u32),
     Back,
 }
 
 impl Kind {
-    /// By light points.
+    /// Whether light points light it.
     fn is_lit(self) -> bool {
         matches!(self, Self::Front(_))
     }
 }
 
 impl Mesh {
+    /// All triangles but those that are drawn as prisms; lit where there are `shafts`.
+    ///
+    /// # Errors
+    /// A device without the memory.
     pub fn new(
         device: &Arc<Device>,
-        scene: &Scene,
-        lighting: &Lighting<'_>,
-        projection: &Projection,
-        (rest, shafts): (Option<&FlatRelief>, Option<&Shafts>),
+        seen: &SeenScene<'_>,
+        rest: Option<&FlatRelief>,
+        shafts: Option<&Shafts>,
     ) -> Result<Self> {
+        let SeenScene {
+            scene,
+            lighting,
+            projection,
+            ..
+        } = *seen;
         let far = |e: usize| rest.and_then(|rest| rest.far.get(&e));
         let smooth = corner_irradiance(scene, &lighting.baked());
-        // Which side is seen is found here in f64: a rasteriser finds it from rounded corners, wrongly for slivers.
+        // The visible side is decided here in f64: a rasteriser decides it from rounded corners,
+        // wrongly for slivers.
         let mut order: Vec<_> = scene
             .triangles
             .par_iter()
@@ -70,13 +97,13 @@ impl Mesh {
                     true => Kind::Front(t.material),
                     false => Kind::Back,
                 };
-                (kind, e)
+                Drawn { kind, triangle: e }
             })
             .collect();
         order.par_sort_unstable();
         let vertices: Vec<_> = order
             .par_iter()
-            .flat_map_iter(|&(_, e)| {
+            .flat_map_iter(|&Drawn { triangle: e, .. }| {
                 let light = far(e).copied().unwrap_or(smooth[e]);
                 let triangle = &scene.triangles[e];
                 let away = rest.and_then(|rest| rest.away.get(&e));
@@ -86,15 +113,19 @@ impl Mesh {
             .collect();
         let mut ranges = Vec::new();
         let mut first = 0;
-        for same in order.chunk_by(|a, b| a.0 == b.0) {
+        for same in order.chunk_by(|a, b| a.kind == b.kind) {
             let count = 3 * same.len() as u32;
-            ranges.push((same[0].0, first, count));
+            ranges.push(KindRange {
+                kind: same[0].kind,
+                first,
+                count,
+            });
             first += count;
         }
         let lit = shafts.map_or_else(Vec::new, |shafts| {
             lit_triangles(scene, &order, &vertices, shafts)
         });
-        let fronts = order.iter().filter(|(kind, _)| kind.is_lit()).count();
+        let fronts = order.iter().filter(|drawn| drawn.kind.is_lit()).count();
         let open = lit.iter().filter(|t| t.open == 1).count();
         let indices: Vec<u32> = (0..vertices.len() as u32).collect();
         Ok(Self {
@@ -106,24 +137,24 @@ impl Mesh {
         })
     }
 
-    /// `lights` counts light points as [`Parameters::lit_by`] does.
+    /// Draws of one tile. `lights` counts light points as [`Parameters::lit_by`] does.
     pub fn draws<'a>(
         &'a self,
-        scene: &'a Scene,
+        seen: &SeenScene<'a>,
+        tile: Tile,
         textures: &'a Bound,
-        (projection, tile): (&Projection, Tile),
-        part: Light,
         lights: [u32; 2],
     ) -> impl Iterator<Item = Draw<'a>> {
-        let rows = projection.rows(tile);
-        self.ranges.iter().map(move |&(kind, first, count)| Draw {
-            first_vertex: first,
-            vertex_count: count,
-            texture: match kind {
+        let rows = seen.projection.rows(tile);
+        let (scene, part) = (seen.scene, seen.lighting.part);
+        self.ranges.iter().map(move |range| Draw {
+            first_vertex: range.first,
+            vertex_count: range.count,
+            texture: match range.kind {
                 Kind::Front(m) => textures.of_material(m),
                 Kind::Far(_) | Kind::Back => textures.white(),
             },
-            parameters: match kind {
+            parameters: match range.kind {
                 Kind::Front(m) => {
                     parameters(rows, Some(&scene.materials[m as usize]), part).lit_by(lights)
                 }
@@ -137,15 +168,15 @@ impl Mesh {
     }
 }
 
-/// Ways to light points start above a triangle by this share of its corners' greatest distance along an axis of the eye's
-/// frame, 2⁻¹⁸: places on it are interpolated with weights that sum to 1 within some 2⁻²², and so lie off its plane by so
-/// much of that distance.
+/// Height of the start of shadow rays above a triangle, as a share of its corners' greatest
+/// coordinate relative to the eye: 2⁻¹⁸. Places on it are interpolated with weights that sum to 1
+/// within about 2⁻²², so that they deviate from its plane by that share.
 const ABOVE: f32 = 1.0 / (1 << 18) as f32;
 
-/// `vertices` are those of the triangles of `order`.
+/// `vertices` are those of the triangles in `order`, three each.
 fn lit_triangles(
     scene: &Scene,
-    order: &[(Kind, usize)],
+    order: &[Drawn],
     vertices: &[Vertex],
     shafts: &Shafts,
 ) -> Vec<LitTriangle> {
@@ -153,7 +184,7 @@ fn lit_triangles(
     order
         .par_iter()
         .zip(vertices.par_chunks(3))
-        .map(|(&(kind, e), drawn)| {
+        .map(|(&Drawn { kind, triangle: e }, drawn)| {
             let triangle = &scene.triangles[e];
             let plane = neighbours.normals[e];
             let [normal_a, normal_b, normal_c] = triangle.vertices.map(|vertex| {
@@ -180,7 +211,7 @@ fn lit_triangles(
         .collect()
 }
 
-/// Of a material's fronts, or of backs.
+/// Push constants of a material's fronts, or of backs (None).
 pub fn parameters([x, y, w]: [Vec3; 3], material: Option<&Material>, part: Light) -> Parameters {
     let (reflectance, emitted, metered) = match material {
         Some(m) => (m.kd, m.ke, if m.emits() { 0.0 } else { 1.0 }),
@@ -207,7 +238,7 @@ fn corners(
     projection: &Projection,
 ) -> [Vertex; 3] {
     let images = triangle.uv.map(|[u, v]| Vec2::new(u, 1.0 - v));
-    // A texture repeats: near 0, its coordinates have more digits left for the place within it.
+    // The texture repeats: coordinates shifted to near 0 are more precise.
     let whole = images[0].floor();
     std::array::from_fn(|k| Vertex {
         position: ((positions[k] - projection.eye) / projection.unit).as_vec3(),

@@ -1,5 +1,5 @@
-//! A simple shaded picture of a bake: irradiance smoothed over each surface, reflectance textures per sample, 4 × 4 samples a
-//! pixel.
+//! A simple shaded picture of a bake: irradiance smoothed over each surface, reflectance textures
+//! per sample, 4 × 4 samples a pixel.
 //!
 //! ```text
 //! irradiance ─► smooth ─┐
@@ -9,6 +9,7 @@
 //! ```
 
 mod compare;
+mod flat_relief;
 mod flip;
 mod gathered;
 mod lighting;
@@ -20,7 +21,9 @@ mod projection;
 mod relief;
 mod relief_mesh;
 mod relief_scene;
+mod relief_surfaces;
 mod renderer;
+mod seen_scene;
 mod shafts;
 mod slots;
 mod smooth;
@@ -47,7 +50,7 @@ use crate::error::{Error, Result};
 use crate::scene::{Camera, Scene};
 use crate::vk::Device;
 
-/// What is to be seen.
+/// A view of a scene.
 #[derive(Debug, Clone, Copy)]
 pub struct View<'a> {
     pub camera: &'a Camera,
@@ -74,11 +77,13 @@ impl View<'_> {
 /// Most pixels along a side of a picture.
 pub const MOST_PIXELS: u32 = 16_384;
 
-/// Renders `scene` under its irradiance E: L = ρ(u, v) · E / π + Le on fronts, black on backs, which block all the same.
-/// Triangles with relief are drawn by relief mapping where their light by direction is given.
+/// Renders `scene` under its irradiance E: L = ρ(u, v) · E / π + Le on fronts, black on backs,
+/// which also block light. Triangles with relief are drawn by relief mapping where their light by
+/// direction is given.
 ///
 /// # Errors
-/// A size of 0 or above [`MOST_PIXELS`]; a camera that looks nowhere; a device that lacks the memory or fails.
+/// A size of 0 or above [`MOST_PIXELS`]; a camera that looks nowhere; a device that lacks the
+/// memory or fails.
 pub fn render<'a>(
     device: &Arc<Device>,
     scene: &'a Scene,

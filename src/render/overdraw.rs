@@ -1,9 +1,10 @@
-//! How much is shaded where, as numbers and as a picture.
+//! Overdraw, as numbers and as a picture.
 
 use super::picture::Picture;
 
-/// Fragments of prisms that are shaded and steps of their marches, `[row][column]`, means over a pixel's samples. Hidden ones
-/// count: each fragment finds its own depth, so that none is spared.
+/// Fragments of prisms that are shaded and steps of their marches, `[row][column]`, means over a
+/// pixel's samples. Hidden ones count: each fragment computes its own depth, so that none is culled
+/// early.
 #[derive(Debug, Clone)]
 pub struct Overdraw {
     pub width: u32,
@@ -27,22 +28,24 @@ impl Overdraw {
         }
     }
 
-    /// The fragments that the brightest colour stands for: the greatest number, up to a power of two.
+    /// Number of fragments shown in the brightest colour: the greatest number, rounded up to a
+    /// power of two.
     pub fn top(&self) -> f32 {
         let most = self.fragments.iter().copied().fold(1.0, f32::max);
         most.log2().ceil().exp2()
     }
 
-    /// The fragments in the colours of viridis, from 0, dark, to [`Self::top`], bright, with a bar at the bottom over the same
-    /// range, cut at each quarter of it. The range and the steps are logged.
+    /// The fragments in the colours of viridis, from 0, dark, to [`Self::top`], bright, with a bar
+    /// of the same range at the bottom, marked at each quarter. The range and the steps are logged.
     pub fn picture(&self) -> Picture {
         let top = self.top();
-        let tell = |values: &[f32]| {
+        let statistics = |values: &[f32]| {
             let most = values.iter().copied().fold(0.0, f32::max);
             let sum: f64 = values.iter().map(|&v| f64::from(v)).sum();
             (sum / values.len() as f64, most)
         };
-        let ((mean, most), (mean_steps, most_steps)) = (tell(&self.fragments), tell(&self.steps));
+        let ((mean, most), (mean_steps, most_steps)) =
+            (statistics(&self.fragments), statistics(&self.steps));
         tracing::info!(
             "overdraw: {mean:.2} fragments a sample, at most {most:.2}; {mean_steps:.0} steps of marches, at most {most_steps:.0}; the bar runs from 0 to {top}"
         );
@@ -59,13 +62,13 @@ impl Overdraw {
             viridis((column as f32 + 0.5) / self.width as f32)
         };
         let colours = self.fragments.iter().enumerate().map(colour).collect();
-        // Nothing is metered, so that colours are those of the map.
+        // Nothing is metered, so that the map's colours are not exposed.
         let metered = vec![false; self.fragments.len()];
         Picture::new((self.width, self.height), colours, &metered)
     }
 }
 
-/// Linear RGB of a share.
+/// Linear RGB of a value in 0..=1.
 fn viridis(share: f32) -> [f32; 3] {
     let colour = colorous::VIRIDIS.eval_continuous(f64::from(share.clamp(0.0, 1.0)));
     colour.as_array().map(|code| {

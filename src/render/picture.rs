@@ -1,4 +1,4 @@
-//! A picture in linear light and the files that hold it.
+//! A picture in linear light, and its files.
 
 use std::io;
 #[cfg(feature = "formats")]
@@ -26,16 +26,17 @@ pub type Samples = [[f32; 3]; (SAMPLES * SAMPLES) as usize];
 pub struct Picture {
     pub width: u32,
     pub height: u32,
-    /// Mean radiance of each pixel, `[row][column]` from the top left, W·m⁻²·sr⁻¹, linear RGB. Black where nothing is.
+    /// Mean radiance of each pixel, `[row][column]` from the top left, W·m⁻²·sr⁻¹, linear RGB.
+    /// Black where nothing is.
     pub radiance: Vec<[f32; 3]>,
-    /// The exposure, as a power of two, with which an unasked one is written: see [`Picture::write`].
+    /// The exposure, as a power of two, of a picture written without one, see [`Picture::write`].
     pub automatic_exposure: f32,
-    /// Place in `radiance`, ascending, and samples of each pixel of strong contrast. Of the others the mean is enough, and a
-    /// picture of 16384² stays within memory.
+    /// Place in `radiance`, ascending, and samples of each pixel of strong contrast. The mean
+    /// suffices for the others, so that a picture of 16384² fits in memory.
     pub(super) contrasts: Vec<(u32, Samples)>,
 }
 
-/// What the 90th percentile of luminance is brought to without an exposure.
+/// Value of the 90th percentile of luminance after automatic exposure.
 const METER_TARGET: f32 = 0.6;
 
 /// The exposure, as a power of two, for pixels of these luminances.
@@ -45,7 +46,7 @@ pub(super) fn automatic_exposure(metered: &mut [f32]) -> f32 {
     }
     let place = (metered.len() - 1) * 9 / 10;
     let (_, &mut bright, _) = metered.select_nth_unstable_by(place, f32::total_cmp);
-    // In the dark there is nothing to expose for.
+    // A black picture needs no exposure.
     if bright > 0.0 {
         (METER_TARGET / bright).log2()
     } else {
@@ -61,7 +62,7 @@ pub enum FileKind {
 }
 
 impl FileKind {
-    /// By a path's ending, in whatever case.
+    /// By a path's ending, in upper or lower case.
     ///
     /// # Errors
     /// Any other ending.
@@ -79,8 +80,8 @@ impl FileKind {
 }
 
 impl Picture {
-    /// A picture of pixels without samples of their own, `[row][column]` from the top left; `metered` says at which of them
-    /// an exposure meter looks.
+    /// A picture of pixels without samples of their own, `[row][column]` from the top left;
+    /// `metered` marks those that the exposure meter counts.
     pub fn new((width, height): (u32, u32), radiance: Vec<[f32; 3]>, metered: &[bool]) -> Self {
         let mut luminances: Vec<_> = radiance
             .iter()
@@ -97,7 +98,7 @@ impl Picture {
         }
     }
 
-    /// Pictures of one height side by side, exposed as the last one.
+    /// Pictures of equal height side by side, exposed as the last one.
     pub fn side_by_side(pictures: &[Self]) -> Result<Self> {
         let last = pictures
             .last()
@@ -136,7 +137,7 @@ impl Picture {
         })
     }
 
-    /// Reads linear radiance from an OpenEXR file, to be exposed as if all of it were lit.
+    /// Reads linear radiance from an OpenEXR file; all pixels are metered.
     ///
     /// # Errors
     /// A file that cannot be read, or that holds no finite RGB.
@@ -157,11 +158,12 @@ impl Picture {
         Ok(Self::new(size, radiance, &metered))
     }
 
-    /// Writes the picture, by the ending of `path`: `.png` as 8-bit sRGB, exposed by 2^`exposure` and tone-mapped, or
-    /// `.exr` as linear 32-bit float radiance, W·m⁻²·sr⁻¹, neither exposed nor tone-mapped.
+    /// Writes the picture, by the ending of `path`: `.png` as 8-bit sRGB, exposed by 2^`exposure`
+    /// and tone-mapped, or `.exr` as linear 32-bit float radiance, W·m⁻²·sr⁻¹, neither exposed nor
+    /// tone-mapped.
     ///
-    /// Without `exposure`, the 90th percentile of the luminance of what shines by reflected light alone is brought to 0.6:
-    /// lamps in view do not darken the room.
+    /// Without `exposure`, the 90th percentile of the luminance of non-emitting surfaces is brought
+    /// to 0.6, so that lamps in view do not darken the room.
     ///
     /// # Errors
     /// Another ending; a file that cannot be written.
@@ -175,7 +177,7 @@ impl Picture {
             )),
             #[cfg(feature = "formats")]
             FileKind::Exr => write_atomically(path, |out| {
-                // The encoder goes back to fill in its table, which a stream cannot.
+                // The encoder seeks back to fill in its table, which a stream cannot.
                 let mut whole = Cursor::new(Vec::new());
                 OpenExrEncoder::new(&mut whole)
                     .write_image(
@@ -195,7 +197,8 @@ impl Picture {
         let scale = exposure.unwrap_or(self.automatic_exposure).exp2();
         let shown = |radiance: [f32; 3]| tone::neutral(radiance.map(|c| c * scale));
         let mut linear: Vec<[f32; 3]> = self.radiance.par_iter().map(|&r| shown(r)).collect();
-        // Mapped before they are averaged: otherwise one sample of a lamp outshines its pixel, and the lamp's edge is jagged.
+        // Tone-mapped before they are averaged: otherwise one sample of a lamp dominates its pixel,
+        // and the lamp's edge is jagged.
         for (place, samples) in &self.contrasts {
             linear[*place as usize] = mean(&samples.map(shown));
         }

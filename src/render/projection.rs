@@ -20,11 +20,13 @@ pub struct Tile {
 
 /// A camera with its picture's shape.
 pub struct Projection {
-    /// Scene units.
+    /// Position of the eye, scene units.
     pub eye: DVec3,
-    /// Scene units of one internal unit, a power of two: the scene's greatest half extent is at most one.
+    /// Scene units of one internal unit, a power of two: the scene's greatest half extent is at
+    /// most one.
     pub unit: f64,
-    /// Rows x, y and w over the whole picture: clip coordinates of a place seen from the eye; y is down.
+    /// Rows x, y and w over the whole picture: clip coordinates of a place seen from the eye; y is
+    /// down.
     rows: [DVec3; 3],
     /// Pixels.
     size: [f64; 2],
@@ -56,7 +58,7 @@ impl Projection {
         })
     }
 
-    /// The direction, a unit vector, in which a place in the picture is seen; pixels from the left top corner.
+    /// The direction, a unit vector, of a place in the picture; pixels from the top left corner.
     pub fn ray(&self, column: f64, row: f64) -> DVec3 {
         let [x, y, w] = self.rows;
         let across = 2.0 * column / self.size[0] - 1.0;
@@ -64,16 +66,16 @@ impl Projection {
         (w + x * (across / x.length_squared()) + y * (down / y.length_squared())).normalize()
     }
 
-    /// Angle of one of so many samples along a pixel's side in the picture's middle, radians.
+    /// Angle of one of `samples` samples along a pixel's side in the picture's middle, radians.
     pub fn sample_angle(&self, samples: u32) -> f32 {
         // Half of the picture's height is 1 / |y| at a distance of 1.
         (2.0 / (self.rows[1].length() * self.size[1] * f64::from(samples))) as f32
     }
 
-    /// Rows x, y and w over a tile alone.
+    /// Rows x, y and w over one tile.
     pub fn rows(&self, tile: Tile) -> [Vec3; 3] {
         let [x, y, w] = self.rows;
-        // The tile's ends, as places in −1..1 of the whole, go to −1 and 1.
+        // Maps the tile's ends, as places in −1..1 of the whole, to −1 and 1.
         let onto = |row: DVec3, whole: f64, first: u32, length: u32| {
             let (first, length) = (f64::from(first), f64::from(length));
             row * (whole / length) + w * ((whole - 2.0 * first - length) / length)

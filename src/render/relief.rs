@@ -2,54 +2,51 @@
 
 use std::sync::Arc;
 
+use super::ReliefShading;
 use super::mesh::parameters;
-use super::projection::{Projection, Tile};
+use super::projection::Tile;
 use super::relief_mesh::ReliefMesh;
 use super::relief_scene::ReliefScene;
+use super::seen_scene::SeenScene;
 use super::textures::Textures;
-use super::{Lighting, ReliefShading};
 use crate::error::Result;
 use crate::passes;
 use crate::passes::shadow_rays::LightBuffers;
-use crate::scene::Scene;
 use crate::vk::{Commands, DescriptorSet, Device, Sampler};
 
 /// The relief of a picture, ready to be drawn.
 pub struct Relief {
     pass: Arc<passes::relief::Relief>,
     pub mesh: ReliefMesh,
-    /// One for each range of the mesh.
+    /// `[range of the mesh]`.
     sets: Vec<DescriptorSet>,
     shading: u32,
 }
 
 impl Relief {
-    /// None where nothing with relief is drawn as such.
+    /// None where no relief is drawn by rays or its response.
+    ///
+    /// # Errors
+    /// A device without the memory.
     pub fn new(
         device: &Arc<Device>,
+        seen: &SeenScene<'_>,
         kept: Option<&ReliefScene>,
-        scene: &Scene,
-        lighting: &Lighting<'_>,
-        (textures, lights): (&Textures, &LightBuffers),
-        (projection, samples): (&Projection, u32),
+        textures: &Textures,
+        lights: &LightBuffers,
     ) -> Result<Option<Self>> {
-        let Some(((light, shading), kept)) = lighting.relief().zip(kept) else {
+        let Some(((light, shading), kept)) = seen.lighting.relief().zip(kept) else {
             return Ok(None);
         };
         let pass = Arc::clone(&kept.pass);
-        let mesh = ReliefMesh::new(
-            device,
-            scene,
-            lighting,
-            (light, kept),
-            (projection, samples),
-        )?;
+        let mesh = ReliefMesh::new(device, seen, light, kept)?;
         let sampler = Sampler::new(device, "relief albedo", true)?;
         let sets = mesh
             .ranges
             .iter()
-            .map(|&(material, ..)| {
-                pass.bind(textures.image(material), &sampler, &mesh.buffers, lights)
+            .map(|range| {
+                let albedo = textures.image(range.material);
+                pass.bind(albedo, &sampler, &mesh.buffers, lights)
             })
             .collect::<Result<_>>()?;
         Ok(Some(Self {
@@ -60,33 +57,27 @@ impl Relief {
         }))
     }
 
-    pub fn record(
-        &self,
-        cmd: &Commands,
-        scene: &Scene,
-        lighting: &Lighting<'_>,
-        (projection, lights): (&Projection, &LightBuffers),
-        (tile, samples): (Tile, u32),
-    ) {
-        let rows = projection.rows(tile);
+    /// Draws one tile within the render pass that has begun.
+    pub fn record(&self, cmd: &Commands, seen: &SeenScene<'_>, tile: Tile, lights: &LightBuffers) {
+        let rows = seen.projection.rows(tile);
         let directions = self.mesh.directions;
-        let counts = if lighting.shading == ReliefShading::Factored {
+        let counts = if seen.lighting.shading == ReliefShading::Factored {
             lights.counts
         } else {
             [0; 2]
         };
         let draws = self.mesh.ranges.iter().zip(&self.sets);
-        let draws = draws.map(|(&(material, first, count), set)| {
-            let material = &scene.materials[material as usize];
+        let draws = draws.map(|(range, set)| {
+            let material = &seen.scene.materials[range.material as usize];
             passes::relief::Draw {
-                first_prism: first,
-                prism_count: count,
+                first_prism: range.first,
+                prism_count: range.count,
                 set,
                 parameters: passes::relief::Parameters {
-                    shade: parameters(rows, Some(material), lighting.part).lit_by(counts),
+                    shade: parameters(rows, Some(material), seen.lighting.part).lit_by(counts),
                     shading: self.shading,
-                    view: lighting.show.code(),
-                    pixel: projection.sample_angle(samples),
+                    view: seen.lighting.show.code(),
+                    pixel: seen.projection.sample_angle(seen.samples),
                     cells: [directions.columns, directions.rows],
                 },
             }

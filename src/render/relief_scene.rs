@@ -1,11 +1,13 @@
-//! What of a scene's relief and its light does not depend on the view: made once for a series of pictures.
+//! The part of a scene's relief and its light that does not depend on the view; made once for a
+//! series of pictures.
 
 use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::relief_mesh::Surfaces;
+use super::relief_surfaces::Surfaces;
 use super::{Lighting, Show};
+use crate::bake::marcher;
 use crate::directions::Directions;
 use crate::elements::Elements;
 use crate::error::Result;
@@ -15,17 +17,17 @@ use crate::passes::shade::Shade;
 use crate::scene::Scene;
 use crate::vk::Device;
 
-/// What the factors may leave out of the light, see [`Factors::error`].
+/// Largest error of the factors, see [`Factors::error`].
 const FACTOR_ERROR: f64 = 0.01;
 
-/// The relief of a scene, seen from nowhere yet.
+/// The relief of a scene, without a view.
 pub struct ReliefScene {
     pub pass: Arc<passes::relief::Relief>,
     pub directions: Directions,
     pub tiles: Vec<Tile>,
-    /// `[triangle]`, its place in `tiles`; `u32::MAX` of those without.
+    /// Index into `tiles`, `[triangle]`; `u32::MAX` for triangles without.
     pub surface_of: Vec<u32>,
-    /// `[surface]`, as `tiles`.
+    /// `[surface]`, in the order of `tiles`.
     pub factors: Vec<Factors>,
     pub surfaces: Surfaces,
     pub vertices: MesoVertices,
@@ -35,7 +37,7 @@ pub struct ReliefScene {
 }
 
 impl ReliefScene {
-    /// None where nothing with relief is drawn as such.
+    /// None where no relief is drawn by rays or its response.
     ///
     /// # Errors
     /// As [`super::render`].
@@ -57,10 +59,10 @@ impl ReliefScene {
                 surface_of[elements.input_index[e] as usize] = surface;
             }
         }
-        let mut marcher = None;
+        let mut march = marcher(device);
         let mut factors = Vec::with_capacity(tiles.len());
         for tile in &tiles {
-            let (visibility, _) = visibility(device, &tile.field, lighting.cache, &mut marcher)?;
+            let (visibility, _) = visibility(&tile.field, lighting.cache, &mut march)?;
             factors.push(Factors::new(
                 &directions,
                 &tile.field,
@@ -69,8 +71,8 @@ impl ReliefScene {
                 FACTOR_ERROR,
             ));
         }
-        let vertices = MesoVertices::new(scene, light);
-        let gather = |moments| vertices.gather(&directions, light, moments);
+        let vertices = MesoVertices::new(scene, &light.elements, &light.frames);
+        let gather = |moments| vertices.gather(&directions, &light.frames, moments);
         Ok(Some(Self {
             pass: Arc::new(passes::relief::Relief::new(
                 device,

@@ -1,4 +1,4 @@
-//! A scene on the device, ready to be drawn from one camera after the other.
+//! A scene on the device, ready to be drawn from one camera after another.
 
 use std::sync::Arc;
 
@@ -9,6 +9,7 @@ use super::picture::{Picture, SAMPLES};
 use super::projection::{NEAR, Projection, Tile};
 use super::relief::Relief;
 use super::relief_scene::ReliefScene;
+use super::seen_scene::SeenScene;
 use super::textures::{Bound, Textures};
 use super::{Lighting, Overdraw, Show, View};
 use crate::error::Result;
@@ -17,32 +18,71 @@ use crate::passes::shadow_rays::LightBuffers;
 use crate::scene::Scene;
 use crate::vk::{Commands, Device, Timestamps};
 
-/// Pixels along a side of a tile: 2048² samples take 64 MiB of colour, as much again to read them, and 16 MiB of depth.
+/// Pixels along a side of a tile: 2048² samples take 64 MiB of colour, as much again to read them,
+/// and 16 MiB of depth.
 const TILE: u32 = 2048 / SAMPLES;
 
-/// Marks a pixel of a plain triangle where relief is counted.
+/// Marks pixels of plain triangles when pixels of relief are counted.
 const NOT_RELIEF: f32 = 2.0;
 
-/// Draws a view of a scene, as a picture or again and again.
+/// Draws views of a scene, each as one picture or as frames.
 pub struct Renderer<'a> {
+    fixed: Fixed<'a>,
+    view: ViewParts,
+}
+
+/// What does not depend on the view.
+struct Fixed<'a> {
     device: Arc<Device>,
     scene: &'a Scene,
     lighting: Lighting<'a>,
+    /// Samples along a pixel's side that the view is prepared for.
+    samples: u32,
+    shade: Shade,
+    textures: Textures,
+    relief: Option<ReliefScene>,
+}
+
+/// What depends on the view.
+struct ViewParts {
     /// Pixels across and down.
     size: (u32, u32),
     projection: Projection,
-    shade: Shade,
-    textures: Textures,
-    kept: Option<ReliefScene>,
-    samples: u32,
     lights: LightBuffers,
     bound: Bound,
     mesh: Mesh,
     relief: Option<Relief>,
 }
 
+impl ViewParts {
+    fn new(fixed: &Fixed<'_>, view: &View<'_>) -> Result<Self> {
+        let device = &fixed.device;
+        let projection = Projection::new(fixed.scene, view)?;
+        let seen = SeenScene {
+            scene: fixed.scene,
+            lighting: &fixed.lighting,
+            projection: &projection,
+            samples: fixed.samples,
+        };
+        let (lights, shafts) = light_buffers(device, &seen)?;
+        let kept = fixed.relief.as_ref();
+        let relief = Relief::new(device, &seen, kept, &fixed.textures, &lights)?;
+        let rest = relief.as_ref().map(|r| &r.mesh.rest);
+        let mesh = Mesh::new(device, &seen, rest, shafts.as_ref())?;
+        Ok(Self {
+            size: (view.width, view.height),
+            bound: fixed.textures.bind(&fixed.shade, &lights, &mesh.lit)?,
+            lights,
+            mesh,
+            relief,
+            projection,
+        })
+    }
+}
+
 impl<'a> Renderer<'a> {
-    /// For so many samples along a pixel's side: SAMPLES for [`Self::picture`], 1 for [`Self::frames`].
+    /// `samples` is the number of samples along a pixel's side: SAMPLES for [`Self::picture`], 1
+    /// for [`Self::frames`].
     ///
     /// # Errors
     /// As [`super::render`].
@@ -56,7 +96,7 @@ impl<'a> Renderer<'a> {
         Self::with_depths(device, scene, lighting, view, samples, false)
     }
 
-    /// With `depths`, [`Self::picture_while`] tells how far away what it shows is.
+    /// As [`Self::new`]; with `depths`, [`Self::picture_while`] also returns distances.
     ///
     /// # Errors
     /// As [`super::render`].
@@ -74,62 +114,34 @@ impl<'a> Renderer<'a> {
             "one irradiance a triangle"
         );
         view.check()?;
-        let projection = Projection::new(scene, view)?;
         let shade = Shade::new(device, depths)?;
-        let textures = Textures::new(device, scene)?;
-        let kept = ReliefScene::new(device, &shade, scene, &lighting)?;
-        let (lights, shafts) = light_buffers(device, scene, &lighting, &projection)?;
-        let seen = (&projection, samples);
-        let shared = (&textures, &lights);
-        let relief = Relief::new(device, kept.as_ref(), scene, &lighting, shared, seen)?;
-        let rest = relief.as_ref().map(|r| &r.mesh.rest);
-        let rest = (rest, shafts.as_ref());
-        let mesh = Mesh::new(device, scene, &lighting, &projection, rest)?;
-        Ok(Self {
-            bound: textures.bind(&shade, &lights, &mesh.lit)?,
-            lights,
-            mesh,
-            relief,
+        let fixed = Fixed {
+            textures: Textures::new(device, scene)?,
+            relief: ReliefScene::new(device, &shade, scene, &lighting)?,
             device: Arc::clone(device),
             scene,
             lighting,
-            size: (view.width, view.height),
-            projection,
-            shade,
-            textures,
-            kept,
             samples,
-        })
+            shade,
+        };
+        let view = ViewParts::new(&fixed, view)?;
+        Ok(Self { fixed, view })
     }
 
-    /// Turns to another view, keeping pipelines, textures and what of the relief and its light does not depend on the view.
+    /// Turns to another view. Pipelines, textures, and the part of the relief and its light that
+    /// does not depend on the view are kept.
     ///
     /// # Errors
-    /// As [`super::render`]; what was seen before stays then.
+    /// As [`super::render`]; the view before stays then.
     pub fn look(&mut self, view: &View<'_>) -> Result<()> {
         view.check()?;
-        let (device, scene) = (&self.device, self.scene);
-        let (lighting, kept) = (&self.lighting, self.kept.as_ref());
-        let projection = Projection::new(scene, view)?;
-        let (lights, shafts) = light_buffers(device, scene, lighting, &projection)?;
-        let seen = (&projection, self.samples);
-        let shared = (&self.textures, &lights);
-        let relief = Relief::new(device, kept, scene, lighting, shared, seen)?;
-        let rest = relief.as_ref().map(|r| &r.mesh.rest);
-        let rest = (rest, shafts.as_ref());
-        let mesh = Mesh::new(device, scene, lighting, &projection, rest)?;
-        self.bound = self.textures.bind(&self.shade, &lights, &mesh.lit)?;
-        self.lights = lights;
-        self.mesh = mesh;
-        self.relief = relief;
-        self.projection = projection;
-        self.size = (view.width, view.height);
+        self.view = ViewParts::new(&self.fixed, view)?;
         Ok(())
     }
 
     /// SAMPLES × SAMPLES samples a pixel, tile by tile.
     pub fn picture(&self) -> Result<Picture> {
-        match self.lighting.show {
+        match self.fixed.lighting.show {
             Show::Overdraw => Ok(self.overdraw()?.picture()),
             // Colours that are looked up in a legend are not exposed.
             Show::Slots => Ok(Picture {
@@ -140,8 +152,10 @@ impl<'a> Renderer<'a> {
         }
     }
 
-    /// As [`Self::picture`], in tiles of so many pixels a side, at each of which `go_on` may give the picture up; and of each
-    /// pixel how far along the view its middle is, internal units, 0 where nothing is. Nothing of a renderer without depths.
+    /// As [`Self::picture`], in tiles of `tile` pixels a side. `go_on` is asked before each tile;
+    /// when it returns false, drawing stops and the result is None. The second value is the
+    /// distance of each pixel's middle along the view, `[row][column]`, internal units, 0 where
+    /// nothing is; it is empty for a renderer without depths.
     ///
     /// # Errors
     /// A device that fails.
@@ -159,7 +173,7 @@ impl<'a> Renderer<'a> {
     /// A device that fails.
     pub fn overdraw(&self) -> Result<Overdraw> {
         assert_eq!(
-            self.lighting.show,
+            self.fixed.lighting.show,
             Show::Overdraw,
             "what is drawn must be counts"
         );
@@ -168,7 +182,7 @@ impl<'a> Renderer<'a> {
 
     fn gathered(&self) -> Result<Picture> {
         let whole = self.tiles(TILE, || true)?.map(|whole| whole.0);
-        Ok(whole.expect("a picture that nothing gives up is whole"))
+        Ok(whole.expect("nothing stops this picture"))
     }
 
     fn tiles(
@@ -176,13 +190,13 @@ impl<'a> Renderer<'a> {
         side: u32,
         mut go_on: impl FnMut() -> bool,
     ) -> Result<Option<(Picture, Vec<f32>)>> {
-        let (width, height) = self.size;
+        let (width, height) = self.view.size;
         let target = Target::new(
-            &self.device,
-            &self.shade,
+            &self.fixed.device,
+            &self.fixed.shade,
             (width.min(side) * SAMPLES, height.min(side) * SAMPLES),
         )?;
-        let mut gathered = Gathered::new(self.size);
+        let mut gathered = Gathered::new(self.view.size);
         let mut distances = Vec::new();
         for row in (0..height).step_by(side as usize) {
             for column in (0..width).step_by(side as usize) {
@@ -195,8 +209,8 @@ impl<'a> Renderer<'a> {
                     width: side.min(width - column),
                     height: side.min(height - row),
                 };
-                Commands::run(&self.device, "shade", |cmd| {
-                    self.record(cmd, &target, (tile, SAMPLES), None, || ());
+                Commands::run(&self.fixed.device, "shade", |cmd| {
+                    self.record(cmd, &target, tile, SAMPLES, None, || ());
                     Ok(())
                 })?;
                 gathered.add(
@@ -219,16 +233,17 @@ impl<'a> Renderer<'a> {
         Ok(Some((gathered.into_picture(), distances)))
     }
 
-    /// Draws the whole view `count` times with one sample a pixel, as a window would; seconds of each by GPU timestamps.
+    /// Draws the whole view `count` times with one sample a pixel, as a window would. Returns the
+    /// seconds of each frame by GPU timestamps.
     pub fn frames(&self, count: usize) -> Result<Vec<f64>> {
         let (target, tile) = self.whole()?;
-        let stamps = Timestamps::new(&self.device, "frame", 2)?;
+        let stamps = Timestamps::new(&self.fixed.device, "frame", 2)?;
         (0..count)
             .map(|_| {
-                Commands::run(&self.device, "frame", |cmd| {
+                Commands::run(&self.fixed.device, "frame", |cmd| {
                     cmd.reset_timestamps(&stamps);
                     cmd.timestamp(&stamps, 0);
-                    self.record(cmd, &target, (tile, 1), None, || cmd.timestamp(&stamps, 1));
+                    self.record(cmd, &target, tile, 1, None, || cmd.timestamp(&stamps, 1));
                     Ok(())
                 })?;
                 Ok(stamps.intervals()?[0])
@@ -236,17 +251,17 @@ impl<'a> Renderer<'a> {
             .collect()
     }
 
-    /// Of the plain triangles that light points light, those that nothing stands between and the lights, see
-    /// [`Lighting::skip_open`], and all.
+    /// Plain triangles that light points light: those with nothing between them and the lights (see
+    /// [`Lighting::skip_open`]), and all.
     pub fn open_triangles(&self) -> [usize; 2] {
-        self.mesh.open
+        self.view.mesh.open
     }
 
-    /// The share of the pixels of such a frame that show relief by rays.
+    /// Share of a frame's pixels that show relief drawn by rays.
     pub fn relief_coverage(&self) -> Result<f64> {
         let (target, tile) = self.whole()?;
-        Commands::run(&self.device, "coverage", |cmd| {
-            self.record(cmd, &target, (tile, 1), Some(NOT_RELIEF), || ());
+        Commands::run(&self.fixed.device, "coverage", |cmd| {
+            self.record(cmd, &target, tile, 1, Some(NOT_RELIEF), || ());
             Ok(())
         })?;
         let rows = target.rows(tile.height);
@@ -257,7 +272,7 @@ impl<'a> Renderer<'a> {
 
     /// A target for one sample of each pixel, and the tile that is the whole view.
     fn whole(&self) -> Result<(Target, Tile)> {
-        let (width, height) = self.size;
+        let (width, height) = self.view.size;
         let tile = Tile {
             column: 0,
             row: 0,
@@ -265,41 +280,55 @@ impl<'a> Renderer<'a> {
             height,
         };
         Ok((
-            Target::new(&self.device, &self.shade, (width, height))?,
+            Target::new(&self.fixed.device, &self.fixed.shade, (width, height))?,
             tile,
         ))
     }
 
-    /// `mark` stands in place of the meter's flag on plain triangles; `drawn` is recorded after all draws, before anything
-    /// is copied.
+    /// `mark` replaces the meter's flag on plain triangles; `drawn` is recorded after all draws and
+    /// before any copy.
     fn record(
         &self,
         cmd: &Commands,
         target: &Target,
-        (tile, samples): (Tile, u32),
+        tile: Tile,
+        samples: u32,
         mark: Option<f32>,
         drawn: impl FnOnce(),
     ) {
-        let part = self.lighting.part;
-        let seen = (&self.projection, tile);
-        let counts = self.lights.counts;
-        let plain = self.mesh.draws(self.scene, &self.bound, seen, part, counts);
-        self.shade.record(
+        let Fixed {
+            scene, lighting, ..
+        } = &self.fixed;
+        let ViewParts {
+            mesh,
+            relief,
+            lights,
+            bound,
+            projection,
+            ..
+        } = &self.view;
+        let seen = SeenScene {
+            scene,
+            lighting,
+            projection,
+            samples,
+        };
+        let plain = mesh
+            .draws(&seen, tile, bound, lights.counts)
+            .filter(|_| lighting.show != Show::Overdraw)
+            .map(|mut draw| {
+                draw.parameters.metered = mark.unwrap_or(draw.parameters.metered);
+                draw
+            });
+        self.fixed.shade.record(
             cmd,
             target,
             (tile.width * samples, tile.height * samples),
-            (&self.mesh.vertices, &self.mesh.indices),
-            plain
-                .filter(|_| self.lighting.show != Show::Overdraw)
-                .map(|mut draw| {
-                    draw.parameters.metered = mark.unwrap_or(draw.parameters.metered);
-                    draw
-                }),
+            (&mesh.vertices, &mesh.indices),
+            plain,
             || {
-                if let Some(relief) = &self.relief {
-                    let place = (tile, samples);
-                    let seen = (&self.projection, &self.lights);
-                    relief.record(cmd, self.scene, &self.lighting, seen, place);
+                if let Some(relief) = relief {
+                    relief.record(cmd, &seen, tile, lights);
                 }
                 drawn();
             },

@@ -1,8 +1,8 @@
-//! Triangles that nothing stands between and the lights: their samples follow no ways to light points.
+//! Triangles with nothing between them and the lights: their samples need no shadow rays.
 //!
-//! A shaft (Haines and Wallace 1991) holds every way from a triangle to a lamp. Here it is cut by planes about the convex hull
-//! of where ways begin and end; a triangle wholly outside one of them, or whose own plane has the hull on one side, stands on
-//! no way.
+//! A shaft (Haines and Wallace 1991) contains all shadow rays from a triangle to a lamp. Here it is
+//! bounded by planes about the convex hull of the rays' starts and ends. A triangle wholly outside
+//! one of the planes, or whose own plane has the hull on one side, blocks no ray.
 
 use glam::{DVec3, Vec3};
 
@@ -11,20 +11,21 @@ use crate::passes::shadow_rays::ShadowTree;
 use crate::passes::types::{LitTriangle, ShadowTriangle};
 use crate::scene::Scene;
 
-/// Shafts are as many as lamps; with more of them none are looked at.
+/// Most lamps, and so most shafts of a triangle; scenes with more lamps use no shafts.
 const MOST_LAMPS: usize = 8;
-/// Ways end this share of the greatest coordinate above an emitter: ABOVE of `shared/light_points.glsl`.
+/// Shadow rays end above an emitter by this share of the greatest coordinate: ABOVE of
+/// `shared/light_points.glsl`.
 const ABOVE: f64 = 3.8e-6;
-/// What lies outside of a shaft lies so far outside, as a share of the greatest coordinate: the walk through the tree looks at
-/// nothing further from a way, see `BOX_MARGIN`.
+/// Margin of a shaft's planes, as a share of the greatest coordinate: the traversal of the tree
+/// tests nothing further from a ray, see `BOX_MARGIN`.
 const MARGIN: f64 = 1.0 / (1 << 20) as f64;
-/// The same over planes that ways begin or end above: a share of what they begin above it, 2⁻¹⁸ of coordinates that are
-/// rounded to 2⁻²².
+/// The margin of planes that rays begin or end above: a share of the rays' height above them, which
+/// is 2⁻¹⁸ of coordinates that are rounded to 2⁻²².
 const MARGIN_ABOVE: f64 = 0.25;
 
 /// Emitters in one plane that face alike, or a point light.
 struct Lamp {
-    /// Ways end in their hull.
+    /// Shadow rays end in the hull of these points.
     ends: Vec<DVec3>,
     plane: Option<LampPlane>,
 }
@@ -32,7 +33,7 @@ struct Lamp {
 struct LampPlane {
     normal: DVec3,
     offset: f64,
-    /// Of the nearest end.
+    /// Distance of the nearest end.
     above: f64,
 }
 
@@ -42,7 +43,7 @@ struct Side {
     limit: f64,
 }
 
-/// What casts shadows, and lamps before which it may.
+/// Shadow casters and lamps.
 pub struct Shafts {
     tree: ShadowTree,
     lamps: Vec<Lamp>,
@@ -50,7 +51,7 @@ pub struct Shafts {
 }
 
 impl Shafts {
-    /// Of `tree`, whose triangles are `scene`'s as `projection` sees them.
+    /// Shafts for `tree`, whose triangles are `scene`'s relative to the eye of `projection`.
     pub fn new(tree: ShadowTree, scene: &Scene, projection: &Projection) -> Self {
         let seen = |p: DVec3| (p - projection.eye) / projection.unit;
         let mut lamps: Vec<_> = Self::emitters(scene, seen)
@@ -75,7 +76,7 @@ impl Shafts {
         }
     }
 
-    /// That finds no triangle open.
+    /// Shafts by which no triangle is open.
     pub fn closed() -> Self {
         Self {
             tree: ShadowTree::default(),
@@ -110,7 +111,7 @@ impl Shafts {
                     corners: corners.to_vec(),
                 }),
             }
-            // A round lamp is as many as its triangles: too many soon.
+            // A round lamp counts as one lamp per triangle, which soon exceeds the limit.
             if all.len() > MOST_LAMPS {
                 break;
             }
@@ -118,7 +119,7 @@ impl Shafts {
         all
     }
 
-    /// Whether nothing stands on any way from the triangle to any light.
+    /// Whether no shadow ray from the triangle to any light is blocked.
     pub fn is_open(&self, t: &LitTriangle) -> bool {
         let starts = starts(t);
         !self.lamps.is_empty()
@@ -172,7 +173,8 @@ impl Shafts {
         !(hull.iter().all(|p| off(p) > self.margin) || hull.iter().all(|p| off(p) < -self.margin))
     }
 
-    /// Planes that hold the hull: by the axes, the triangle's and the lamp's own, and those along an axis that touch it.
+    /// Planes that bound the hull: across the axes, the planes of the triangle and of the lamp, and
+    /// planes parallel to an axis that touch the hull.
     fn sides(&self, t: &LitTriangle, lamp: &Lamp, hull: &[DVec3]) -> Vec<Side> {
         let side = |normal: DVec3, margin: f64| Side {
             normal,
@@ -202,7 +204,8 @@ impl Shafts {
     }
 }
 
-/// Places in whose hull ways from the triangle begin, see `shade.frag`: up to where the tangent planes of its corners are.
+/// Points whose hull contains the starts of all rays from the triangle, see `shade.frag`: the
+/// starts reach up to the tangent planes of its corners.
 fn starts(t: &LitTriangle) -> Vec<DVec3> {
     let corners = [t.a, t.b, t.c].map(|v| v.as_dvec3());
     let above = f64::from(t.above);
@@ -214,7 +217,7 @@ fn starts(t: &LitTriangle) -> Vec<DVec3> {
     {
         let lift = corners.map(|c| normal.dot(*corner - c));
         let lift = lift.into_iter().fold(0.0, f64::max);
-        // Less is rounding, which the margins hold.
+        // Smaller values are rounding, which the margins cover.
         if lift > MARGIN_ABOVE * above {
             starts.extend(raised.map(|c| c + normal * lift));
         }
@@ -222,7 +225,7 @@ fn starts(t: &LitTriangle) -> Vec<DVec3> {
     starts
 }
 
-/// Emitters in a plane, from the eye.
+/// Emitters in a plane, relative to the eye.
 struct FlatEmitter {
     normal: DVec3,
     /// A long edge.
@@ -230,7 +233,8 @@ struct FlatEmitter {
     corners: Vec<DVec3>,
 }
 
-/// f64 places of one plane lie so near to it, as a share of the distance from the eye.
+/// Largest distance of f64 positions from their common plane, as a share of the distance from the
+/// eye.
 const FLAT: f64 = 1e-9;
 
 impl FlatEmitter {
@@ -257,7 +261,7 @@ impl FlatEmitter {
             corner(u.1, v.1),
             corner(u.0, v.1),
         ];
-        // The greatest coordinate of any place between the corners lies between these.
+        // The greatest coordinate of any point between the corners lies between these.
         let low = corners.into_iter().reduce(DVec3::min).unwrap_or_default();
         let high = corners.into_iter().reduce(DVec3::max).unwrap_or_default();
         let nearest = low.max(-high).max(DVec3::ZERO).max_element();
@@ -274,7 +278,8 @@ impl FlatEmitter {
     }
 }
 
-/// Edges of the convex outline of the points along two axes, counter-clockwise: Andrew's monotone chain.
+/// Edges of the convex outline of the points along two axes, counter-clockwise: Andrew's monotone
+/// chain.
 fn outline(points: &[DVec3], u: usize, v: usize) -> Vec<(DVec3, DVec3)> {
     let mut sorted = points.to_vec();
     sorted.sort_by(|a, b| a[u].total_cmp(&b[u]).then(a[v].total_cmp(&b[v])));

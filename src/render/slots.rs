@@ -4,20 +4,23 @@ use glam::{DVec3, Vec3};
 
 use crate::directions::Directions;
 
-/// Chroma of a slot that has all of the light: most that sRGB has at every hue is less, and is cut.
+/// Chroma of a slot that has all of the light. It is above what sRGB can show at every hue, and is
+/// clipped.
 const MOST_CHROMA: f64 = 0.2;
 /// Lightness of slots at the horizon and at the normal.
 const LIGHTNESS: [f64; 2] = [0.4, 0.9];
 
-/// The strongest slot of the light `[slot][colour]` by the length of its moment summed over the colours, as linear RGB.
+/// The strongest slot of the light `[slot][colour]` by the length of its moment summed over the
+/// colours, as linear RGB.
 ///
-/// Hue is its azimuth about the normal (0 along the tangent, red), lightness its height over the horizon, chroma the root of its
-/// share of all slots' lengths, each in Oklch, in which equal steps look equal. Black where there is no light.
+/// Hue is its azimuth about the normal (0 along the tangent, red), lightness its height over the
+/// horizon, chroma the root of its share of all slots' lengths, each in Oklch, in which equal steps
+/// look equal. Black where there is no light.
 pub fn slot_colour(directions: &Directions, moments: &[[Vec3; 3]]) -> Vec3 {
     let length = |m: &[Vec3; 3]| (m[0] + m[1] + m[2]).as_dvec3().length();
     let whole: f64 = moments.iter().map(length).sum();
     let strongest = (0..moments.len()).max_by(|&a, &b| {
-        // Of equal ones the first.
+        // The first of equal ones.
         let by_length = length(&moments[a]).total_cmp(&length(&moments[b]));
         by_length.then(b.cmp(&a))
     });
@@ -77,7 +80,7 @@ mod tests {
         assert!(against.x < against.y.max(against.z), "{against}");
         let up = one(DVec3::new(0.1, 0.1, 1.0).normalize());
         assert!(up.element_sum() > 2.0 * along_u.element_sum(), "{up}");
-        // The same from everywhere is nearly grey: of 64 slots one has an eighth of the chroma.
+        // Uniform light is nearly grey: one of 64 slots has an eighth of the chroma.
         let even: Vec<_> = (0..64)
             .map(|k| [directions.centre(k).as_vec3(); 3])
             .collect();

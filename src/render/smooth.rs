@@ -1,5 +1,5 @@
-//! From one irradiance an element to one a corner, so that shading runs smoothly over an even surface and breaks at its
-//! edges.
+//! Irradiance at the corners from irradiance of the elements, so that shading is smooth over a
+//! smooth surface and breaks at its edges.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;

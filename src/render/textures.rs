@@ -20,7 +20,7 @@ pub struct Textures {
     sampler: Sampler,
 }
 
-/// The same, each with the light that falls on plain triangles, ready to be drawn with.
+/// The same bound for drawing, each with the light on plain triangles.
 pub struct Bound {
     of_material: Vec<usize>,
     sets: Vec<DescriptorSet>,
@@ -66,7 +66,7 @@ impl Textures {
         &self.images[self.of_material[material as usize]]
     }
 
-    /// With the light of `lights` on the triangles of `lit`, see [`Shade::bind`].
+    /// Binds the textures with `lights` and the triangles of `lit`, see [`Shade::bind`].
     ///
     /// # Errors
     /// A device without the memory.
@@ -122,7 +122,8 @@ pub fn upload(
     Ok(image)
 }
 
-/// The next level of detail, half the size rounded down: each texel the mean of the area that it covers, in linear light.
+/// The next level of detail, half the size rounded down: each texel is the mean over the area that
+/// it covers, in linear light.
 fn half(texels: &[[f32; 4]], (width, height): (usize, usize)) -> (Vec<[f32; 4]>, (usize, usize)) {
     let (w, h) = ((width / 2).max(1), (height / 2).max(1));
     let out = (0..w * h)
@@ -141,7 +142,8 @@ fn half(texels: &[[f32; 4]], (width, height): (usize, usize)) -> (Vec<[f32; 4]>,
     (out, (w, h))
 }
 
-/// The texels along one side that a texel of the smaller level covers, and their shares of it. Of an odd size it is three.
+/// The texels along one side that a texel of the smaller level covers, and their shares of it. For
+/// an odd size they are three.
 fn covered(place: usize, size: usize, smaller: usize) -> impl Iterator<Item = (usize, f32)> {
     let (from, to) = (place * size, (place + 1) * size);
     (from / smaller..to.div_ceil(smaller)).map(move |texel| {

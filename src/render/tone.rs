@@ -1,7 +1,8 @@
 //! From radiance to the codes of a picture: tone curve, sRGB, dither.
 
-/// Khronos PBR Neutral (Khronos Group 2024): leaves what is below 0.76 alone but for a Fresnel offset, and brings what is
-/// above to 1 without a change of hue. Exposed linear RGB in, linear RGB in 0..=1 out.
+/// Khronos PBR Neutral (Khronos Group 2024): keeps values below 0.76 except for a Fresnel offset,
+/// and compresses values above to 1 without a change of hue. Exposed linear RGB in, linear RGB in
+/// 0..=1 out.
 pub fn neutral(colour: [f32; 3]) -> [f32; 3] {
     const START: f32 = 0.8 - 0.04;
     const DESATURATION: f32 = 0.15;
@@ -26,8 +27,8 @@ pub fn neutral(colour: [f32; 3]) -> [f32; 3] {
     })
 }
 
-/// 8-bit sRGB codes of the colour map magma (Smith and van der Walt 2015) at 0..=1, from black over purple to pale yellow, by
-/// Zucker's polynomial of 2019, which keeps within five codes of it.
+/// 8-bit sRGB codes of the colour map magma (Smith and van der Walt 2015) at 0..=1, from black over
+/// purple to pale yellow, by Zucker's polynomial of 2019, which is within five codes of it.
 pub fn magma(value: f32) -> [u8; 3] {
     const TERMS: [[f32; 3]; 7] = [
         [-0.002_136_485, -0.000_749_655, -0.005_386_128],
@@ -50,8 +51,9 @@ pub fn luminance([r, g, b]: [f32; 3]) -> f32 {
     0.2126 * r + 0.7152 * g + 0.0722 * b
 }
 
-/// The 8-bit sRGB code (IEC 61966-2-1) of linear light in 0..=1 at a pixel: an ordered dither of half a code about
-/// the exact value, which keeps a smooth wall from banding and leaves whole codes, black and white among them, as they are.
+/// The 8-bit sRGB code (IEC 61966-2-1) of linear light in 0..=1 at a pixel: with an ordered dither
+/// of half a code about the exact value, which prevents banding and keeps exact codes, such as
+/// black and white, unchanged.
 pub fn code(linear: f32, column: u32, row: u32) -> u8 {
     let linear = linear.clamp(0.0, 1.0);
     let coded = if linear <= 0.003_130_8 {

@@ -1,4 +1,5 @@
-//! Brings meshes together into one scene: welds, drops triangles without area and duplicates, makes up texture coordinates.
+//! Merges meshes into one scene: welds, drops triangles without area and duplicates, makes up
+//! texture coordinates.
 
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
@@ -10,7 +11,7 @@ use super::uv::box_projection;
 use super::{Material, Scene, Triangle};
 use crate::error::{Error, Result};
 
-/// A mesh on its way into a scene.
+/// A mesh before it is added to a scene.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Mesh {
     pub positions: Vec<DVec3>,
@@ -48,7 +49,7 @@ pub(super) struct MeshTriangle {
     pub material: u32,
 }
 
-/// Height over longest edge below which rounding alone decides where the normal points.
+/// Height over longest edge below which the direction of the normal is only rounding error.
 const LEAST_HEIGHT: f64 = 1e-10;
 
 /// A scene while meshes are added to it.
@@ -74,8 +75,8 @@ impl Assembly {
         }
     }
 
-    /// Adds materials and returns their indices in the scene. An equal one is shared; one with a name that another
-    /// material has already is given a number.
+    /// Adds materials and returns their indices in the scene. An equal one is shared; one whose
+    /// name is taken by another material gets a number.
     pub fn add_materials(&mut self, materials: &[Material]) -> Vec<u32> {
         materials.iter().map(|m| self.add_material(m)).collect()
     }
@@ -102,7 +103,8 @@ impl Assembly {
         known.len() as u32 - 1
     }
 
-    /// Adds the triangles of a mesh in their order; `materials` gives the scene's index for each of the mesh's.
+    /// Adds the triangles of a mesh in their order; `materials` gives the scene's index for each of
+    /// the mesh's.
     ///
     /// # Errors
     /// A position that is not finite.
@@ -120,7 +122,8 @@ impl Assembly {
                 continue;
             }
             let vertices = corners.map(|p| self.weld(p));
-            // Two of one place would both send the light that falls there: each bounce would double it.
+            // Two triangles in one place would both reflect the light that falls there: each bounce
+            // would double it.
             let least = (0..3).fold(0, |l, i| if vertices[i] < vertices[l] { i } else { l });
             if !self
                 .known
@@ -143,7 +146,7 @@ impl Assembly {
     }
 
     fn weld(&mut self, position: DVec3) -> u32 {
-        // Adding zero turns −0 into 0, which is the same place with other bits.
+        // Adding zero turns −0 into 0: the same position with other bits.
         let position = position + DVec3::ZERO;
         let vertices = &mut self.scene.vertices;
         *self
@@ -166,18 +169,18 @@ impl Assembly {
     }
 }
 
-/// Whether a triangle has no area to speak of: height over longest edge below [`LEAST_HEIGHT`].
+/// Whether a triangle has practically no area: height over longest edge below [`LEAST_HEIGHT`].
 pub(super) fn is_degenerate([a, b, c]: [DVec3; 3]) -> bool {
     let edges = [b - a, c - b, a - c];
     let size = edges
         .iter()
         .map(|e| e.abs().max_element())
         .fold(0.0, f64::max);
-    // Too long for f64 is for the check of the whole scene to refuse.
+    // Lengths that overflow f64 are rejected later, by the check of the whole scene.
     if size == 0.0 || size.is_infinite() {
         return size == 0.0;
     }
-    // Scaled first, so that no square leaves the range of f64.
+    // Scaled first, so that no square overflows.
     let [ab, bc, ca] = edges.map(|e| e / size);
     let longest = ab
         .length_squared()

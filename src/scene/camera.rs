@@ -1,4 +1,4 @@
-//! Cameras: what makes one usable, and one for a scene that has none.
+//! Cameras: checks, and a default for a scene without one.
 
 use super::*;
 
@@ -34,7 +34,8 @@ impl Camera {
         Ok(())
     }
 
-    /// A view of the whole scene from the front, the right and above; from within where the surfaces face inward.
+    /// A view of the whole scene from the front, the right and above; from inside where the
+    /// surfaces face inward.
     pub(super) fn for_scene(scene: &Scene) -> Self {
         let (low, high) = scene.bounds();
         let (centre, half) = ((low + high) / 2.0, (high - low) / 2.0);

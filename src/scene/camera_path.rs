@@ -1,4 +1,4 @@
-//! Ways of a camera through a series of pictures.
+//! Paths of a camera through a series of pictures.
 
 use glam::{DQuat, DVec3};
 
@@ -8,8 +8,9 @@ use crate::error::{Error, Result};
 /// Most pictures of a series: what nine digits can number.
 pub const MOST_FRAMES: u32 = 999_999_999;
 
-/// `frames` cameras about `camera.look_at`, turned about its up. Over 360° the first is `camera` itself and the last stands a
-/// step before it, so that the series can be repeated; over less, `camera` is in the middle.
+/// `frames` cameras about `camera.look_at`, turned about its up. Over 360° the first is `camera`
+/// itself and the last is one step before it, so that the series can be repeated; over less,
+/// `camera` is in the middle.
 ///
 /// # Errors
 /// No frames, or too many; degrees not in −360..=360.
@@ -43,8 +44,9 @@ pub fn turntable(camera: &Camera, degrees: f64, frames: u32) -> Result<Vec<Camer
         .collect())
 }
 
-/// `frames` cameras on a smooth path through all of `cameras` in their order, from the first to the last: uniform Catmull–Rom
-/// splines (Catmull and Rom 1974) of eye, target, up and field of view. At the ends the path goes on straight.
+/// `frames` cameras on a smooth path through all of `cameras` in their order, from the first to the
+/// last: uniform Catmull–Rom splines (Catmull and Rom 1974) of eye, target, up and field of view.
+/// Beyond its ends the path is extended linearly.
 ///
 /// # Errors
 /// Fewer than two cameras; no frames, or too many.
@@ -72,7 +74,7 @@ pub fn through(cameras: &[Camera], frames: u32) -> Result<Vec<Camera>> {
                 position: spline.at(|c| c.position),
                 look_at: spline.at(|c| c.look_at),
                 up: spline.at(|c| c.up.normalize_or_zero()).normalize_or_zero(),
-                // A spline may pass what it goes through.
+                // A spline may overshoot the values that it goes through.
                 fov_y: spline.at(|c| DVec3::splat(c.fov_y)).x.clamp(1.0, 179.0),
             }
         })
@@ -88,7 +90,7 @@ fn check(frames: u32) -> Result<()> {
     }
 }
 
-/// A place on the path: between camera `leg` and the next.
+/// A point on the path, between camera `leg` and the next.
 struct Spline<'a> {
     cameras: &'a [Camera],
     leg: usize,

@@ -1,9 +1,9 @@
-//! What must hold for a scene as a whole, however it was read.
+//! Checks of a whole scene, from any source.
 
 use super::{Camera, Scene, relief_notes};
 use crate::error::{Error, Result};
 
-/// Extents within which the squares and areas of later steps stay far from the ends of f32.
+/// Extents within which the squares and areas of later steps stay well within the range of f32.
 const EXTENTS: std::ops::RangeInclusive<f64> = 1e-15..=1e15;
 
 /// Checks a scene and gives it a camera if it has none.

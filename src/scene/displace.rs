@@ -1,4 +1,4 @@
-//! Relief turned into geometry: the high-poly baseline that light on relief is compared with.
+//! Relief turned into geometry: the high-poly baseline for comparisons of light on relief.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -8,20 +8,21 @@ use glam::{DVec2, DVec3};
 use super::assemble::is_degenerate;
 use super::{HeightMap, Material, Scene, Triangle};
 
-/// Rounds of halving, at most: an edge of 2³² texels ends at one.
+/// Most rounds of halving: they reduce an edge of 2³² texels to one.
 const MOST_ROUNDS: u32 = 32;
 
-/// Coordinates that differ by whole repeats, each rounded to f32, are one place.
+/// Coordinates that differ by whole repeats, each rounded to f32, are the same place.
 const SAME_PLACE: f64 = 1e-6;
 
-/// A scene in which every triangle with relief is refined to the texels of its height map and displaced, without maps of
-/// the relief.
+/// A scene in which every triangle with relief is refined to the texels of its height map and
+/// displaced, without its relief maps.
 ///
-/// An edge is halved until it spans one texel at most, in the triangle beside it where it spans more, and the triangles
-/// follow without T-junctions. A vertex moves along the smooth normal of the original triangles with relief (weighted by
-/// area) by the height above the map's mean; where texture coordinates meet in a seam, by the mean of their heights. What is
-/// shared with triangles without relief stays where it is: these keep their shape, and are cut only along such edges.
-/// Triangles left without area are dropped and counted.
+/// An edge is halved until it spans at most one texel, in that of its two triangles where it spans
+/// more; the triangles are cut to match, without T-junctions. A vertex moves along the smooth
+/// normal of the original triangles with relief (weighted by area) by the height above the map's
+/// mean; where texture coordinates meet in a seam, by the mean of their heights. Vertices shared
+/// with triangles without relief stay where they are: these triangles keep their shape and are cut
+/// only along such edges. Triangles left without area are dropped and counted.
 pub fn displace(scene: &Scene) -> Scene {
     let mut work = Refined::new(scene);
     for _ in 0..MOST_ROUNDS {
@@ -32,7 +33,7 @@ pub fn displace(scene: &Scene) -> Scene {
     work.into_scene(scene)
 }
 
-/// A triangle on its way, with coordinates not yet rounded.
+/// A triangle under refinement, with coordinates not yet rounded.
 #[derive(Clone, Copy)]
 struct Piece {
     vertices: [u32; 3],
@@ -65,7 +66,7 @@ impl Relief {
         ((to - from) * DVec2::new(f64::from(self.map.width), f64::from(self.map.height))).length()
     }
 
-    /// Scene units above the mesh's own surface.
+    /// Height above the mesh's own surface, scene units.
     fn height(&self, uv: DVec2) -> f64 {
         self.scale * (self.map.sample(uv.x, uv.y) - self.mean)
     }
@@ -75,10 +76,10 @@ struct Refined {
     /// `[material]`.
     reliefs: Vec<Option<Relief>>,
     vertices: Vec<DVec3>,
-    /// Smooth unit normals, zero where no relief is or where the normals cancel.
+    /// Smooth unit normals; zero where there is no relief or where the normals cancel.
     normals: Vec<DVec3>,
     pieces: Vec<Piece>,
-    /// Edges between relief and none, the lower vertex first.
+    /// Edges between triangles with and without relief, the lower vertex first.
     fixed_edges: HashSet<[u32; 2]>,
     /// Vertices of triangles without relief and of such edges.
     fixed: HashSet<u32>,
@@ -118,7 +119,7 @@ impl Refined {
         }
     }
 
-    /// Halves every edge that is longer than a texel, once; false if there was none.
+    /// Halves every edge that is longer than a texel once. Returns false if there was none.
     fn refine(&mut self) -> bool {
         let mut middles: HashMap<[u32; 2], u32> = HashMap::new();
         for piece in &self.pieces {
@@ -156,7 +157,7 @@ impl Refined {
         true
     }
 
-    /// Cuts a triangle by the middles of its edges: in two, three or four.
+    /// Cuts a triangle at the middles of its halved edges, into two, three or four.
     fn split(&mut self, piece: Piece, middles: &HashMap<[u32; 2], u32>) {
         let middle = edges_of(piece.vertices).map(|[a, b]| middles.get(&sorted(a, b)).copied());
         let corner = |k: usize| (piece.vertices[k % 3], piece.uv[k % 3]);
@@ -168,7 +169,7 @@ impl Refined {
                 material: piece.material,
             });
         };
-        // Turned so that the pattern begins at edge k: middle of edge k first.
+        // Rotated so that the pattern begins with the middle of edge k.
         let turned = |k: usize| [0, 1, 2].map(|i| middle[(k + i) % 3]);
         for k in 0..3 {
             match turned(k) {
@@ -181,7 +182,8 @@ impl Refined {
                 [Some(m), Some(n), None] => {
                     let (m, n) = (half(k, m), half(k + 1, n));
                     push([m, corner(k + 1), n]);
-                    // The quad that is left, along its shorter diagonal; on a tie by index, the same on every run.
+                    // The remaining quad is cut along its shorter diagonal; ties are broken by
+                    // index, the same on every run.
                     let place = |c: (u32, DVec2)| self.vertices[c.0 as usize];
                     let (a, c) = (corner(k), corner(k + 2));
                     if place(a).distance_squared(place(n)) <= place(m).distance_squared(place(c)) {
@@ -231,7 +233,8 @@ impl Refined {
     }
 
     fn displaced(&self) -> Vec<DVec3> {
-        // Each height counts once for a place in texture space, however many triangles meet there.
+        // Each height counts once for a place in texture space, for any number of triangles that
+        // meet there.
         let mut heights: Vec<Vec<(u32, DVec2, f64)>> = vec![Vec::new(); self.vertices.len()];
         for piece in &self.pieces {
             let Some(relief) = &self.reliefs[piece.material as usize] else {
@@ -261,8 +264,8 @@ impl Refined {
     }
 }
 
-/// Along which each vertex is displaced, `[vertex]`: the smooth unit normal of the triangles with relief about it, weighted
-/// by area; zero where there are none or where they cancel.
+/// Direction in which each vertex is displaced, `[vertex]`: the smooth unit normal of the triangles
+/// with relief about it, weighted by area; zero where there are none or where they cancel.
 pub fn relief_normals(scene: &Scene) -> Vec<DVec3> {
     let mut normals = vec![DVec3::ZERO; scene.vertices.len()];
     for triangle in &scene.triangles {

@@ -1,12 +1,12 @@
-//! The identity of what is baked.
+//! A hash that identifies a scene's bake.
 
 use sha2::{Digest, Sha256};
 
 use super::{Material, Scene};
 
 impl Scene {
-    /// SHA-256 in hexadecimal over everything that a bake depends on: vertices, triangles, materials with their texels,
-    /// point lights. Names, paths and cameras do not count.
+    /// SHA-256 in hexadecimal over everything that a bake depends on: vertices, triangles,
+    /// materials with their texels, point lights. Names, paths and cameras do not count.
     pub fn hash(&self) -> String {
         let mut hash = Sha256::new();
         // Each list begins with its length, so that no two scenes give the same bytes.
@@ -59,7 +59,8 @@ fn material(hash: &mut Sha256, material: &Material) {
 }
 
 fn relief(hash: &mut Sha256, material: &Material) {
-    // A material without relief is hashed as it was before there was any, so that its bakes stay valid.
+    // A material without relief is hashed without relief fields, so that bakes of earlier versions
+    // stay valid.
     if let Some(map) = &material.map_height {
         hash.update(b"height");
         hash.update(map.width.to_le_bytes());

@@ -1,28 +1,21 @@
-//! Finds out what a scene argument names, and reads it.
+//! Resolves a scene argument and reads the scene.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::assemble::Assembly;
 use super::material::TextureCache;
 #[cfg(feature = "formats")]
 use super::scene_file;
-use super::{Scene, builtin, check, obj};
+use super::text_file::stem;
+use super::{BuiltinOptions, Scene, builtin, check, obj};
 use crate::error::{Error, Result};
 
-/// What a person may ask of a built-in scene.
-#[derive(Debug, Clone, Default)]
-pub struct BuiltinOptions {
-    /// The exact number of elements.
-    pub patches: Option<usize>,
-    /// An OBJ mesh, y up, head towards −z, in the place of the statue made by code.
-    pub statue: Option<PathBuf>,
-}
-
-/// Reads the scene that `spec` names: a built-in one ([`builtin::NAMES`]), an `.obj` file or a `scene.toml` file.
+/// Reads the scene that `spec` names: a built-in one ([`builtin::NAMES`]), an `.obj` file or a
+/// `scene.toml` file.
 ///
 /// # Errors
-/// A name that is neither; a file that cannot be read or used, with the line or the material; a scene that cannot be
-/// baked.
+/// A name that is none of these; a file that cannot be read or used, with the line or the material;
+/// a scene that cannot be baked.
 pub fn load(spec: &str, options: &BuiltinOptions) -> Result<Scene> {
     if builtin::NAMES.contains(&spec) {
         return builtin::build(spec, options);
@@ -66,11 +59,4 @@ fn load_obj(path: &Path) -> Result<Scene> {
         .notes
         .extend(mesh.made_up.iter().map(|made_up| made_up.to_string()));
     check::finish(assembly.into_scene())
-}
-
-/// The name of a scene that has none: its file's, without the extension.
-pub(super) fn stem(path: &Path) -> String {
-    path.file_stem()
-        .map(|s| s.to_string_lossy().into_owned())
-        .unwrap_or_default()
 }

@@ -34,7 +34,7 @@ fn address<T>(map: &Arc<T>) -> usize {
 /// Writes each texture and map once.
 pub(super) fn write(scene: &Scene, dir: &Path) -> Result<MapFiles> {
     let mut files = MapFiles::default();
-    // Read whole before any is written: a copy may replace an original.
+    // All are read before any is written: a copy may replace an original.
     let mut contents: Vec<(String, Vec<u8>)> = Vec::new();
     for texture in scene.materials.iter().filter_map(|m| m.map_kd.as_deref()) {
         if files.textures.contains_key(&texture.path) {
@@ -77,7 +77,7 @@ pub(super) fn write(scene: &Scene, dir: &Path) -> Result<MapFiles> {
     Ok(files)
 }
 
-/// The file of a map, if it holds the map still, else the map encoded anew.
+/// The map's own file if it still holds the map, else the map encoded again.
 fn add<T>(
     files: &mut MapFiles,
     contents: &mut Vec<(String, Vec<u8>)>,

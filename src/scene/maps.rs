@@ -13,11 +13,12 @@ use crate::error::{Error, Result};
 /// White is high. The surface of the mesh lies at the map's mean height.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeightMap {
-    /// The file it came from; of a map made by code, the name that it is given when it is written.
+    /// The file it came from; for a map made by code, the name of its file when it is written.
     pub path: PathBuf,
     pub width: u32,
     pub height: u32,
-    /// Row-major from the top row. In 0..=1 for integer images (the code as it is, no gamma), as stored for OpenEXR.
+    /// Row-major from the top row. In 0..=1 for integer images (the code as it is, no gamma), as
+    /// stored for OpenEXR.
     pub values: Vec<f32>,
 }
 
@@ -25,8 +26,9 @@ pub struct HeightMap {
 const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
 
 impl HeightMap {
-    /// Reads PNG (8 and 16 bit), JPEG or OpenEXR (with R, G and B). The second value is a note for the person if the
-    /// image is coloured: the height is the luminance then, else the first channel. Alpha is ignored.
+    /// Reads PNG (8 and 16 bit), JPEG or OpenEXR (with R, G and B). The height is the luminance of
+    /// a coloured image, else the first channel; alpha is ignored. The second value is a note for
+    /// the user if the image is coloured.
     ///
     /// # Errors
     /// A file that cannot be read or decoded; a texel that is not finite.
@@ -69,7 +71,8 @@ impl HeightMap {
         self.values.iter().map(|&v| f64::from(v)).sum::<f64>() / self.values.len() as f64
     }
 
-    /// The value at texture coordinates (v up), bilinear and repeating; not yet scaled, nor the mean taken off.
+    /// The value at texture coordinates (v up), bilinear and repeating; neither scaled nor reduced
+    /// by the mean.
     pub fn sample(&self, u: f64, v: f64) -> f64 {
         let (columns, x) = neighbours(u, self.width);
         let (rows, y) = neighbours(1.0 - v, self.height);
@@ -88,7 +91,8 @@ pub struct NormalMap {
     pub path: PathBuf,
     pub width: u32,
     pub height: u32,
-    /// Row-major from the top row. Unit vectors: x along growing u, y along growing v (up in the image), z outward.
+    /// Row-major from the top row. Unit vectors: x along increasing u, y along increasing v (up in
+    /// the image), z outward.
     pub normals: Vec<[f32; 3]>,
 }
 
@@ -96,8 +100,8 @@ impl NormalMap {
     /// Reads PNG (8 and 16 bit) or OpenEXR (with R, G and B): n = 2c − 1, made a unit vector.
     ///
     /// # Errors
-    /// A file that cannot be read or decoded; a texel outside 0..=1; a normal of length 0 or that does not point out of
-    /// the surface (z ≤ 0).
+    /// A file that cannot be read or decoded; a texel outside 0..=1; a normal of length 0, or one
+    /// that does not point out of the surface (z ≤ 0).
     pub fn load(path: &Path) -> Result<Self> {
         let image = Channels::read(path)?;
         if let Some(at) = image.find(|texel| !texel.iter().all(|c| (0.0..=1.0).contains(c))) {

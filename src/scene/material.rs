@@ -14,11 +14,11 @@ pub struct Material {
     pub kd: [f32; 3],
     /// Reflectance texture, linear RGB.
     pub map_kd: Option<Arc<Texture>>,
-    /// Relief: heights times `height_scale` stand on the surface.
+    /// Relief: heights times `height_scale` above the surface.
     pub map_height: Option<Arc<HeightMap>>,
-    /// Scene units that a value of 1 in the height map stands above a value of 0.
+    /// Scene units between the values 0 and 1 of the height map.
     pub height_scale: f32,
-    /// Normals of the relief; derived from the heights where there is none.
+    /// Normals of the relief; None derives them from the heights.
     pub map_normal: Option<Arc<NormalMap>>,
     /// Emitted radiance Le, W·m⁻²·sr⁻¹, RGB.
     pub ke: [f32; 3],
@@ -39,12 +39,12 @@ impl Default for Material {
     }
 }
 
-/// Reflectance of a surface about which the file says nothing.
+/// Reflectance of a surface whose file gives none.
 pub(super) const DEFAULT_KD: f32 = 0.5;
 
 impl Material {
-    /// Checks reflectance in 0..=1, texture included, emission finite and not negative, and the relief finite; the error
-    /// is one clause.
+    /// Checks reflectance in 0..=1, texture included, emission finite and not negative, and the
+    /// relief finite; the error is one clause.
     pub(super) fn check(&self) -> Result<(), String> {
         if !self.kd.iter().all(|c| (0.0..=1.0).contains(c)) {
             return Err(format!("reflectance Kd {} must be in 0..=1", rgb(self.kd)));
@@ -92,7 +92,7 @@ impl Material {
                 .is_some_and(|map| !map.is_constant())
     }
 
-    /// Whether it sends light of its own.
+    /// Whether it emits light.
     pub fn emits(&self) -> bool {
         self.ke.iter().any(|&c| c > 0.0)
     }
@@ -102,7 +102,7 @@ fn rgb([r, g, b]: [f32; 3]) -> String {
     format!("({r}, {g}, {b})")
 }
 
-/// A reflectance that no file gave, with the sentence that tells the person so.
+/// A reflectance that no file gave, with the sentence that reports it to the user.
 #[derive(Debug, Clone)]
 pub(super) struct MadeUp {
     pub material: String,
@@ -119,20 +119,20 @@ impl std::fmt::Display for MadeUp {
     }
 }
 
-/// Textures and relief maps by path, so that materials share what they have in common.
+/// Textures and relief maps by path, so that materials share them.
 #[derive(Default)]
 pub(super) struct TextureCache {
     textures: HashMap<PathBuf, Arc<Texture>>,
     heights: HashMap<PathBuf, Arc<HeightMap>>,
     normals: HashMap<PathBuf, Arc<NormalMap>>,
-    /// What reading them gave to say, for whoever reads next to pass on.
+    /// Notes from reading them, for the caller to pass on.
     pub notes: Vec<String>,
 }
 
-/// Where a map is asked for.
+/// The reference to a map.
 #[derive(Clone, Copy)]
 pub(super) struct Asked<'a> {
-    /// To whose folder the name of the map is relative.
+    /// The file whose folder the name of the map is relative to.
     pub file: &'a Path,
     pub material: &'a str,
     /// The statement or key that names the map.

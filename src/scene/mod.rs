@@ -1,7 +1,8 @@
-//! A scene as it was read: triangles, materials, point lights, cameras. Scene units throughout, nothing derived.
+//! A scene as it was read: triangles, materials, point lights, cameras. All in scene units; nothing
+//! is derived.
 //!
-//! Positions stay in f64: an offset of 10⁶ units must not eat the shape. `elements` brings them to f32 about the
-//! scene's own centre.
+//! Positions stay in f64: an offset of 10⁶ units must not cost the shape its precision. `elements`
+//! converts them to f32 about the scene's own centre.
 //!
 //! ```text
 //! .obj ─► obj_lint ─► obj + mtl ─┐
@@ -30,6 +31,8 @@ mod placement;
 mod relief_notes;
 #[cfg(feature = "formats")]
 mod scene_file;
+pub mod shapes;
+mod text_file;
 mod texture;
 mod uv;
 #[cfg(feature = "formats")]
@@ -40,21 +43,23 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+pub use builtin::BuiltinOptions;
 pub use displace::{displace, relief_normals};
-pub use load::{BuiltinOptions, load};
+pub use load::load;
 pub use maps::{HeightMap, NormalMap};
 pub use material::Material;
 pub use texture::Texture;
 #[cfg(feature = "formats")]
 pub use write::write_scene;
 
-/// A scene that is fit to be baked: at least one triangle, every number finite, every reflectance in 0..=1.
+/// A scene that can be baked: at least one triangle, all numbers finite, all reflectances in 0..=1.
 #[derive(Debug, Clone, Default)]
 pub struct Scene {
     pub name: String,
     /// The file it came from; none for a built-in scene.
     pub path: Option<PathBuf>,
-    /// Positions in scene units. Corners that touch in the file share one index: equal positions are welded.
+    /// Positions in scene units. Corners that touch in the file share one index: equal positions
+    /// are welded.
     pub vertices: Vec<DVec3>,
     /// In the order of the input.
     pub triangles: Vec<Triangle>,
@@ -65,7 +70,7 @@ pub struct Scene {
     pub dropped_degenerate: usize,
     /// Triangles left out because an earlier one has the same corners and the same front.
     pub dropped_duplicates: usize,
-    /// What was made up or passed over while reading, one sentence each, for the person's eyes.
+    /// What was made up or ignored while reading, one sentence each, to show to the user.
     pub notes: Vec<String>,
 }
 
@@ -84,8 +89,8 @@ impl Scene {
             })
     }
 
-    /// The middle of the scene and the length of an *internal unit*, both in scene units. The unit is a power of two: about
-    /// the middle every internal coordinate lies in −1..1.
+    /// The middle of the scene and the length of an *internal unit*, both in scene units. The unit
+    /// is a power of two such that all coordinates about the middle lie in −1..1.
     pub(crate) fn local_frame(&self) -> (DVec3, f64) {
         let (low, high) = self.bounds();
         let half = (0.5 * (high - low)).max_element();
@@ -124,7 +129,7 @@ pub struct Camera {
     pub name: String,
     /// Scene units.
     pub position: DVec3,
-    /// The point in the middle of the picture.
+    /// The point shown in the middle of the picture.
     pub look_at: DVec3,
     pub up: DVec3,
     /// Vertical field of view, degrees.

@@ -5,8 +5,8 @@ use std::path::Path;
 use super::Material;
 use super::material::{Asked, DEFAULT_KD, MadeUp, TextureCache};
 use super::mtl_relief::{self, Relief};
-use super::obj::read_text;
 use super::obj_lint::{brief, finite, statements};
+use super::text_file::read_text;
 use crate::error::{Error, Result};
 
 pub(super) struct Library {
@@ -36,7 +36,7 @@ pub(super) fn read(path: &Path, textures: &mut TextureCache) -> Result<Library> 
         "tobj and the check see the same materials"
     );
     for (material, relief) in read.into_iter().zip(&checked.reliefs) {
-        // With a texture and no factor the texture is the reflectance.
+        // A texture without a factor is the reflectance itself.
         let default = if material.diffuse_texture.is_some() {
             1.0
         } else {
@@ -82,14 +82,14 @@ pub(super) fn read(path: &Path, textures: &mut TextureCache) -> Result<Library> 
 }
 
 struct Checked {
-    /// What tobj is to read.
+    /// The text for tobj.
     text: String,
     /// `[material]`, in the order of the file.
     reliefs: Vec<Relief>,
 }
 
-/// Checks the text line by line. Of a `Ka`, `Kd`, `Ks` or `Ke` that is short tobj panics, and the relief maps it does not
-/// know in full.
+/// Checks the text line by line. tobj panics at a `Ka`, `Kd`, `Ks` or `Ke` that is too short, and
+/// does not read all statements of relief maps.
 fn check(path: &Path, text: &str) -> Result<Checked> {
     let mut kept = String::new();
     let mut names: Vec<String> = Vec::new();

@@ -27,7 +27,8 @@ fn kind(keyword: &str) -> Option<Kind> {
     }
 }
 
-/// What one material says of its relief; of two statements of one kind the later counts, as with the others.
+/// The relief statements of one material; of two statements of one kind the later counts, as for
+/// other keywords.
 #[derive(Debug, Default)]
 pub(super) struct Relief {
     displacement: Option<Map>,
@@ -101,7 +102,7 @@ impl Relief {
     }
 }
 
-/// The multiplier and what follows the options: the file.
+/// The multiplier, and the file, which follows the options.
 fn options<'a>(keyword: &str, operands: &'a str, scaled: bool) -> Result<(f32, &'a str), String> {
     let mut scale = 1.0_f32;
     let mut rest = operands;
@@ -118,7 +119,8 @@ fn options<'a>(keyword: &str, operands: &'a str, scaled: bool) -> Result<(f32, &
                 ));
             }
         };
-        // Of `-mm base gain` the base moves the whole surface, which lies at the mean height whatever it is.
+        // The base of `-mm base gain` is ignored: it moves the whole surface, which always lies at
+        // the mean height.
         let mut number = 1.0;
         for _ in 0..numbers {
             let (text, following) = word(after);
@@ -134,7 +136,7 @@ fn options<'a>(keyword: &str, operands: &'a str, scaled: bool) -> Result<(f32, &
     Ok((scale, rest))
 }
 
-/// The first word, and what stands behind it.
+/// The first word, and the rest.
 fn word(text: &str) -> (&str, &str) {
     text.split_once(char::is_whitespace)
         .map_or((text, ""), |(word, rest)| (word, rest.trim_start()))

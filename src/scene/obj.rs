@@ -8,6 +8,7 @@ use glam::DVec3;
 use super::assemble::{Mesh, MeshTriangle};
 use super::material::{DEFAULT_KD, MadeUp, TextureCache};
 use super::obj_lint::{self, Checked, brief};
+use super::text_file::read_text;
 use super::{Material, mtl};
 use crate::error::{Error, Result};
 
@@ -17,7 +18,8 @@ const NO_MATERIAL: &str = "default";
 /// Reads a mesh with its materials: faces in the order of the file, polygons cut into fans.
 ///
 /// # Errors
-/// A file that is missing or is no text; the first wrong line; a material or texture that is wrong or missing; no face.
+/// A file that is missing or is not text; the first wrong line; a material or texture that is wrong
+/// or missing; no face.
 pub(super) fn read(path: &Path, textures: &mut TextureCache) -> Result<Mesh> {
     let text = read_text(path)?;
     let checked = obj_lint::check(path, &text)?;
@@ -36,20 +38,6 @@ pub(super) fn read(path: &Path, textures: &mut TextureCache) -> Result<Mesh> {
     materials(path, &checked, textures, &mut mesh)?;
     faces(path, &checked, &mut mesh)?;
     Ok(mesh)
-}
-
-/// The text of a file; a byte order mark is left out.
-pub(super) fn read_text(path: &Path) -> Result<String> {
-    let bytes = std::fs::read(path).map_err(|source| Error::read(path, source))?;
-    let text = String::from_utf8(bytes).map_err(|error| {
-        let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
-        let line = 1 + valid.iter().filter(|&&byte| byte == b'\n').count();
-        Error::line(path, line, "this is not UTF-8 text")
-    })?;
-    Ok(match text.strip_prefix('\u{feff}') {
-        Some(rest) => rest.to_owned(),
-        None => text,
-    })
 }
 
 fn materials(
@@ -118,7 +106,7 @@ fn library_files(path: &Path, names: &str) -> Vec<String> {
 }
 
 fn faces(path: &Path, checked: &Checked, mesh: &mut Mesh) -> Result<()> {
-    // One library stands for all, so that tobj knows each name before the first `usemtl`.
+    // One library replaces all, so that tobj knows each name before the first `usemtl`.
     let text = format!("mtllib all\n{}", checked.text);
     let options = tobj::LoadOptions {
         triangulate: true,

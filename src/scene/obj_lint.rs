@@ -1,14 +1,14 @@
 //! Checks the text of an OBJ file line by line before tobj reads it.
 //!
-//! tobj takes `nan`, `inf` and faces of one or two corners without a word, reads a polyline as a face, invents texture
-//! coordinates in a mesh where only some faces have them, and names no lines.
+//! tobj silently accepts `nan`, `inf` and faces of one or two corners, reads a polyline as a face,
+//! invents texture coordinates in a mesh where only some faces have them, and reports no lines.
 
 use std::fmt::Write as _;
 use std::path::Path;
 
 use crate::error::{Error, Result};
 
-/// What tobj is to see, and what it would not tell.
+/// The text for tobj, and what tobj would not report.
 #[derive(Debug, Default)]
 pub(super) struct Checked {
     /// `v`, `vt`, `f` with absolute indices, and `usemtl`; nothing else.
@@ -19,7 +19,7 @@ pub(super) struct Checked {
     pub used: Vec<(usize, String)>,
     /// For each triangle of the fans, in order, whether its face has texture coordinates.
     pub has_uv: Vec<bool>,
-    /// Lines with no meaning here, and the first of them.
+    /// Number of lines that are ignored, and the first of them.
     pub unknown: usize,
     pub first_unknown: Option<(usize, String)>,
     counts: Counts,
@@ -84,7 +84,8 @@ pub(super) fn check(path: &Path, text: &str) -> Result<Checked> {
     Ok(checked)
 }
 
-/// Statements with the line they begin on, counted from 1; a backslash at the end of a line goes on to the next.
+/// Statements with the line they begin on, counted from 1; a backslash at the end of a line
+/// continues it.
 pub(super) fn statements(text: &str) -> impl Iterator<Item = (usize, String)> {
     let mut lines = text.lines().enumerate();
     std::iter::from_fn(move || {
@@ -102,7 +103,7 @@ pub(super) fn statements(text: &str) -> impl Iterator<Item = (usize, String)> {
     })
 }
 
-/// A number as OBJ and MTL files write it, finite also in f32 where it ends there.
+/// A number as OBJ and MTL files write it; finite also as f32 where it is stored as such.
 pub(super) fn finite(word: &str) -> Result<f64, String> {
     match word.parse::<f64>() {
         Ok(number) if number.is_finite() => Ok(number),
@@ -111,7 +112,7 @@ pub(super) fn finite(word: &str) -> Result<f64, String> {
     }
 }
 
-/// A piece of a file that is fit to stand in a one-line message.
+/// A piece of a file, made fit for a one-line message.
 pub(super) fn brief(text: &str) -> String {
     const MOST: usize = 40;
     let mut brief: String = text

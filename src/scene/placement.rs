@@ -1,4 +1,4 @@
-//! Where a mesh stands in a scene: scale, then rotate, then translate.
+//! Placement of a mesh in a scene: scale, then rotate, then translate.
 
 use glam::{DAffine3, DMat3, DVec3};
 use serde::{Deserialize, Serialize};
@@ -47,8 +47,8 @@ impl Placement {
         Ok(Self(DAffine3::from_mat3_translation(matrix, translation)))
     }
 
-    /// Moves the mesh. A mirroring placement turns the winding as well, so that fronts stay fronts; `reverse` turns it
-    /// once more.
+    /// Moves the mesh. A mirroring placement turns the winding as well, so that fronts stay fronts;
+    /// `reverse` turns it a second time.
     pub fn apply(&self, mesh: &mut Mesh, reverse: bool) -> Result<(), String> {
         if self.0 != DAffine3::IDENTITY {
             for position in &mut mesh.positions {
@@ -70,7 +70,7 @@ impl Placement {
     }
 }
 
-/// Quarter turns are exact, so that what stood on the axes stays on them.
+/// Quarter turns are exact, so that points on the axes stay on them.
 fn turn(rotation: fn(f64) -> DMat3, degrees: f64) -> DMat3 {
     let turned = rotation(degrees.to_radians());
     if degrees % 90.0 == 0.0 {

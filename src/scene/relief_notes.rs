@@ -1,4 +1,5 @@
-//! What a person should know of the relief in a scene: maps without effect, and maps that contradict each other.
+//! Notes for the user on a scene's relief: maps without effect, and maps that contradict each
+//! other.
 
 use glam::DVec2;
 
@@ -6,18 +7,19 @@ use super::{HeightMap, Material, NormalMap, Scene};
 
 /// Samples along each axis of a normal map, at most.
 const MOST_SAMPLES: u32 = 256;
-/// Correlation of slopes below which two maps contradict each other, and above which a changed sign mends them.
+/// Correlation of slopes below which two maps contradict each other, and above which a changed sign
+/// makes them agree.
 const CONTRADICTING: f64 = 0.5;
 const AGREEING: f64 = 0.8;
 
-/// One sentence for each thing worth saying of a material that a triangle uses.
+/// One sentence for each note on a material that a triangle uses.
 pub(super) fn collect(scene: &Scene) -> Vec<String> {
     let mut notes = Vec::new();
     for (index, material) in scene.materials.iter().enumerate() {
         if !scene.triangles.iter().any(|t| t.material as usize == index) {
             continue;
         }
-        let told = match (&material.map_height, &material.map_normal) {
+        let found = match (&material.map_height, &material.map_normal) {
             (None, Some(map)) => Some(format!(
                 "normal map {} makes no relief without a height map, which light by directions needs",
                 map.path.display()
@@ -33,12 +35,13 @@ pub(super) fn collect(scene: &Scene) -> Vec<String> {
                 .and_then(|tile| contradiction(material, heights, normals, tile)),
             _ => None,
         };
-        notes.extend(told.map(|what| format!("material \"{}\": {what}", material.name)));
+        notes.extend(found.map(|what| format!("material \"{}\": {what}", material.name)));
     }
     notes
 }
 
-/// Scene units that one repeat takes along u and v: the means of |dP/du| and |dP/dv| over the area with this material.
+/// Size of one repeat along u and v, scene units: the means of |dP/du| and |dP/dv| over the area
+/// with this material.
 fn tile_size(scene: &Scene, material: u32) -> Option<DVec2> {
     let (mut sum, mut area) = (DVec2::ZERO, 0.0);
     for triangle in scene.triangles.iter().filter(|t| t.material == material) {
@@ -49,7 +52,7 @@ fn tile_size(scene: &Scene, material: u32) -> Option<DVec2> {
         let along_v = (pr * ab.x - pq * ac.x) / ab.perp_dot(ac);
         let weight = pq.cross(pr).length();
         let size = DVec2::new(along_u.length(), along_v.length());
-        // Coordinates on a line or in a point have no size.
+        // Coordinates on a line or in a point span no area.
         if size.is_finite() && size.min_element() > 0.0 {
             sum += size * weight;
             area += weight;
@@ -102,7 +105,7 @@ impl Slopes {
         sums
     }
 
-    /// Correlation, were the slopes of the normals multiplied by these signs.
+    /// Correlation if the slopes of the normals were multiplied by these signs.
     fn correlation(&self, sign_u: f64, sign_v: f64) -> f64 {
         let size = (self.of_heights * self.of_normals).sqrt();
         if size == 0.0 {
@@ -112,7 +115,7 @@ impl Slopes {
     }
 }
 
-/// Texels of an axis, all or evenly chosen.
+/// Texels along an axis, all or evenly spaced ones.
 fn chosen(size: u32) -> impl Iterator<Item = u32> {
     let count = size.min(MOST_SAMPLES);
     (0..count).map(move |i| (u64::from(i) * u64::from(size) / u64::from(count)) as u32)
@@ -128,7 +131,7 @@ fn contradiction(
     if slopes.correlation(1.0, 1.0) >= CONTRADICTING {
         return None;
     }
-    let mends = [
+    let fixing_signs = [
         ([1.0, -1.0], "; with green (y) turned over they agree"),
         (
             [-1.0, -1.0],
@@ -136,12 +139,12 @@ fn contradiction(
         ),
         ([-1.0, 1.0], "; with red (x) turned over they agree"),
     ];
-    let mend = mends
+    let fix = fixing_signs
         .iter()
         .find(|([u, v], _)| slopes.correlation(*u, *v) > AGREEING)
         .map_or("", |(_, words)| words);
     Some(format!(
-        "height map {} and normal map {} contradict each other: {:.0} degrees between their normals in the mean{mend}",
+        "height map {} and normal map {} contradict each other: {:.0} degrees between their normals in the mean{fix}",
         heights.path.display(),
         normals.path.display(),
         (slopes.angle / slopes.samples).to_degrees()

@@ -1,4 +1,4 @@
-//! `scene.toml`: meshes with their places, changes to materials, point lights, cameras.
+//! `scene.toml`: meshes with their placement, changes to materials, point lights, cameras.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -8,10 +8,9 @@ use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 use super::assemble::{Assembly, Mesh};
-use super::load::stem;
 use super::material::{Asked, DEFAULT_KD, MadeUp, TextureCache};
-use super::obj::read_text;
 use super::placement::{Placement, Scale};
+use super::text_file::{read_text, stem};
 use super::{Camera, Material, PointLight, Scene, check, obj};
 use crate::error::{Error, Result};
 
@@ -85,7 +84,7 @@ fn y_up() -> [f64; 3] {
 /// Reads a scene file and all that it names; paths are relative to it.
 ///
 /// # Errors
-/// Those of the files it names, and whatever is wrong in its own text, with the line of the table.
+/// Errors of the files it names; any error in its own text, with the line of the table.
 pub(super) fn load(path: &Path) -> Result<Scene> {
     let text = read_text(path)?;
     let lines = Lines { path, text: &text };
@@ -138,7 +137,7 @@ pub(super) fn load(path: &Path) -> Result<Scene> {
     check::finish(assembly.into_scene())
 }
 
-/// Where a byte of the file stands.
+/// The line of a byte of the file.
 struct Lines<'a> {
     path: &'a Path,
     text: &'a str,
@@ -183,7 +182,7 @@ fn add_mesh(
                 "material \"{name}\" is neither in this file nor in the mesh"
             )));
         };
-        // The others belong to no triangle any more.
+        // No triangle uses the others any more.
         mesh.materials = vec![mesh.materials.swap_remove(index)];
         mesh.made_up.retain(|made_up| made_up.material == *name);
         mesh.triangles.iter_mut().for_each(|t| t.material = 0);
@@ -202,7 +201,7 @@ fn add_mesh(
     Ok(())
 }
 
-/// Applies `[material.name]` to a mesh that has such a material or is to get it.
+/// Applies `[material.name]` to a mesh that has such a material or is assigned it.
 fn change_material(
     name: &str,
     spanned: &Spanned<MaterialTable>,

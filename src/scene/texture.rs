@@ -16,15 +16,17 @@ pub struct Texture {
     pub texels: Vec<[f32; 3]>,
 }
 
-/// Samples along an edge of a triangle, at most: 64² keeps the mean of one element under a millisecond.
+/// Samples along an edge of a triangle, at most: 64² keeps the mean of one element under a
+/// millisecond.
 const MOST_STRATA: u32 = 64;
 
 impl Texture {
-    /// Reads PNG (8 and 16 bit) and JPEG as sRGB, OpenEXR as linear light. Grey is spread to RGB, alpha is ignored.
+    /// Reads PNG (8 and 16 bit) and JPEG as sRGB, OpenEXR as linear light. Grey is expanded to RGB;
+    /// alpha is ignored.
     ///
     /// # Errors
-    /// A file that cannot be read or decoded, or that passes the decoder's memory limit; a texel that is negative or
-    /// not finite.
+    /// A file that cannot be read or decoded, or that passes the decoder's memory limit; a texel
+    /// that is negative or not finite.
     pub fn load(path: &Path) -> Result<Self> {
         let decoded = decode(path)?;
         let (width, height) = (decoded.width(), decoded.height());
@@ -65,7 +67,8 @@ impl Texture {
         })
     }
 
-    /// Bilinear, repeating; v is up, so v = 0 is the bottom edge. Texel centres lie at half-integers.
+    /// Bilinear, repeating; v is up, so v = 0 is the bottom edge. Texel centres lie at
+    /// half-integers.
     pub fn sample_bilinear(&self, u: f32, v: f32) -> [f32; 3] {
         self.bilinear(f64::from(u), f64::from(v))
     }
@@ -88,13 +91,14 @@ impl Texture {
 
     /// The area mean over a triangle in texture space, linear RGB.
     ///
-    /// The triangle is cut into n² equal ones with n twice its longest edge in texels, at most 64, and
-    /// each is sampled once: at its centroid, or at a fixed pseudo-random place where n had to be cut down, so that
-    /// a regular texture cannot fall into step with the samples. The same input gives the same bits.
+    /// The triangle is cut into n² equal ones with n twice its longest edge in texels, at most 64,
+    /// and each is sampled once: at its centroid, or at a fixed pseudo-random place where n was
+    /// limited, so that a regular texture does not alias with the samples. The same input gives the
+    /// same bits.
     pub fn mean_over_triangle(&self, uv: &[[f32; 2]; 3]) -> [f32; 3] {
         let [a, b, c] = uv.map(|[u, v]| [f64::from(u), f64::from(v)]);
         let wanted = 2.0 * self.longest_edge([a, b, c]);
-        // A float cast saturates, so an enormous triangle ends at the cap too.
+        // A float cast saturates, so an enormous triangle also gets the limit.
         let n = (wanted.ceil() as u32).clamp(1, MOST_STRATA);
         let jitter = wanted > f64::from(MOST_STRATA);
         let mut sum = [0.0_f64; 3];
@@ -133,7 +137,7 @@ impl Texture {
     }
 }
 
-/// An image as its file holds it, of whichever format its first bytes tell.
+/// An image as its file stores it; the first bytes give the format.
 pub(super) fn decode(path: &Path) -> Result<DynamicImage> {
     image::ImageReader::open(path)
         .and_then(image::ImageReader::with_guessed_format)
@@ -142,7 +146,7 @@ pub(super) fn decode(path: &Path) -> Result<DynamicImage> {
         .map_err(|error| Error::file(path, format!("cannot be decoded: {error}")))
 }
 
-/// The two texels about a coordinate in repeats, and how far it lies towards the second.
+/// The two texels about a coordinate in repeats, and the weight of the second.
 pub(super) fn neighbours(coordinate: f64, size: u32) -> ([usize; 2], f64) {
     let at = coordinate.rem_euclid(1.0) * f64::from(size) - 0.5;
     let low = at.floor();

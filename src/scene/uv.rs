@@ -1,11 +1,12 @@
-//! Texture coordinates for surfaces that bring none.
+//! Texture coordinates for surfaces without any.
 
 use glam::DVec3;
 
-/// Box projection: along the axis nearest to the normal, one repeat per scene unit, right way round seen from the front.
+/// Box projection: along the axis nearest to the normal, one repeat per scene unit, not mirrored
+/// seen from the front.
 ///
-/// Each triangle is shifted by whole repeats towards zero, which no repeating texture shows, so that f32 keeps its
-/// digits far from the origin.
+/// Each triangle is shifted by whole repeats towards zero, so that f32 keeps its precision far from
+/// the origin; a repeating texture looks the same.
 pub(super) fn box_projection(corners: [DVec3; 3]) -> [[f32; 2]; 3] {
     let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
     let size = normal.abs();

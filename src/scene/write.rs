@@ -17,22 +17,22 @@ const MESH: &str = "scene.obj";
 const MATERIALS: &str = "scene.mtl";
 const SCENE: &str = "scene.toml";
 
-/// Writes `scene.obj`, `scene.mtl`, the textures and relief maps and `scene.toml` into `dir`, and returns the path of the
-/// last.
+/// Writes `scene.obj`, `scene.mtl`, the textures and relief maps and `scene.toml` into `dir`, and
+/// returns the path of the last.
 ///
-/// Loading that gives the same triangles in the same order, the same f64 positions, materials, lights and cameras. A
-/// normal map made by code may change by 10⁻⁵.
+/// Loading that gives the same triangles in the same order, the same f64 positions, materials,
+/// lights and cameras. A normal map made by code may change by 10⁻⁵.
 ///
 /// # Errors
-/// A file that cannot be written; a texture that cannot be copied; two materials of one name, or a name that a material
-/// file cannot hold, which only a scene put together by hand can have.
+/// A file that cannot be written; a texture that cannot be copied; two materials of one name, or a
+/// name that a material file cannot hold; only a scene made by code can have one.
 pub fn write_scene(scene: &Scene, dir: &Path) -> Result<PathBuf> {
     check_names(scene)?;
     fs::create_dir_all(dir).map_err(|source| Error::write(dir, source))?;
     let maps = map_files::write(scene, dir)?;
     write_atomically(&dir.join(MATERIALS), |out| materials(scene, &maps, out))?;
     write_atomically(&dir.join(MESH), |out| mesh(scene, out))?;
-    // Last, so that a scene file never stands beside a mesh that is not its own.
+    // Last, so that a scene file is never beside another scene's mesh.
     let path = dir.join(SCENE);
     let text = toml::to_string(&tables(scene))
         .map_err(|error| Error::file(&path, format!("cannot be put in words: {error}")))?;
@@ -144,7 +144,7 @@ fn tables(scene: &Scene) -> SceneFile {
     }
 }
 
-/// A table that comes from no text.
+/// A table without a place in a text.
 fn bare<T>(table: T) -> Spanned<T> {
     Spanned::new(0..0, table)
 }

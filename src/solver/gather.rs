@@ -119,7 +119,10 @@ impl Gathering {
                 let end = rows.len().min(first + relief.slots as usize);
                 let slots = first as u32..end as u32;
                 let of_relief = relief.first_source..relief.first_source + relief.source_count;
-                if rows[first..end].iter().any(|row| of_relief.contains(&row.source)) {
+                if rows[first..end]
+                    .iter()
+                    .any(|row| of_relief.contains(&row.source))
+                {
                     let ByDirection { send, send_set, .. } = by_direction;
                     send.record(cmd, send_set, relief, slots.clone());
                     cmd.barrier(&[Stage::Compute], &[Stage::Compute]);

@@ -47,8 +47,8 @@ use crate::vk::Device;
 pub use ambient::Ambient;
 pub use devices::{check_devices, open_devices};
 pub use look::ItemPicture;
-use progress::{Bound, Watch};
 pub use progress::Update;
+use progress::{Bound, Watch};
 pub use relief_light::ReliefLight;
 pub use report::{Report, Seconds, Skipped, StopReason};
 pub use rows::Stages;
@@ -162,7 +162,11 @@ impl Solver {
                 ReliefBuffers::new(device, &elements, relief, &sources, slots, by_pixel)
             })
             .transpose()?;
-        let emitted = sources.list.iter().map(sources::Source::emitted_power).sum();
+        let emitted = sources
+            .list
+            .iter()
+            .map(sources::Source::emitted_power)
+            .sum();
         let bound = Bound::new(&elements, emitted);
         let stop_power = bound.stop_power(settings.residual);
         let on = On {

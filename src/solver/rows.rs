@@ -134,7 +134,10 @@ impl RowMaker {
             }
             Looks::Rays(occluders) => {
                 let tree = OccluderTree::new(device, occluders)?;
-                (None, Batch::new(device, fresh.slot_count, Sight::Rays(tree))?)
+                (
+                    None,
+                    Batch::new(device, fresh.slot_count, Sight::Rays(tree))?,
+                )
             }
         };
         let evaluate = Evaluate::new(device, settings, scene, parts.meso, &batch)?;
@@ -249,6 +252,11 @@ impl RowMaker {
     pub fn items(&self) -> Result<Vec<u32>> {
         read_items(&self.device, &self.batch)
     }
+}
+
+/// Whether strong emitters are looked at with more care than all others.
+pub(super) fn looks_closer(device: &Device, settings: &Settings) -> bool {
+    emitter_looks(device, settings, Vec::new).is_some()
 }
 
 /// What strong emitters are looked at with, if not as all others are.

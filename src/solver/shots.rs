@@ -170,7 +170,9 @@ impl Shots {
 
     fn unshot(&self, reflected: &[DVec3]) -> f64 {
         let powers = self.sources.iter().zip(reflected);
-        powers.map(|(shot, &reflected)| shot.unshot(reflected).0).sum()
+        powers
+            .map(|(shot, &reflected)| shot.unshot(reflected).0)
+            .sum()
     }
 
     /// Unshot power after the last run.
@@ -192,7 +194,6 @@ impl Shots {
         };
         Ok(self.sources.iter().zip(reflected).map(left).sum())
     }
-
 }
 
 impl Shots {

@@ -12,7 +12,7 @@ use glam::{DVec3, Vec3};
 use super::coupling::{CouplingRow, Targets};
 use super::gather::{Gathering, Lit, LitRow};
 use super::progress::Watch;
-use super::rows::{Factors, Made};
+use super::rows::{Factors, Made, looks_closer};
 use super::scene_parts::SceneParts;
 use super::system::System;
 use super::team::{Batch, Team, TeamParts};
@@ -126,8 +126,9 @@ impl Spine {
         let mut system = System::new(targets, list, on.settings.coupling_memory);
         let least = least_strong(list, &on.settings.grouping);
         let of_relief = &on.parts.sources.relief;
+        let looks = looks_closer(device, on.settings);
         let drawn = |(s, source): (usize, &crate::sources::Source)| Drawn {
-            strong: least > 0.0 && source.emitted_power() >= least,
+            strong: looks && least > 0.0 && source.emitted_power() >= least,
             relief: of_relief.contains(&s),
             ..Drawn::default()
         };
@@ -182,6 +183,7 @@ impl Spine {
                 break;
             }
             corrections += 1;
+            self.system.shoot_unknown();
         }
         if watch.stop.is_some() {
             self.solve(UNSOLVED * self.size.stop_power, report);
@@ -249,12 +251,7 @@ impl Spine {
     }
 
     /// The sources of the next batch, if one is to be drawn and can begin.
-    fn choose(
-        &mut self,
-        on: On<'_>,
-        phase: Phase,
-        report: &Report,
-    ) -> Result<Option<Batch>> {
+    fn choose(&mut self, on: On<'_>, phase: Phase, report: &Report) -> Result<Option<Batch>> {
         let under_way = self.sources.iter().filter(|d| d.under_way).count() as u32;
         let limit = on.settings.shots.unwrap_or(u32::MAX);
         let left = limit.saturating_sub(report.shots + under_way) as usize;
@@ -271,7 +268,9 @@ impl Spine {
         if !team.has_room(strong) {
             return Ok(None);
         }
-        candidates.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        // Powers that differ by rounding alone are equal.
+        let power = |(_, power): &(u32, f64)| *power as f32;
+        candidates.sort_by(|a, b| power(b).total_cmp(&power(a)).then(a.0.cmp(&b.0)));
         candidates.truncate(team.slots(strong).min(left));
         let sources = candidates.into_iter().map(|(s, _)| s).collect();
         Ok(Some(Batch { sources, strong }))
@@ -291,7 +290,11 @@ impl Spine {
             if power > 0.0 {
                 emitted_left += emitted;
                 power_left += power;
-                let list = if drawn.strong { &mut strong } else { &mut others };
+                let list = if drawn.strong {
+                    &mut strong
+                } else {
+                    &mut others
+                };
                 list.push((s as u32, power));
             }
         }
@@ -309,8 +312,7 @@ impl Spine {
             let power = self.owed_power(s);
             (loose && power > 0.0).then_some((s as u32, power))
         };
-        let mut owing: Vec<(u32, f64)> =
-            self.sources.iter().enumerate().filter_map(owes).collect();
+        let mut owing: Vec<(u32, f64)> = self.sources.iter().enumerate().filter_map(owes).collect();
         owing.sort_by(|a, b| b.1.total_cmp(&a.1));
         // The last ones may keep what is little together.
         let mut kept_back = 0.0;

@@ -231,6 +231,17 @@ impl System {
         }
     }
 
+    /// Sources that were drawn and have no row shoot what they have: measuring will find what arrived.
+    pub fn shoot_unknown(&mut self) {
+        for s in 0..self.sources.len() {
+            let reflected = self.reflected(s);
+            let source = &mut self.sources[s];
+            if source.drawn && source.row.is_none() {
+                source.shot = reflected;
+            }
+        }
+    }
+
     /// Reflected radiosity that a source has shot.
     pub fn shot(&self, s: usize) -> DVec3 {
         self.sources[s].shot

@@ -10,7 +10,9 @@ use std::thread::{self, JoinHandle};
 
 use glam::Vec3;
 
-use super::rows::{Factors, FactorWords, Looks, Made, Row, RowMaker, RowParts, Stages, emitter_looks};
+use super::rows::{
+    FactorWords, Factors, Looks, Made, Row, RowMaker, RowParts, Stages, emitter_looks,
+};
 use super::scene_parts::SceneParts;
 use super::{Estimator, Settings};
 use crate::error::{Error, Result};
@@ -74,7 +76,12 @@ impl Makers {
             [] => None,
             meso => {
                 let storage = BufferUse::Storage;
-                Some(crate::passes::buffers::upload(device, "meso elements", meso, storage)?)
+                Some(crate::passes::buffers::upload(
+                    device,
+                    "meso elements",
+                    meso,
+                    storage,
+                )?)
             }
         };
         let row_parts = RowParts {
@@ -441,7 +448,9 @@ fn work(board: &Board, makers: &mut Makers) -> Result<()> {
             };
             let maker = makers.of(batch.strong);
             // Only a device with little memory has fewer slots than its share.
-            let more = batch.sources.split_off(batch.sources.len().min(maker.slots()));
+            let more = batch
+                .sources
+                .split_off(batch.sources.len().min(maker.slots()));
             for source in more.into_iter().rev() {
                 board.notes().wanted.push_front((source, batch.strong));
             }
@@ -454,7 +463,9 @@ fn work(board: &Board, makers: &mut Makers) -> Result<()> {
         if let Some(made) = makers.of(strong).take()? {
             let mut notes = board.notes();
             notes.stages += made.stages;
-            notes.rows.extend(made.rows.into_iter().map(|row| (row.source, row)));
+            notes
+                .rows
+                .extend(made.rows.into_iter().map(|row| (row.source, row)));
             drop(notes);
             board.changed.notify_all();
         }

@@ -75,7 +75,9 @@ fn key(scene: &Scene, settings: &Settings) -> String {
     let estimator = settings.estimator;
     let sizes = (settings.hemicube, settings.emitter_shadows());
     let (seed, grouping) = (settings.seed, settings.grouping);
-    hash.update(format!("5 {estimator:?} {sizes:?} {seed} {grouping:?} {flat}"));
+    hash.update(format!(
+        "5 {estimator:?} {sizes:?} {seed} {grouping:?} {flat}"
+    ));
     hexadecimal(hash)
 }
 
@@ -88,12 +90,18 @@ impl Visibility {
             scale: 1.0,
         };
         let rows: Vec<KeptRow> = kept.rows.iter().map(|row| row.unwrap_or(none)).collect();
-        let lists = || kept.coupling.iter().map(|row| row.map(CouplingRow::lists).unwrap_or_default());
+        let lists = || {
+            kept.coupling
+                .iter()
+                .map(|row| row.map(CouplingRow::lists).unwrap_or_default())
+        };
         let counts: Vec<[u32; 2]> = lists()
             .map(|(runs, values)| [runs.len() as u32, values.len() as u32])
             .collect();
         let runs: Vec<[u32; 2]> = lists().flat_map(|(runs, _)| runs.iter().copied()).collect();
-        let values: Vec<f32> = lists().flat_map(|(_, values)| values.iter().copied()).collect();
+        let values: Vec<f32> = lists()
+            .flat_map(|(_, values)| values.iter().copied())
+            .collect();
         let Kept {
             state,
             chunks,
@@ -113,12 +121,15 @@ impl Visibility {
                 runs: runs.len(),
                 values: values.len(),
                 words: chunks.iter().map(Vec::len).collect(),
-                sha256: digest(&[
-                    bytemuck::cast_slice(&rows),
-                    bytemuck::cast_slice(&counts),
-                    bytemuck::cast_slice(&runs),
-                    bytemuck::cast_slice(&values),
-                ], &chunks),
+                sha256: digest(
+                    &[
+                        bytemuck::cast_slice(&rows),
+                        bytemuck::cast_slice(&counts),
+                        bytemuck::cast_slice(&runs),
+                        bytemuck::cast_slice(&values),
+                    ],
+                    &chunks,
+                ),
             },
             starts: starts(&counts),
             rows,
@@ -152,7 +163,9 @@ impl Visibility {
         let &[runs, values] = self.counts.get(s)?;
         let &[first_run, first_value] = self.starts.get(s)?;
         let runs = self.runs.get(first_run..first_run + runs as usize)?;
-        let values = self.values.get(first_value..first_value + values as usize)?;
+        let values = self
+            .values
+            .get(first_value..first_value + values as usize)?;
         // A row that sees nothing has no runs, as one that was not kept: both are measured.
         (!runs.is_empty())
             .then(|| CouplingRow::from_lists(runs.to_vec(), values.to_vec(), words))
@@ -244,7 +257,9 @@ impl Visibility {
             header.runs.saturating_mul(8),
             header.values.saturating_mul(4),
         ];
-        let expected = expected.iter().fold(0, |sum: usize, &n| sum.saturating_add(n));
+        let expected = expected
+            .iter()
+            .fold(0, |sum: usize, &n| sum.saturating_add(n));
         if expected as u64 != length - header_length - 24
             || header
                 .words

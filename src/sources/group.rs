@@ -1,4 +1,4 @@
-//! Groups of elements as sources, and where they are cut.
+//! Groups of elements as sources, and where groups are cut.
 
 use glam::DVec3;
 
@@ -8,7 +8,8 @@ use crate::constants::KIND_SURFACE;
 use crate::contour::contour;
 use crate::elements::Elements;
 
-/// Largest distance from the mean plane, as a share of the extent, at which a group still counts as plane.
+/// Largest distance from the mean plane, as a share of the extent, at which a group still counts as
+/// plane.
 const FLAT: f64 = 1e-6;
 
 /// A group of elements as a whole.
@@ -17,9 +18,9 @@ pub(super) struct Shape {
     centroid: DVec3,
     /// Mean normal.
     normal: DVec3,
-    /// Area that a far place in the direction of `normal` sees.
+    /// Projected area seen from far away along `normal`.
     facing: f64,
-    /// Whether all lie in one plane and face its way.
+    /// Whether all lie in one plane and face the same way.
     pub flat: bool,
 }
 
@@ -53,8 +54,8 @@ impl Shape {
     }
 }
 
-/// Sorts the members along their longest extent and says where to cut: at the widest gap between neighbours in the middle
-/// third, which on a grid is a line of the grid.
+/// Sorts the members along their longest extent and returns the index of the cut: at the widest gap
+/// between neighbours in the middle third, which on a grid is a line of the grid.
 pub(super) fn bisect(elements: &Elements, members: &mut [u32]) -> usize {
     let centroid = |e: u32| elements.centroid[e as usize];
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -68,7 +69,8 @@ pub(super) fn bisect(elements: &Elements, members: &mut [u32]) -> usize {
     let count = members.len();
     let middle = (count / 3).max(1)..=(count - count / 3).min(count - 1);
     let gap = |i: usize| centroid(members[i])[axis] - centroid(members[i - 1])[axis];
-    // Gaps of a grid agree to rounding only: among the widest, the one nearest to the middle.
+    // Gaps of a grid are equal only up to rounding: among the widest, the one nearest to the
+    // middle.
     let widest = middle.clone().map(gap).fold(0.0, f64::max) * (1.0 - 1e-6);
     middle
         .filter(|&i| gap(i) >= widest)

@@ -1,4 +1,5 @@
-//! Which elements have another surface close before them: light there changes over short ways, and falls on it unevenly.
+//! Elements with another surface close in front of them: light between the two varies over short
+//! distances.
 
 use std::time::Duration;
 
@@ -13,10 +14,10 @@ use crate::elements::Elements;
 /// Heights above an element's plane below which a place lies in the plane, in internal units.
 const FLAT: f64 = 1e-6;
 
-/// Boxes are wider than what they hold: coordinates of 1 in f32.
+/// Margin of boxes: the rounding of coordinates of 1 in f32.
 const BOX_MARGIN: f32 = 1.0 / (1 << 22) as f32;
 
-/// A place on a triangle, and the chart that the triangle is of.
+/// A place on a triangle, and the triangle's chart.
 struct Place(DVec3, u32);
 
 impl Boundable for Place {
@@ -34,7 +35,7 @@ pub(super) struct Surroundings<'a> {
     reach: f64,
     places: Vec<Place>,
     bvh: Bvh2,
-    /// The chart of all places in a node, where it is one, `[node]`.
+    /// The chart of all places in a node if they have the same, `[node]`.
     charts: Vec<Option<u32>>,
 }
 
@@ -59,7 +60,7 @@ impl<'a> Surroundings<'a> {
         }
     }
 
-    /// Whether anything of another chart lies before an element of this chart within `reach` of its centroid.
+    /// Whether another chart has a place in front of this element within `reach` of its centroid.
     pub fn any_before(&self, element: u32, chart: u32) -> bool {
         let (middle, normal) = (
             self.elements.centroid[element as usize],
@@ -99,7 +100,7 @@ impl<'a> Surroundings<'a> {
 }
 
 fn charts_of_nodes(bvh: &Bvh2, places: &[Place]) -> Vec<Option<u32>> {
-    // Parents before their children; the tree of no place has no node.
+    // Parents come before their children; an empty tree has no nodes.
     let mut order = Vec::from_iter((!bvh.nodes.is_empty()).then_some(0));
     let mut next = 0;
     while next < order.len() {
@@ -126,14 +127,14 @@ fn charts_of_nodes(bvh: &Bvh2, places: &[Place]) -> Vec<Option<u32>> {
     charts
 }
 
-/// Middles of equal parts of a triangle, no part longer than `most`.
+/// Centroids of equal parts of a triangle, none longer than `most`.
 fn spread([a, b, c]: [DVec3; 3], most: f64) -> impl Iterator<Item = DVec3> {
     let longest = (b - a).length().max((c - b).length()).max((a - c).length());
     let parts = (longest / most).ceil().max(1.0);
     let [ab, ac] = [(b - a) / parts, (c - a) / parts];
     (0..parts as u32).flat_map(move |i| {
         (0..parts as u32 - i).flat_map(move |j| {
-            // The upright part, and the one upside down beside it.
+            // The upright part, and the inverted one beside it.
             let upright = Some(1.0 / 3.0);
             let turned = (f64::from(i + j + 1) < parts).then_some(2.0 / 3.0);
             upright
@@ -165,7 +166,7 @@ mod tests {
         for (c, chart) in (0_u32..).zip(&charts) {
             chart.iter().for_each(|&e| chart_of[e as usize] = c);
         }
-        // Longer than any element, each of which is thus one place.
+        // Longer than any element, so that each is one place.
         let reach = 0.15;
         let surroundings = Surroundings::new(&elements, &charts, reach);
         let mut found = [0, 0];

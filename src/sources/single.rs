@@ -1,4 +1,4 @@
-//! Sources that are no groups: elements, pieces of them, and point lights.
+//! Sources of a single element, of a piece of one, and of point lights.
 
 use glam::DVec3;
 
@@ -39,7 +39,7 @@ pub(super) fn part(
     }
 }
 
-/// Cut at the middle of the longest edge.
+/// The two halves of a triangle, cut at the middle of its longest edge.
 pub(super) fn halves(triangle: [DVec3; 3]) -> [[DVec3; 3]; 2] {
     let length = |i: usize| triangle[i].distance_squared(triangle[(i + 1) % 3]);
     let longest = (0..3).fold(0, |best, i| if length(i) > length(best) { i } else { best });
@@ -61,7 +61,7 @@ pub(super) fn point(light: &PointLight, elements: &Elements) -> [Source; 2] {
         facing: 0.0,
         parts: Vec::new(),
         radius: 0.0,
-        // The shader gives the plane between the halves to the one whose cone is 0.
+        // The shader assigns the plane between the halves to the one whose cone is 0.
         cone,
         emitted: (DVec3::from_array(light.intensity.map(f64::from))
             / (elements.unit * elements.unit))

@@ -1,4 +1,4 @@
-//! The eye of the window: it orbits about a point and flies.
+//! The camera of the window: it orbits about a point and flies.
 
 use glam::{DQuat, DVec3, Vec3, Vec4};
 
@@ -6,23 +6,24 @@ use crate::scene::{Camera, Scene};
 
 /// Radians that a pixel of the mouse turns.
 const TURN: f64 = 0.007;
-/// What a step of the wheel leaves of the distance.
+/// Factor of the distance for one step of the wheel.
 const STEP: f64 = 0.85;
-/// Share of the scene's size that flying crosses in a second.
+/// Speed of flying, in sizes of the scene per second.
 const SPEED: f64 = 0.25;
-/// Nearest to straight up and down that the eye looks, as a sine.
+/// Sine of the steepest view up or down.
 const STEEPEST: f64 = 0.9999;
 
-/// Where from, and what about.
+/// The camera, with the scene's middle and size.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Eye {
     pub camera: Camera,
-    /// Of the scene, scene units.
+    /// Middle of the scene, scene units.
     middle: DVec3,
     size: f64,
 }
 
-/// Rows of a projection over (p, 1), p from the scene's middle in internal units, and the eye there.
+/// Rows of a projection over (p, 1), p from the scene's middle in internal units, and the eye
+/// there.
 #[derive(Debug, Clone, Copy)]
 pub struct Rows {
     pub x: Vec4,
@@ -39,7 +40,7 @@ impl Eye {
             middle: (low + high) / 2.0,
             size: (high - low).length(),
         };
-        // Keeps what looks straight up or down from turning over.
+        // Keeps a camera that looks straight up or down from flipping.
         eye.place(camera.position, camera.look_at - camera.position);
         eye
     }
@@ -60,7 +61,8 @@ impl Eye {
         self.camera.look_at.distance(self.camera.position)
     }
 
-    /// Stands at `position` and looks along `way` as far as it is long; refuses what looks along its up.
+    /// Moves the eye to `position`, looking at the end of `way`. Does nothing if `way` is along the
+    /// up vector.
     fn place(&mut self, position: DVec3, way: DVec3) {
         let sine = way.normalize_or_zero().dot(self.up());
         if sine.abs() < STEEPEST && position.is_finite() && way.is_finite() {
@@ -75,21 +77,21 @@ impl Eye {
         about * (tilt * way)
     }
 
-    /// Goes about the point that is looked at, as if the scene were dragged by so many pixels.
+    /// Orbits about the point looked at, as if the scene were dragged by these pixels.
     pub fn orbit(&mut self, across: f64, down: f64) {
         let way = self.camera.look_at - self.camera.position;
         let turned = self.turned(way, across, down);
         self.place(self.camera.look_at - turned, turned);
     }
 
-    /// Looks elsewhere from the same place.
+    /// Turns the view in place.
     pub fn look(&mut self, across: f64, down: f64) {
         let way = self.camera.look_at - self.camera.position;
         let turned = self.turned(way, across, down);
         self.place(self.camera.position, turned);
     }
 
-    /// Moves aside so that the point looked at follows a drag of so many pixels in a window of that height.
+    /// Pans so that the point looked at follows a drag of these pixels in a window of this height.
     pub fn pan(&mut self, across: f64, down: f64, height: f64) {
         let half = (self.camera.fov_y / 2.0).to_radians().tan();
         let scale = 2.0 * half * self.distance() / height.max(1.0);
@@ -101,7 +103,7 @@ impl Eye {
         );
     }
 
-    /// Nears the point looked at by so many steps of a wheel.
+    /// Zooms to the point looked at by steps of a wheel.
     pub fn near(&mut self, steps: f64) {
         let way = self.camera.look_at - self.camera.position;
         let left = way * STEP.powf(steps);
@@ -111,7 +113,7 @@ impl Eye {
         }
     }
 
-    /// Flies right, up and forward by shares of the speed, for so many seconds.
+    /// Flies right, up and forward by shares of the speed, for `seconds`.
     pub fn fly(&mut self, way: DVec3, seconds: f64) {
         let by = (self.right() * way.x + self.up() * way.y + self.forward() * way.z)
             * (SPEED * self.size * seconds);
@@ -121,7 +123,7 @@ impl Eye {
         );
     }
 
-    /// Looks along an axis at what is looked at now; a little aside of straight down.
+    /// Looks along an axis at the current target; the view from the top is slightly tilted.
     pub fn along(&mut self, from: DVec3) {
         let way = -from.normalize_or(DVec3::Z) * self.distance();
         let aside = self
@@ -135,14 +137,14 @@ impl Eye {
         self.place(self.camera.look_at - way, way);
     }
 
-    /// Steps back until the whole scene is seen.
+    /// Moves back until the whole scene is in view.
     pub fn see_all(&mut self) {
         let distance = 0.55 * self.size / (self.camera.fov_y / 2.0).to_radians().sin();
         let way = self.forward() * distance;
         self.place(self.middle - way, way);
     }
 
-    /// The direction, a unit vector, in which a pixel is seen.
+    /// Direction of a pixel, a unit vector.
     pub fn ray(&self, (column, row): (f64, f64), (width, height): (u32, u32)) -> DVec3 {
         let (width, height) = (f64::from(width), f64::from(height));
         let half = (self.camera.fov_y / 2.0).to_radians().tan();
@@ -152,7 +154,7 @@ impl Eye {
         (self.forward() + self.right() * across - up * down).normalize_or_zero()
     }
 
-    /// The pixel at which a place is seen; none behind the eye.
+    /// The pixel of a place; None behind the eye.
     pub fn pixel(&self, place: DVec3, (width, height): (u32, u32)) -> Option<(f64, f64)> {
         let (width, height) = (f64::from(width), f64::from(height));
         let half = (self.camera.fov_y / 2.0).to_radians().tan();
@@ -167,7 +169,7 @@ impl Eye {
         })
     }
 
-    /// What a window of so many pixels draws by.
+    /// Rows of the projection for a window of this size.
     pub fn rows(&self, scene: &Scene, (width, height): (u32, u32)) -> Rows {
         let (origin, unit) = scene.local_frame();
         let eye = (self.camera.position - origin) / unit;
@@ -227,7 +229,7 @@ mod tests {
         assert!(eye.pixel(eye.camera.position * 2.0, size).is_none());
     }
 
-    /// What is dragged stays under the pointer.
+    /// A dragged point stays under the pointer.
     #[test]
     fn panning_moves_the_point_by_as_many_pixels() {
         let mut eye = eye();

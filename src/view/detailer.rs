@@ -1,8 +1,10 @@
-//! Detailed pictures of views, drawn as `render` draws them, on a thread and a Vulkan device of their own.
+//! Detailed pictures of views, drawn as `render` draws them, on a thread and a Vulkan device of
+//! their own.
 //!
-//! Of a view that stays: a coarse one first, then the whole. While the view moves: coarse ones of where it is when the last is done, and
-//! whole ones where they are quick enough. Each comes with the distance of what it shows, so that the window can lay it over the surfaces
-//! seen from elsewhere.
+//! A view that stays is drawn coarsely first, then whole. While the view moves, coarse pictures are
+//! drawn of its place when the last one is done, and whole ones if they are quick enough. Each
+//! comes with the distances of its pixels, so that the window can lay it over the surfaces seen
+//! from elsewhere.
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -39,19 +41,20 @@ pub struct Wanted {
 }
 
 impl Drawn {
-    /// Whether it has all the pixels that were wanted.
+    /// Whether it has all pixels of the wanted picture.
     pub fn is_whole(&self) -> bool {
         self.size == self.of.size
     }
 }
 
 impl Wanted {
-    /// Whether a picture of `other` shows this one's view in this one's way, by whatever stage of the same bake.
+    /// Whether a picture of `other` shows the same view in the same way, at any stage of the same
+    /// bake.
     pub fn looks_like(&self, other: &Self) -> bool {
         self.size == other.size && self.camera == other.camera && self.colours_like(other)
     }
 
-    /// Whether a picture of `other` shows surfaces as this one's does, seen from wherever.
+    /// Whether a picture of `other` gives surfaces the same colours, from any view.
     pub fn colours_like(&self, other: &Self) -> bool {
         self.snapshot.epoch == other.snapshot.epoch
             && self.shows_like(other)
@@ -74,11 +77,12 @@ impl Wanted {
 /// A picture that was wanted.
 pub struct Drawn {
     pub of: Wanted,
-    /// Pixels; fewer than wanted of a first, coarse picture.
+    /// Pixels; fewer than wanted for a coarse picture.
     pub size: (u32, u32),
     /// sRGB, `[row][column]`.
     pub codes: Vec<Color32>,
-    /// How far along the view each pixel's middle is, internal units; 0 where nothing is.
+    /// Distance of each pixel's middle along the view, `[row][column]`, internal units; 0 where
+    /// nothing is.
     pub distances: Vec<f32>,
     pub seconds: f64,
 }
@@ -98,14 +102,15 @@ struct Shared {
 #[derive(Default)]
 struct State {
     wanted: Option<Wanted>,
-    /// Whether the view that is wanted moves.
+    /// Whether the wanted view is moving.
     moving: bool,
-    /// Counts what was asked for: a picture under way is given up when something else is. While the view moves, it is finished.
+    /// Number of requests so far: a new request stops the picture in progress, unless the view
+    /// moves.
     asked: u64,
-    /// Pictures for files go before the view's.
+    /// Pictures for files come before the view's.
     to_save: VecDeque<(Wanted, PathBuf)>,
     drawn: Option<Drawn>,
-    /// With their exposures.
+    /// Saved files, with their exposures.
     saved: Vec<(PathBuf, Result<f32>)>,
     error: Option<crate::error::Error>,
     closing: bool,
@@ -141,7 +146,8 @@ impl Detailer {
         }
     }
 
-    /// Asks for a picture in place of the one that was asked for before, of a view that moves or stays; none: for no more.
+    /// Replaces the wanted picture by another one, of a view that moves or stays; None wants no
+    /// picture.
     pub fn want(&self, wanted: Option<Wanted>, moving: bool) {
         {
             let mut state = self.shared.state();
@@ -153,23 +159,23 @@ impl Detailer {
         self.shared.changed.notify_all();
     }
 
-    /// Asks for a picture in a file.
+    /// Orders a picture in a file.
     pub fn save(&self, wanted: Wanted, path: PathBuf) {
         self.shared.state().to_save.push_back((wanted, path));
         self.shared.changed.notify_all();
     }
 
-    /// The last picture since this was asked.
+    /// The latest picture since the last call.
     pub fn take(&self) -> Option<Drawn> {
         self.shared.state().drawn.take()
     }
 
-    /// Files that have been written, or not, since this was asked.
+    /// Files that were written, or failed, since the last call.
     pub fn saved(&self) -> Vec<(PathBuf, Result<f32>)> {
         std::mem::take(&mut self.shared.state().saved)
     }
 
-    /// Why there will be no more pictures.
+    /// The error that ended the thread.
     pub fn error(&self) -> Option<crate::error::Error> {
         self.shared.state().error.take()
     }
@@ -185,11 +191,11 @@ impl Drop for Detailer {
     }
 }
 
-/// A coarse picture comes first, of one pixel for so many along each side.
+/// Pixels along each side that are one pixel of a coarse picture.
 const COARSE: u32 = 4;
-/// Pixels a side of what is drawn between two looks at what is wanted.
+/// Pixels along a side of a tile; between tiles the thread checks for new requests.
 const TILE: u32 = 96;
-/// Whole pictures that take no longer are drawn while the view moves.
+/// Longest time of a whole picture that is drawn while the view moves.
 const QUICK: Duration = Duration::from_millis(300);
 
 struct Work<'a> {
@@ -198,7 +204,7 @@ struct Work<'a> {
     device: Arc<Device>,
 }
 
-/// What a renderer draws next.
+/// The next picture of a renderer.
 enum Next {
     Draw(Wanted),
     Save(Wanted, PathBuf),
@@ -221,7 +227,7 @@ impl Work<'_> {
         Ok(())
     }
 
-    /// Waits for something to draw; none when the window closes.
+    /// Waits for a request; None when the window closes.
     fn wait(&self) -> Option<Next> {
         let mut state = self.shared.state();
         loop {
@@ -247,7 +253,8 @@ impl Work<'_> {
         state.closing || state.asked != asked || !state.to_save.is_empty()
     }
 
-    /// Draws pictures for as long as one renderer can; returns what it cannot draw.
+    /// Draws pictures as long as one renderer can draw them; returns the first request that it
+    /// cannot.
     fn draw_alike(&self, first: Next) -> Result<Option<Next>> {
         let wanted = first.wanted().clone();
         let snapshot = Arc::clone(&wanted.snapshot);
@@ -299,7 +306,8 @@ impl Work<'_> {
             (state.asked, state.moving)
         };
         for coarse in [COARSE, 1] {
-            // Where the view goes on meanwhile, a whole picture that takes long shows what is not seen any more.
+            // If the view moves on meanwhile, a whole picture that takes long shows an outdated
+            // view.
             if moving && coarse == 1 && start.elapsed() * COARSE * COARSE > QUICK {
                 return Ok(());
             }
@@ -324,7 +332,8 @@ impl Work<'_> {
     }
 }
 
-/// The same light by direction under a sky of one radiance besides, whose irradiance is given; none where that is dark.
+/// The light by direction with a uniform sky of the given irradiance added; None where the
+/// irradiance is 0.
 fn under(relief: &DirectionalLight, ambient: Vec3) -> Option<DirectionalLight> {
     if ambient == Vec3::ZERO {
         return None;
@@ -354,5 +363,5 @@ fn view(wanted: &Wanted, coarse: u32) -> View<'_> {
     }
 }
 
-/// How long a view has stayed before it is drawn in detail.
+/// Time that a view must stay before it is drawn in detail.
 pub const PAUSE: Duration = Duration::from_millis(120);

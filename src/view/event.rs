@@ -1,4 +1,4 @@
-//! What a person does to the window, from the system or from a script alike.
+//! Events of the window, from the system or from a script.
 
 pub use egui::{Key, Modifiers, PointerButton};
 use glam::DVec3;
@@ -16,7 +16,7 @@ pub enum Event {
         button: PointerButton,
         pressed: bool,
     },
-    /// Steps of the wheel, away from the person.
+    /// Steps of the wheel, positive away from the user.
     Wheel(f32),
     Key {
         key: Key,
@@ -26,12 +26,12 @@ pub enum Event {
     /// Look from this side, scene axes.
     See(DVec3),
     Modifiers(Modifiers),
-    /// The window has so many pixels; none while it is minimised.
+    /// New size of the window, pixels; 0 while it is minimised.
     Resized {
         width: u32,
         height: u32,
     },
-    /// Pixels a point.
+    /// Pixels per point.
     Scale(f32),
     /// Whether the window has the keyboard.
     Focus(bool),
@@ -39,7 +39,7 @@ pub enum Event {
 }
 
 impl Event {
-    /// Whether a person waits for an answer on the screen.
+    /// Whether the event is input that the user expects an answer to.
     pub fn is_input(&self) -> bool {
         matches!(
             self,

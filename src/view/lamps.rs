@@ -1,4 +1,4 @@
-//! The lights of a scene as a person changes them.
+//! The lights of a scene as the user edits them.
 
 use glam::DVec3;
 
@@ -12,9 +12,9 @@ pub struct Lamp {
     place: Place,
     /// The strongest channel is 1.
     pub colour: [f32; 3],
-    /// Of the strongest channel: W·sr⁻¹ of a point light, W·m⁻²·sr⁻¹ of a material.
+    /// Value of the strongest channel: W·sr⁻¹ of a point light, W·m⁻²·sr⁻¹ of a material.
     pub strength: f32,
-    /// Scene units; emitters stay where they are, since their form factors are kept.
+    /// Scene units; None for emitters, which cannot move, since their form factors are kept.
     pub position: Option<DVec3>,
 }
 
@@ -58,7 +58,7 @@ impl Lamp {
     /// Sets a property as a script names it: `colour R G B`, `strength S`, `position X Y Z`.
     ///
     /// # Errors
-    /// A property that there is not, or numbers that cannot be.
+    /// An unknown property, or values out of range.
     pub fn set(&mut self, property: &str, values: &[String]) -> Result<()> {
         let numbers: Vec<f64> = values.iter().filter_map(|v| v.parse().ok()).collect();
         let wrong = || {
@@ -85,7 +85,7 @@ impl Lamp {
     }
 }
 
-/// The scene under other lights, of which `lamps` are all.
+/// The scene with its lights replaced by `lamps`.
 pub fn lit(scene: &Scene, lamps: &[Lamp]) -> Scene {
     let mut scene = scene.clone();
     for lamp in lamps {

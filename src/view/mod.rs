@@ -7,16 +7,18 @@
 //!                      Detailer ────►┴─► the detailed picture ─┘
 //! ```
 //!
-//! Three threads, each with a Vulkan device of its own, hand results over in host memory: the window's draws frames by the light of
-//! the corners; the baker's solves; the detailer's draws the view as `render` does while it stays. No frame waits for the other
-//! two. A software driver shares its own threads between the devices of an instance, so that each device has its own instance too;
-//! and the other two threads, with all that they start, run at a lower priority.
+//! Three threads, each with a Vulkan device of its own, exchange results in host memory. The
+//! window's thread draws frames with the light at the corners; the baker's thread solves; the
+//! detailer's thread draws the view as `render` does while it stays. No frame waits for the other
+//! two threads. A software driver shares its own threads between the devices of an instance, so
+//! that each device has its own instance too; and the other two threads, with all that they start,
+//! run at a lower priority.
 
 mod baker;
 mod camera;
 mod detailer;
 mod event;
-mod input;
+mod laid_pictures;
 mod lamps;
 mod overlay;
 mod panel;
@@ -26,6 +28,7 @@ mod runner;
 mod screen;
 mod script;
 mod snapshot;
+mod surface_mesh;
 mod surface_pass;
 mod switches;
 mod timing;
@@ -45,19 +48,19 @@ use crate::vk::{Device, Instance};
 pub use script::{Step, read as read_script};
 pub use window::run;
 
-/// What is to be shown, and how.
+/// Options of the window.
 pub struct Options {
     pub scene: Scene,
-    /// A solution; without one the scene is baked.
+    /// A solution; None bakes the scene.
     pub bake: Option<Bake>,
-    /// What was kept with the solution, to light it anew by.
+    /// Visibility kept with the solution, for relighting.
     pub kept: Option<Visibility>,
     pub settings: Settings,
     pub camera: Camera,
     /// Pixels across and down.
     pub size: (u32, u32),
     pub device: DeviceChoice,
-    /// What is done in place of a person; the window closes at its end.
+    /// Steps done in place of the user; the window closes at their end.
     pub script: Option<Vec<Step>>,
     /// When the program started.
     pub start: Instant,
@@ -66,10 +69,10 @@ pub struct Options {
 /// Tells the window that there is something new.
 type Wake = Arc<dyn Fn() + Send + Sync>;
 
-/// Which device, whether it is watched, and the one that bakes once it is open.
+/// The choice of device, validation, and the baking device once it is open.
 #[derive(Clone, Default)]
 pub struct DeviceChoice {
-    /// By index or a part of its name; the best one if not given.
+    /// Index or part of the name; None chooses the best one.
     pub wanted: Option<String>,
     pub validation: bool,
     baking: Arc<Mutex<Option<Arc<Device>>>>,
@@ -84,7 +87,7 @@ impl DeviceChoice {
         }
     }
 
-    /// The device that bakes, tested when it is opened first.
+    /// The device that bakes; it is tested when it is first opened.
     fn open_baking(&self) -> Result<Arc<Device>> {
         let mut baking = self.baking.lock().unwrap_or_else(|e| e.into_inner());
         match &*baking {
@@ -108,12 +111,13 @@ impl DeviceChoice {
 #[cfg(target_os = "linux")]
 const NICENESS: i32 = 10;
 
-/// Starts a thread at a lower priority; threads that it starts, and those of drivers that it loads, inherit it.
+/// Starts a thread at a lower priority; threads that it starts, and those of drivers that it loads,
+/// inherit it.
 fn background(name: &str, work: impl FnOnce() + Send + 'static) -> JoinHandle<()> {
     let started = std::thread::Builder::new()
         .name(name.to_owned())
         .spawn(move || {
-            // Linux takes it for this thread alone; where it is refused, frames are slower.
+            // On Linux this applies to this thread only; if it is refused, frames are slower.
             #[cfg(target_os = "linux")]
             let _ = rustix::process::setpriority_process(None, NICENESS);
             work();
@@ -121,10 +125,10 @@ fn background(name: &str, work: impl FnOnce() + Send + 'static) -> JoinHandle<()
     started.expect("the system has room for another thread")
 }
 
-/// Threads of the CPU's own work at a lower priority; to be called before any of them works.
+/// Gives rayon's threads a lower priority; to be called before any of them starts.
 fn calm_workers() {
     let built = background("workers", || {
-        // Where they have begun to work, they stay as they are.
+        // Threads that have already started keep their priority.
         let _ = rayon::ThreadPoolBuilder::new().build_global();
     });
     let _ = built.join();

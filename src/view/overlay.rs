@@ -12,8 +12,9 @@ use crate::solver::ItemPicture;
 /// Pixels a side of the picture of a hemisphere.
 pub const SIDE: usize = 96;
 
-/// Light that falls on one element by direction, seen from above: the disc's middle is the normal, its rim the horizon, u goes
-/// right and v up. Of each slot the mean radiance; none of an element without relief.
+/// Light that falls on one element by direction, seen from above: the disc's middle is the normal,
+/// its rim the horizon, u goes right and v up. Each slot shows its mean radiance. None for an
+/// element without relief.
 pub fn hemisphere(light: &DirectionalLight, triangle: u32, exposure: f32) -> Option<ColorImage> {
     let m = light.elements.binary_search(&triangle).ok()?;
     let k = light.directions.len();
@@ -27,7 +28,8 @@ pub fn hemisphere(light: &DirectionalLight, triangle: u32, exposure: f32) -> Opt
         .collect();
     let pixels = (0..SIDE * SIDE).map(|i| {
         let at = |n: usize| 2.0 * (n as f64 + 0.5) / SIDE as f64 - 1.0;
-        // Lambert's azimuthal map keeps areas, so that slots look as large as they are.
+        // Lambert's azimuthal map preserves areas, so that slots appear in proportion to their
+        // solid angles.
         let (x, y) = (at(i % SIDE), -at(i / SIDE));
         let square = x * x + y * y;
         if square > 1.0 {
@@ -41,12 +43,13 @@ pub fn hemisphere(light: &DirectionalLight, triangle: u32, exposure: f32) -> Opt
 }
 
 fn code(linear: [f32; 3]) -> Color32 {
-    // One place of the dither's matrix near its middle: rounding.
+    // A place near the middle of the dither's matrix, which amounts to rounding.
     let [r, g, b] = tone::neutral(linear).map(|c| tone::code(c, 0, 4));
     Color32::from_rgb(r, g, b)
 }
 
-/// An item buffer unfolded: the top face in the middle of its four sides, each triangle in the colour of its own light.
+/// An item buffer unfolded: the top face in the middle of its four sides, each triangle in the
+/// colour of its own light.
 pub fn items(picture: &ItemPicture, irradiance: &[Vec3], exposure: f32) -> ColorImage {
     let n = picture.face;
     let (half, side) = (n / 2, 2 * n);
@@ -54,7 +57,7 @@ pub fn items(picture: &ItemPicture, irradiance: &[Vec3], exposure: f32) -> Color
     let colour = |item: u32| match irradiance.get(item as usize) {
         None => Color32::BLACK,
         Some(e) => {
-            // Half its light and half a hue of its own, so that neighbours are told apart.
+            // Half its light and half a hue of its own, so that neighbours can be distinguished.
             let hue = egui::ecolor::Hsva::new((item as f32 * 0.618_034).fract(), 0.7, 0.8, 1.0);
             let [r, g, b] = hue.to_rgb();
             let lit = (e.to_array()).map(|c| c / std::f32::consts::PI * exposure);
@@ -78,8 +81,9 @@ pub fn items(picture: &ItemPicture, irradiance: &[Vec3], exposure: f32) -> Color
     image
 }
 
-/// Where a pixel of a face lies among all, x of the source's frame to the right and y down: sides hang off the edges of the top
-/// face, their horizon outermost. `half` is half a face's side.
+/// Position of a face's pixel in the unfolded cross, x of the source's frame to the right and y
+/// down: sides adjoin the edges of the top face, with the horizon outermost. `half` is half a
+/// face's side.
 fn unfolded(face: u32, (column, row): (u32, u32), half: u32) -> (u32, u32) {
     // The first row of a side is at the horizon.
     let after = 3 * half + (half - 1 - row.min(half - 1));
@@ -170,7 +174,8 @@ mod tests {
         );
     }
 
-    /// Light along the normal alone shines in the middle of the disc; the rim is dark, and what lies beyond is not there.
+    /// Light along the normal only lights the middle of the disc; the rim is dark, and outside it
+    /// is transparent.
     #[test]
     fn the_middle_of_the_disc_is_the_normal() {
         let directions = Directions::new(64).expect("a number of the paper");

@@ -1,4 +1,4 @@
-//! The panel: what the window tells and what it lets be switched.
+//! The panel: status and controls.
 
 use egui::{Color32, ComboBox, DragValue, RichText, Slider, Ui};
 use glam::DVec3;
@@ -9,41 +9,41 @@ use super::snapshot::Progress;
 use super::switches::{DIRECTIONS, DIRECTS, EXPOSURES, PARTS, SHADINGS, Switches};
 use crate::render::Show;
 
-/// What the panel tells.
-pub struct Told<'a> {
+/// The status that the panel shows.
+pub struct Status<'a> {
     pub scene: &'a str,
     pub triangles: usize,
     pub device: &'a str,
     pub cameras: &'a [String],
     pub progress: Progress,
-    /// What a bake waits for before it goes on.
+    /// The stage that a bake waits for.
     pub stage: Option<Stage>,
     pub baking: bool,
     /// Seconds.
     pub frame: Option<f64>,
-    /// Seconds that the detailed picture took, if it is shown.
+    /// Time of the detailed picture, if it is shown, seconds.
     pub detail: Option<f64>,
     pub has_relief: bool,
     pub messages: &'a [String],
-    /// Seconds and error bounds of the bake.
+    /// Error bounds of the bake: `[seconds, bound]`.
     pub bounds: &'a [[f64; 2]],
     /// The element under the cursor, or the one that was clicked.
     pub element: Option<String>,
 }
 
-/// What the panel changes beside the switches.
+/// State that the panel changes.
 pub struct Changed<'a> {
     pub switches: &'a mut Switches,
     pub lamps: &'a mut [Lamp],
-    /// The lamp that keys change.
+    /// Index of the lamp that keys change.
     pub lamp: &'a mut usize,
-    /// Of the bake.
+    /// Number of directions of the bake.
     pub directions: &'a mut u32,
-    /// What the heights of the relief are multiplied by.
+    /// Factor of the relief's heights.
     pub relief_scale: &'a mut f64,
 }
 
-/// What the panel asks to be done.
+/// Actions of the panel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Asked {
     Camera(usize),
@@ -57,8 +57,8 @@ pub enum Asked {
 
 const ERROR: Color32 = Color32::from_rgb(255, 120, 100);
 
-/// Lays the panel out; returns what a person asked for.
-pub fn show(context: &egui::Context, told: &Told<'_>, changed: &mut Changed<'_>) -> Vec<Asked> {
+/// Lays out the panel; returns the actions that the user chose.
+pub fn show(context: &egui::Context, status: &Status<'_>, changed: &mut Changed<'_>) -> Vec<Asked> {
     let mut asked = Vec::new();
     egui::Window::new("Mesolux")
         .default_pos([8.0, 8.0])
@@ -67,48 +67,48 @@ pub fn show(context: &egui::Context, told: &Told<'_>, changed: &mut Changed<'_>)
         .fade_in(false)
         .vscroll(true)
         .show(context, |ui| {
-            status(ui, told);
+            show_status(ui, status);
             ui.separator();
             light(ui, changed.switches);
-            if told.has_relief {
+            if status.has_relief {
                 ui.separator();
                 relief(ui, changed, &mut asked);
             }
             ui.separator();
-            overlays(ui, told, changed.switches);
+            overlays(ui, status, changed.switches);
             ui.separator();
             if lamps(ui, changed) {
                 asked.push(Asked::Relight);
             }
             ui.separator();
-            view(ui, told, changed.switches, &mut asked);
-            if let Some(element) = &told.element {
+            view(ui, status, changed.switches, &mut asked);
+            if let Some(element) = &status.element {
                 ui.separator();
                 ui.label(element);
             }
-            for message in told.messages {
+            for message in status.messages {
                 ui.colored_label(ERROR, message);
             }
         });
     asked
 }
 
-fn status(ui: &mut Ui, told: &Told<'_>) {
-    ui.label(format!("{}: {} triangles", told.scene, told.triangles));
-    ui.label(RichText::new(told.device).small().weak());
-    let frame = told
+fn show_status(ui: &mut Ui, status: &Status<'_>) {
+    ui.label(format!("{}: {} triangles", status.scene, status.triangles));
+    ui.label(RichText::new(status.device).small().weak());
+    let frame = status
         .frame
         .map_or(String::new(), |s| format!("{:.1} ms", 1e3 * s));
-    let detail = told
+    let detail = status
         .detail
         .map_or(String::new(), |s| format!(", detail {s:.1} s"));
     ui.label(format!("frame {frame}{detail}"));
-    if let Some(stage) = told.stage {
+    if let Some(stage) = status.stage {
         ui.label(stage.line());
     }
-    let progress = &told.progress.update;
+    let progress = &status.progress.update;
     if progress.sources == 0 {
-        if !told.baking {
+        if !status.baking {
             ui.label("from a file");
         }
         return;
@@ -117,7 +117,7 @@ fn status(ui: &mut Ui, told: &Told<'_>) {
         .error_bound
         .map_or("none".to_owned(), |b| format!("{:.2} %", 100.0 * b));
     let time = progress.elapsed.as_secs_f64();
-    ui.label(match (told.progress.done, progress.left) {
+    ui.label(match (status.progress.done, progress.left) {
         (true, _) => format!("baked in {time:.1} s"),
         (false, Some(left)) => format!(
             "baking, {time:.0} s, about {:.0} s left",
@@ -176,24 +176,24 @@ fn relief(ui: &mut Ui, changed: &mut Changed<'_>, asked: &mut Vec<Asked>) {
     });
     let scale = Slider::new(changed.relief_scale, 0.0..=3.0).text("height");
     let scale = ui.add(scale);
-    // Each height is another bake: not one for each pixel of the drag.
+    // Each height starts a bake: only at the end of a drag, not at each pixel.
     if scale.drag_stopped() || (scale.changed() && !scale.dragged()) {
         asked.push(Asked::Bake);
     }
 }
 
-fn overlays(ui: &mut Ui, told: &Told<'_>, switches: &mut Switches) {
+fn overlays(ui: &mut Ui, status: &Status<'_>, switches: &mut Switches) {
     ui.checkbox(&mut switches.elements, "elements (O)");
     ui.checkbox(&mut switches.sources, "sources (P)");
     ui.checkbox(&mut switches.slots, "incoming light under the cursor (H)");
     ui.checkbox(&mut switches.items, "item buffer of the source clicked (I)");
     ui.checkbox(&mut switches.bound, "error bound over time (B)");
     if switches.bound {
-        super::overlay::bounds(ui, told.bounds);
+        super::overlay::bounds(ui, status.bounds);
     }
 }
 
-/// Whether a light was changed: a colour that is only shown may come back rounded.
+/// Whether a light was changed: an unchanged colour may come back rounded.
 fn lamps(ui: &mut Ui, changed: &mut Changed<'_>) -> bool {
     let mut edited = false;
     for (i, lamp) in changed.lamps.iter_mut().enumerate() {
@@ -233,12 +233,12 @@ fn lamps(ui: &mut Ui, changed: &mut Changed<'_>) -> bool {
     edited
 }
 
-fn view(ui: &mut Ui, told: &Told<'_>, switches: &mut Switches, asked: &mut Vec<Asked>) {
+fn view(ui: &mut Ui, status: &Status<'_>, switches: &mut Switches, asked: &mut Vec<Asked>) {
     ui.horizontal(|ui| {
         ComboBox::from_id_salt("camera")
             .selected_text("camera (C)")
             .show_ui(ui, |ui| {
-                for (i, name) in told.cameras.iter().enumerate() {
+                for (i, name) in status.cameras.iter().enumerate() {
                     if ui.selectable_label(false, name).clicked() {
                         asked.push(Asked::Camera(i));
                     }

@@ -1,4 +1,4 @@
-//! Draws the triangles that egui makes of a panel. Shaders: `panel.vert`, `panel.frag`.
+//! Draws the triangles of egui's panel. Shaders: `panel.vert`, `panel.frag`.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -14,12 +14,12 @@ use crate::vk::{
     GraphicsState, Image, ImageUse, RenderPass, Sampler, VertexAttribute,
 };
 
-/// Draws panels; one frame is under way at a time.
+/// Draws panels, one frame at a time.
 pub struct PanelPass {
     pipeline: GraphicsPipeline,
     sampler: Sampler,
     textures: HashMap<TextureId, Texture>,
-    /// Of the picture's image that is the picture.
+    /// Share of the image that is the picture.
     picture_share: Vec2,
     vertices: Buffer,
     indices: Buffer,
@@ -28,11 +28,11 @@ pub struct PanelPass {
 
 struct Texture {
     set: DescriptorSet,
-    /// What the image holds: egui changes parts of it.
+    /// Content of the image, of which egui updates parts.
     pixels: ColorImage,
 }
 
-/// The picture that lies under everything.
+/// The picture under the panel.
 const PICTURE: TextureId = TextureId::User(0);
 
 /// Triangles of one texture within one rectangle.
@@ -44,16 +44,16 @@ struct Draw {
     clip: [u32; 4],
 }
 
-/// What [`PanelPass::prepare`] has brought to the device for one frame.
+/// Draws of one frame, uploaded by [`PanelPass::prepare`].
 pub struct Prepared {
     /// The picture first.
     draws: Vec<Draw>,
-    /// Of the window in points.
+    /// Size of the window in points.
     size: [f32; 2],
 }
 
-/// The size of a new buffer for `bytes` bytes: some spare, so that a panel that grows does not
-/// create one each frame.
+/// Bytes of a new buffer for `bytes`: with a reserve, so that a growing panel does not need a new
+/// one each frame.
 fn roomy(bytes: u64) -> u64 {
     (bytes * 3 / 2).max(1 << 16)
 }
@@ -94,7 +94,7 @@ impl PanelPass {
         })
     }
 
-    /// Takes new textures and lets go of old ones.
+    /// Adds new textures and frees old ones.
     ///
     /// # Errors
     /// A device without the memory.
@@ -137,7 +137,7 @@ impl PanelPass {
         Ok(())
     }
 
-    /// Brings the triangles of a frame of so many pixels to the device, `scale` pixels a point.
+    /// Uploads the triangles of a frame of this size in pixels, with `scale` pixels per point.
     ///
     /// # Errors
     /// A device without the memory.
@@ -218,12 +218,12 @@ impl PanelPass {
         Ok(Prepared { draws, size })
     }
 
-    /// Draws the picture over all that was drawn, within the render pass that is under way.
+    /// Draws the picture over everything drawn so far, within a render pass that has begun.
     pub fn record_picture(&self, cmd: &Commands, prepared: &Prepared) {
         self.draw(cmd, prepared, &prepared.draws[..1]);
     }
 
-    /// Draws the panel within the render pass that is under way.
+    /// Draws the panel within a render pass that has begun.
     pub fn record(&self, cmd: &Commands, prepared: &Prepared) {
         self.draw(cmd, prepared, &prepared.draws[1..]);
     }
@@ -253,7 +253,7 @@ fn patched(mut whole: ColorImage, part: &ColorImage, [left, top]: [usize; 2]) ->
     whole
 }
 
-/// An image of 8-bit codes that shaders read as they are.
+/// An image of 8-bit codes that shaders read without conversion.
 pub fn upload(
     device: &Arc<Device>,
     name: &str,

@@ -1,10 +1,10 @@
-//! Which element a ray meets first.
+//! The element that a ray hits first.
 
 use glam::DVec3;
 
 use crate::scene::Scene;
 
-/// The triangle, by its place in the input, that a ray from `eye` meets first, from whichever side.
+/// Index of the triangle that a ray from `eye` hits first, on either side.
 pub fn first_hit(scene: &Scene, eye: DVec3, ray: DVec3) -> Option<u32> {
     let mut nearest: Option<(f64, u32)> = None;
     for (e, triangle) in (0..).zip(&scene.triangles) {

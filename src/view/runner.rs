@@ -8,18 +8,18 @@ use super::script::Step;
 use super::viewer::Viewer;
 use crate::error::{Error, Result};
 
-/// A script under way.
+/// A script in progress.
 pub struct Runner {
     steps: VecDeque<Step>,
-    /// Frames shown since the step that waits began.
+    /// Frames shown since the current step began.
     frames: u64,
     since: Instant,
     begun: bool,
 }
 
-/// Between two looks at whether what a step waits for has come.
+/// Interval at which the condition of a waiting step is checked.
 const POLLING: Duration = Duration::from_millis(20);
-/// How long a system may take to give the window another size.
+/// Longest time that a system may take to resize the window.
 const RESIZING: Duration = Duration::from_secs(5);
 
 impl Runner {
@@ -37,7 +37,7 @@ impl Runner {
         self.frames += 1;
     }
 
-    /// When this has to be asked again, at the latest; frames are drawn as fast as they can meanwhile if that is now.
+    /// Latest time of the next call; now draws frames as fast as possible until then.
     pub fn next(&self, now: Instant) -> Option<Instant> {
         match self.steps.front() {
             Some(Step::Wait(seconds)) => Some(self.since + Duration::from_secs_f64(*seconds)),
@@ -47,13 +47,13 @@ impl Runner {
         }
     }
 
-    /// Whether frames are wanted though nothing has changed.
+    /// Whether frames are wanted without any change.
     pub fn wants_frames(&self) -> bool {
         let first = self.steps.front();
         matches!(first, Some(Step::Frames(_) | Step::Screenshot(_)))
     }
 
-    /// Does what can be done now. `resize` asks the system for a size.
+    /// Does all steps that can be done now. `resize` asks the system for a size.
     ///
     /// # Errors
     /// A step that cannot be done.

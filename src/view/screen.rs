@@ -1,4 +1,4 @@
-//! What the window's frames are drawn in and shown by.
+//! Images and swapchain of the window's frames.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::vk::{
     Instance, RenderPass, Shown, Stage, Surface, Swapchain,
 };
 
-/// A window with its device and, while it has an area, its images.
+/// A window with its device, and its images while it has an area.
 pub struct Screen {
     swapchain: Option<Swapchain>,
     target: Option<Target>,
@@ -38,8 +38,8 @@ pub struct Captured {
 
 impl Screen {
     /// # Errors
-    /// A display without a Vulkan surface; a device that is absent, or cannot show pictures on
-    /// this display.
+    /// A display without a Vulkan surface; a device that does not exist or cannot present to this
+    /// display.
     pub fn new(window: &Arc<Window>, size: (u32, u32), choice: &DeviceChoice) -> Result<Self> {
         let instance = Instance::for_display(choice.validation, window.as_ref())?;
         let surface = Arc::new(Surface::new(&instance, window)?);
@@ -87,18 +87,18 @@ impl Screen {
         &self.pass
     }
 
-    /// Lets go of the surface as if the system had taken it; the next frame makes a new one.
+    /// Drops the surface as if the system had lost it; the next frame makes a new one.
     pub fn lose(&mut self) {
         self.swapchain = None;
         self.surface = None;
     }
 
-    /// Makes images of the window's size where there are none, and with `remake` replaces them.
-    /// Returns their size; none while the window has no area.
+    /// Makes images of the window's size if there are none. Returns their size; None while the
+    /// window has no area.
     ///
     /// # Errors
     /// A device or a display that fails.
-    pub fn fit(&mut self, size: (u32, u32), remake: bool) -> Result<Option<(u32, u32)>> {
+    pub fn fit(&mut self, size: (u32, u32), recreate: bool) -> Result<Option<(u32, u32)>> {
         if size.0 == 0 || size.1 == 0 {
             return Ok(None);
         }
@@ -107,7 +107,7 @@ impl Screen {
             self.surface = Some(Arc::new(Surface::new(&self.instance, &self.window)?));
         }
         if let Some(surface) = &self.surface
-            && (remake || self.swapchain.is_none())
+            && (recreate || self.swapchain.is_none())
         {
             let before = self.swapchain.take();
             self.swapchain = Swapchain::new(&self.device, surface, size, before)?;
@@ -128,8 +128,8 @@ impl Screen {
         Ok(Some(size))
     }
 
-    /// Shows a frame: what `record` draws within the render pass. With `capture`, reads it back. To
-    /// be called when [`Self::fit`] has returned a size.
+    /// Draws a frame with the commands that `record` adds to the render pass, and shows it; with
+    /// `capture`, reads it back. Call it after [`Self::fit`] has returned a size.
     ///
     /// # Errors
     /// A device that fails.
@@ -164,7 +164,7 @@ impl Screen {
         if shown == Shown::Lost {
             self.lose();
         }
-        // A frame that was given up has drawn nothing.
+        // An abandoned frame has drawn nothing.
         let readback = readback.filter(|_| shown == Shown::Yes);
         let captured = readback.map(|readback| {
             let blue_first = self.format == Format::B8G8R8A8_UNORM;

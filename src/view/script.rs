@@ -7,39 +7,39 @@ use glam::DVec3;
 use super::event::{Event, Key, PointerButton};
 use crate::error::{Error, Result};
 
-/// What a script does next.
+/// One step of a script.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Step {
-    /// Something that a person could have done.
+    /// An event that the user could have caused.
     Do(Event),
     /// Asks the system for a window of this size.
     Resize(u32, u32),
-    /// Draws so many frames, each as soon as the last is shown.
+    /// Draws this many frames, each as soon as the last is shown.
     Frames(u64),
     /// Waits until the bake is done.
     Bake,
-    /// Waits until the light of the last change of the lights is shown.
+    /// Waits until the last change of the lights is shown.
     Relit,
     /// Waits until the detailed picture of the view is shown.
     Detail,
-    /// Waits until the sources and the item buffer that are to be shown have come.
+    /// Waits until the sources and the item buffer have arrived, if they are to be shown.
     Overlays,
-    /// Seconds.
+    /// Waits this many seconds.
     Wait(f64),
     /// Sets a switch, or a property of a light.
     Set(Vec<String>),
-    /// Writes what the window shows.
+    /// Writes the window's content to a file.
     Screenshot(PathBuf),
-    /// Writes the view as `render` would.
+    /// Writes the view to a file, drawn as by `render`.
     Save(PathBuf),
-    /// Behaves as if the system had taken the surface away.
+    /// Behaves as if the system had lost the surface.
     LoseSurface,
 }
 
 /// Reads a script; `#` begins a comment.
 ///
 /// # Errors
-/// A file that cannot be read; a line that is no step.
+/// A file that cannot be read; a line that is not a step.
 pub fn read(path: &Path) -> Result<Vec<Step>> {
     let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
     let mut steps = Vec::new();

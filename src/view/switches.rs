@@ -1,4 +1,4 @@
-//! What a person can switch, by the panel, by keys or by a script.
+//! Switches that the panel, keys and scripts change.
 
 use crate::error::{Error, Result};
 use crate::render::{Direct, Light, ReliefShading, Show};
@@ -14,7 +14,7 @@ pub struct Switches {
     pub ambient: bool,
     /// Draws detailed pictures while the view stays.
     pub detail: bool,
-    /// Stops over the automatic exposure.
+    /// Stops relative to the automatic exposure.
     pub exposure: f32,
     /// Outlines of the elements, colours of the sources.
     pub elements: bool,
@@ -48,7 +48,7 @@ impl Default for Switches {
     }
 }
 
-/// Names of the panel and of scripts.
+/// Names in the panel and in scripts.
 pub const PARTS: [(&str, Light); 3] = [
     ("global", Light::Global),
     ("direct", Light::Direct),
@@ -67,7 +67,7 @@ pub const DIRECTIONS: [u32; 3] = [16, 32, 64];
 /// Stops of the exposure that the panel offers.
 pub const EXPOSURES: std::ops::RangeInclusive<f32> = -6.0..=6.0;
 
-/// The one after this in a list of names.
+/// The value after `now` in a list, cyclic.
 pub fn next<T: Copy + PartialEq>(list: &[(&str, T)], now: T) -> T {
     let place = list.iter().position(|(_, value)| *value == now);
     list[(place.unwrap_or(0) + 1) % list.len()].1
@@ -87,7 +87,7 @@ impl Switches {
     /// Sets a switch as a script names it.
     ///
     /// # Errors
-    /// A name or a value that there is not.
+    /// An unknown name or value.
     pub fn set(&mut self, name: &str, value: &str) -> Result<()> {
         let flag = match name {
             "light" => {

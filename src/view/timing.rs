@@ -1,14 +1,15 @@
-//! How long frames and answers take.
+//! Times of frames and of answers to input.
 
 use std::time::{Duration, Instant};
 
 /// Times of a session, seconds.
 #[derive(Debug, Default)]
 pub struct Timing {
-    /// Of frames, from the first thought to the picture on the screen, while a bake is under way and while none is.
+    /// Times of frames, from the start of their preparation to their presentation: during a bake,
+    /// and without one.
     baking: Vec<f64>,
     idle: Vec<f64>,
-    /// From what a person did to the end of the first frame that could show it.
+    /// From an input to the end of the first frame that could show its effect.
     answers: Vec<f64>,
     /// From a change of the lights to the end of the first frame that shows its light.
     relit: Vec<f64>,
@@ -44,13 +45,13 @@ impl Timing {
             .get_or_insert_with(|| since.elapsed().as_secs_f64());
     }
 
-    /// The last frame's, by whether a bake is under way.
+    /// Time of the last frame, during a bake or without one.
     pub fn last(&self, baking: bool) -> Option<f64> {
         let frames = if baking { &self.baking } else { &self.idle };
         frames.last().copied()
     }
 
-    /// One line each for what there was.
+    /// One line for each kind of time that was measured.
     pub fn lines(&self) -> Vec<String> {
         let mut lines = Vec::new();
         if let Some(seconds) = self.first_light {
@@ -84,7 +85,7 @@ impl Timing {
     }
 }
 
-/// The median and the 95th percentile in milliseconds; none of nothing.
+/// The median and the 95th percentile in milliseconds; None without values.
 fn spread(seconds: &[f64]) -> Option<(f64, f64)> {
     let mut sorted = seconds.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);

@@ -1,4 +1,4 @@
-//! The window itself: events of the system in, frames out.
+//! The window: events of the system in, frames out.
 
 use std::sync::Arc;
 
@@ -17,10 +17,11 @@ use super::viewer::Viewer;
 use super::{Options, Wake, calm_workers};
 use crate::error::{Error, Result};
 
-/// Another thread has something new.
+/// Another thread has a new result.
 struct Woken;
 
-/// Opens the window and shows the scene until it is closed; returns lines on how long frames and answers took.
+/// Opens the window and shows the scene until it is closed; returns lines on how long frames and
+/// answers took.
 ///
 /// # Errors
 /// No display, or one without a Vulkan surface; a device that fails.
@@ -48,7 +49,7 @@ pub fn run(options: Options) -> Result<Vec<String>> {
     }
 }
 
-/// What an error says in the end, in one line: before that stands where in its code winit noticed it.
+/// The last part of an error's text, in one line: winit puts the place in its code before it.
 fn line(error: &impl std::fmt::Display) -> String {
     let text = error.to_string();
     let words: Vec<_> = text.split_whitespace().collect();
@@ -61,7 +62,7 @@ struct App {
     proxy: EventLoopProxy<Woken>,
     title: String,
     size: (u32, u32),
-    /// Until the window is open.
+    /// Kept until the window is open.
     options: Option<Options>,
     runner: Option<Runner>,
     open: Option<(Viewer, Arc<Window>)>,
@@ -83,7 +84,7 @@ impl App {
         let window = Arc::new(window);
         let proxy = self.proxy.clone();
         let wake: Wake = Arc::new(move || {
-            // A window that is gone needs no waking.
+            // A closed window needs no wake-up.
             let _ = proxy.send_event(Woken);
         });
         let PhysicalSize { width, height } = window.inner_size();
@@ -94,14 +95,14 @@ impl App {
         Ok(())
     }
 
-    /// Draws what is due, and says when the next frame is.
+    /// Draws a frame if one is due, and schedules the next.
     fn go_on(&mut self, events: &ActiveEventLoop) -> Result<()> {
         let Some((viewer, window)) = &mut self.open else {
             return Ok(());
         };
         if let Some(runner) = &mut self.runner {
             runner.advance(viewer, |width, height| {
-                // A system that obeys at once sends no event of it.
+                // A system that resizes at once sends no event.
                 let given = window.request_inner_size(PhysicalSize::new(width, height));
                 if let Some(PhysicalSize { width, height }) = given {
                     viewer_resized(window, width, height);
@@ -148,7 +149,7 @@ impl App {
     }
 }
 
-/// On systems that give a size at once, its event comes with the next round.
+/// Where a resize takes effect at once, handles it as an event.
 fn viewer_resized(window: &Window, width: u32, height: u32) {
     tracing::debug!(width, height, "resized at once");
     window.request_redraw();
@@ -182,14 +183,14 @@ impl ApplicationHandler<Woken> for App {
     }
 }
 
-/// Sides from which the number pad looks.
+/// Views of the number pad's keys.
 const SIDES: [(KeyCode, DVec3); 3] = [
     (KeyCode::Numpad1, DVec3::Z),
     (KeyCode::Numpad3, DVec3::X),
     (KeyCode::Numpad7, DVec3::Y),
 ];
 
-/// What an event of the system means here.
+/// Translates an event of the system.
 fn translated(event: WindowEvent) -> Vec<Event> {
     match event {
         WindowEvent::CloseRequested | WindowEvent::Destroyed => vec![Event::Close],
@@ -233,7 +234,7 @@ fn translated(event: WindowEvent) -> Vec<Event> {
                 },
             })]
         }
-        // What an uncovered window shows is drawn anew.
+        // An uncovered window is redrawn.
         WindowEvent::KeyboardInput { event, .. } => {
             let pressed = event.state == ElementState::Pressed;
             let side = SIDES

@@ -11,9 +11,9 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use mesolux::bench::relief_room::{REPEAT, TEXELS};
-use mesolux::bench::stress::shapes::Shapes;
 use mesolux::elements::Elements;
 use mesolux::render::{Picture, side_by_side};
+use mesolux::scene::shapes::Shapes;
 use mesolux::scene::{PointLight, Scene};
 use mesolux::solver::ReliefLight;
 use mesolux::solver::{Light, Report, Settings, Solver, open_device};

@@ -1,4 +1,4 @@
-//! Bakes over a grid of settings, each looked at while it goes on.
+//! Bakes over a grid of settings, each measured at several times.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -27,11 +27,12 @@ pub struct Grid {
     pub scales: Vec<f64>,
     /// Hemicubes of the `pixel` estimator, at the default size of sources and at the smallest.
     pub pixel_hemicubes: Vec<u32>,
-    /// Numbers of directions, at the default hemicube and size of sources; tried where a scene has relief.
+    /// Numbers of directions, at the default hemicube and size of sources; tried where a scene has
+    /// relief.
     pub directions: Vec<u32>,
     /// Each bake goes on to this error bound,
     pub residual: f64,
-    /// or until it has taken so long.
+    /// or until it has taken this long.
     pub limit: Duration,
 }
 
@@ -52,7 +53,7 @@ pub(super) struct Done {
     pub direct: Vec<Vec3>,
 }
 
-/// First look at a bake; each further one is twice as late.
+/// Time of the first measurement of a bake; each further one is twice as late.
 const FIRST_LOOK: Duration = Duration::from_millis(500);
 
 impl Grid {
@@ -123,10 +124,13 @@ impl Try {
         Ok(settings)
     }
 
-    /// Bakes and measures. What a look costs does not count; `go_on` may stop the bake between looks.
+    /// Bakes and measures. The cost of measuring does not count; `go_on` may stop the bake between
+    /// measurements.
     pub fn bake(
         &self,
-        (device, scene, grid): (&Arc<Device>, &Scene, &Grid),
+        device: &Arc<Device>,
+        scene: &Scene,
+        grid: &Grid,
         truth: &Truth,
         go_on: &impl Fn() -> bool,
     ) -> Result<Done> {

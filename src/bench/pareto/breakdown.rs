@@ -1,4 +1,5 @@
-//! Where the error of a bake is: by material and the way that it faces, in direct and indirect light, and the worst elements.
+//! Distribution of a bake's error: by material and facing direction, in direct and indirect light,
+//! and the worst elements.
 
 use std::collections::BTreeMap;
 
@@ -6,12 +7,12 @@ use glam::{DVec3, Vec3};
 use serde::Serialize;
 
 use super::bakes::Done;
-use super::measure::{mean, net_squares};
-use super::truth::Truth;
+use super::measure::net_squares;
+use super::truth::{Truth, mean};
 use crate::bench::irradiance::place_of;
 use crate::scene::Scene;
 
-/// Worst elements that are told.
+/// Number of worst elements reported.
 const WORST: usize = 10;
 
 /// Error on a part of the scene, over the mean irradiance of all places.
@@ -23,10 +24,10 @@ pub struct Part {
     pub light: f64,
     pub bias: f64,
     pub rms: f64,
-    /// Of direct and of indirect light alone.
+    /// Of direct and of indirect light.
     pub rms_direct: f64,
     pub rms_indirect: f64,
-    /// Of the sum of squares over all places.
+    /// Share of the sum of squares over all places.
     pub share: f64,
 }
 
@@ -42,7 +43,7 @@ pub struct Worst {
     /// Means over the colours, over the mean of all places.
     pub truth: f64,
     pub ours: f64,
-    /// Of the difference, what is of direct light.
+    /// The part of the difference that is direct light.
     pub direct: f64,
 }
 
@@ -53,7 +54,8 @@ pub struct Breakdown {
     pub worst: Vec<Worst>,
 }
 
-/// Values at the places: `[global, direct, indirect]`, each with its truth and the truth's standard error.
+/// Values at the places: `[global, direct, indirect]`, each with its truth and the truth's standard
+/// error.
 struct Light {
     ours: Vec<Vec3>,
     truth: Vec<Vec3>,

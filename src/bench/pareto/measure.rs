@@ -1,18 +1,19 @@
-//! Error against the reference with its confidence interval, and which measurements are best.
+//! Error against the reference with its confidence interval, and the best measurements.
 
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
-use super::truth::Truth;
+use super::truth::{Truth, mean};
 use crate::path_tracer::NORMAL_95;
 
 /// Resamples of the bootstrap: the ends of a 95 % interval lie 25 from its ends.
 const RESAMPLES: usize = 1000;
 
-/// Error over places chosen by area, colours together, as shares of the mean irradiance of the reference.
+/// Error over places chosen by area, colours together, as shares of the mean irradiance of the
+/// reference.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Measure {
-    /// Root of the mean square, the reference's noise subtracted; 0 where that is more.
+    /// Root of the mean square, less the reference's noise; 0 where the noise is larger.
     pub rms: f64,
     /// 95 % interval of `rms` by the percentile bootstrap over the places (Efron 1979).
     pub rms_interval: [f64; 2],
@@ -21,13 +22,8 @@ pub struct Measure {
     pub bias_interval: f64,
 }
 
-/// Mean of the reference, over places and colours.
-pub fn mean(truth: &[Vec3]) -> f64 {
-    let sum: f64 = truth.iter().map(|t| t.as_dvec3().element_sum()).sum();
-    sum / (3.0 * truth.len() as f64)
-}
-
-/// Mean square of `ours − truth` at each place over the colours, less the square of the truth's own standard error.
+/// Mean square of `ours − truth` at each place over the colours, less the square of the truth's own
+/// standard error.
 pub fn net_squares(ours: &[Vec3], truth: &[Vec3], error: &[Vec3]) -> Vec<f64> {
     let square = |v: Vec3| v.as_dvec3().length_squared() / 3.0;
     let places = ours.iter().zip(truth).zip(error);
@@ -51,7 +47,7 @@ impl Measure {
             .collect();
         drawn.sort_by(f64::total_cmp);
         let end = RESAMPLES / 40;
-        // Colours of a place err together: the interval is that of the places' means.
+        // Errors of a place's colours are correlated: the interval is that of the places' means.
         let apart: Vec<f64> = ours
             .iter()
             .zip(&truth.global)
@@ -78,7 +74,7 @@ fn below(state: &mut u64, count: usize) -> usize {
     ((u128::from(z ^ (z >> 31)) * count as u128) >> 64) as usize
 }
 
-/// Which of the points (seconds, error) no other one beats in both.
+/// Whether each of the points (seconds, error) is beaten by no other in both.
 pub fn front(points: &[(f64, f64)]) -> Vec<bool> {
     let beats = |a: (f64, f64), b: (f64, f64)| a.0 <= b.0 && a.1 <= b.1 && a != b;
     points
@@ -97,8 +93,8 @@ mod tests {
         assert_eq!(front(&points), [true, false, true, false, true]);
     }
 
-    /// Places that err by a normal variable of 10 % of a truth that is itself known to 20 %, with a bias of 5 %: rms is
-    /// √(0.05² + 0.1²) of the mean, and the interval holds it.
+    /// Places that err by a normal variable of 10 % of a truth that is itself known to 20 %, with a
+    /// bias of 5 %: rms is √(0.05² + 0.1²) of the mean, and the interval holds it.
     #[test]
     fn error_is_that_of_a_known_distribution() {
         const PLACES: usize = 20_000;
@@ -116,7 +112,8 @@ mod tests {
         }
         let found = Measure::new(&ours, &truth);
         let exact = 0.0125_f64.sqrt();
-        // Squares of a normal variable of variance v spread by √2 v: half an interval of rms is 1.96 √(2/n) v / 2 rms.
+        // Squares of a normal variable of variance v spread by √2 v: half an interval of rms is
+        // 1.96 √(2/n) v / 2 rms.
         let half = 1.96 * (2.0 / PLACES as f64).sqrt() * 0.0525 / (2.0 * exact);
         assert!((found.rms - exact).abs() < 2.0 * half, "{found:?}");
         assert!(found.rms_interval[0] < exact && exact < found.rms_interval[1]);

@@ -1,7 +1,9 @@
-//! `mesolux bench pareto`: error against run time, for settings of the bake and for other methods, against one reference.
+//! `mesolux bench pareto`: error against run time, for settings of the bake and for other methods,
+//! against one reference.
 //!
-//! Time is that of having the irradiance of every element, from the scene in memory; opening a device and reading files do not
-//! count. Error is that of irradiance at the centroids of triangles with neither relief nor emission, chosen by area.
+//! Time is measured from the scene in memory to the irradiance of every element; opening a device
+//! and reading files do not count. Error is that of irradiance at the centroids of triangles with
+//! neither relief nor emission, chosen by area.
 
 mod bakes;
 mod breakdown;
@@ -28,7 +30,7 @@ use crate::vk::Device;
 use bakes::Done;
 use peers::Job;
 
-/// What finds irradiance.
+/// A method that computes irradiance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
@@ -37,7 +39,7 @@ pub enum Method {
     Pixel,
     /// Keller 1997, shadow rays on the CPU.
     InstantRadiosity,
-    /// The project's own.
+    /// The project's own path tracer.
     PathTracer,
     /// Mitsuba 3, LLVM.
     Mitsuba,
@@ -52,7 +54,7 @@ impl Method {
         Self::Mitsuba,
     ];
 
-    /// As it is shown.
+    /// Name in tables and plots.
     pub fn title(self) -> &'static str {
         match self {
             Self::Receiver => "receiver",
@@ -68,12 +70,12 @@ impl Method {
     }
 }
 
-/// One measurement. Settings that a method does not have are none.
+/// One measurement. Settings that a method does not have are None.
 #[derive(Debug, Clone, Serialize)]
 pub struct Row {
     pub method: Method,
     pub hemicube: Option<u32>,
-    /// Of strong emitters.
+    /// Hemicube of strong emitters.
     pub emitter_hemicube: Option<u32>,
     /// Size of the sources over the default one, see [`crate::quality::scaled`].
     pub source_scale: Option<f64>,
@@ -82,15 +84,15 @@ pub struct Row {
     pub hemicubes: Option<u64>,
     /// Paths of each element; of instant radiosity, light paths in all.
     pub paths: Option<u32>,
-    /// At which the bake was looked at: `--residual` of the same bake.
+    /// Error bound at the time of the measurement: `--residual` of an equal bake.
     pub error_bound: Option<f64>,
-    /// Whether it ended by itself, and not by a look on its way.
+    /// Whether the bake had ended, and was not measured on its way.
     pub finished: bool,
-    /// For every element of the scene.
+    /// Time for all elements of the scene.
     pub seconds: f64,
     #[serde(flatten)]
     pub measure: Measure,
-    /// No other bake is as quick and as near.
+    /// Whether no other bake is both quicker and more accurate.
     pub best: bool,
 }
 
@@ -113,7 +115,7 @@ impl Row {
         }
     }
 
-    /// Whether two rows are the same bake at two times, or the same method.
+    /// Whether two rows are one bake at two times, or the same method.
     fn same_curve(&self, other: &Self) -> bool {
         let settings = |r: &Self| {
             let hemicubes = (r.hemicube, r.emitter_hemicube);
@@ -122,7 +124,7 @@ impl Row {
         settings(self) == settings(other)
     }
 
-    /// Settings in a few words.
+    /// The settings as text.
     pub fn settings(&self) -> String {
         let mut words = Vec::new();
         words.extend(self.hemicube.map(|n| format!("hemicube {n}")));
@@ -140,31 +142,56 @@ impl Row {
 pub struct Options {
     pub wanted: Wanted,
     pub grid: Grid,
-    /// Seconds of the places of one measurement of another method; none leaves the others out.
+    /// Most time of one measurement of another method; None leaves the others out.
     pub peers: Option<Duration>,
-    /// The Python that may have Mitsuba.
+    /// A Python interpreter that may have Mitsuba.
     pub python: PathBuf,
 }
 
 /// All that was measured of a scene.
 #[derive(Serialize)]
 struct Found<'a> {
+    #[serde(flatten)]
+    conditions: &'a Conditions<'a>,
+    rows: &'a [Row],
+    breakdown: Option<&'a Breakdown>,
+}
+
+/// What all measurements of a scene have in common.
+#[derive(Serialize)]
+struct Conditions<'a> {
     scene: &'a str,
     device: &'a str,
     elements: usize,
     places: usize,
     reference_paths: u32,
     reference_seconds: f64,
+    /// See [`Truth::noise`].
     reference_noise: f64,
-    rows: &'a [Row],
-    breakdown: Option<&'a Breakdown>,
 }
 
-/// Measures, prints, and writes `pareto.csv`, `pareto.json`, `pareto.svg` and `pareto.png` into `folder` after each bake and
-/// each other method. `go_on` may stop it; what has been measured is kept.
+impl Conditions<'_> {
+    fn print(&self) {
+        println!(
+            "{}: {} elements, {}; {} places without relief and emission, reference of {} paths each in {:.0} s, noise {:.2} %",
+            self.scene,
+            self.elements,
+            self.device,
+            self.places,
+            self.reference_paths,
+            self.reference_seconds,
+            100.0 * self.reference_noise
+        );
+    }
+}
+
+/// Measures, prints, and writes `pareto.csv`, `pareto.json`, `pareto.svg` and `pareto.png` into
+/// `folder` after each bake and each other method. When `go_on` returns false it stops and keeps
+/// what has been measured.
 ///
 /// # Errors
-/// A scene without triangles that can be compared, settings that cannot be solved, a folder that cannot be written.
+/// A scene without triangles that can be compared, settings that cannot be solved, a folder that
+/// cannot be written.
 pub fn run(
     device: &Arc<Device>,
     scene: &Scene,
@@ -174,31 +201,36 @@ pub fn run(
 ) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, e))?;
     let fine = displace(scene);
-    let Some(truth) = Truth::of((scene, &fine), &options.wanted, folder, &go_on)? else {
+    let Some(truth) = Truth::of(scene, &fine, &options.wanted, folder, &go_on)? else {
         return Ok(());
     };
-    println!(
-        "{}: {} elements, {}; {} places without relief and emission, reference of {} paths each in {:.0} s, noise {:.2} %",
-        scene.name,
-        scene.triangles.len(),
-        device.name(),
-        truth.triangles.len(),
-        options.wanted.paths,
-        truth.seconds,
-        100.0 * truth.noise()
-    );
+    let conditions = Conditions {
+        scene: &scene.name,
+        device: device.name(),
+        elements: scene.triangles.len(),
+        places: truth.triangles.len(),
+        reference_paths: options.wanted.paths,
+        reference_seconds: truth.seconds,
+        reference_noise: truth.noise(),
+    };
+    conditions.print();
     println!("{HEADER}");
+    let save = |rows: &[Row], breakdown: Option<&Breakdown>| {
+        let found = Found {
+            conditions: &conditions,
+            rows,
+            breakdown,
+        };
+        write(&found, folder)
+    };
     let mut rows: Vec<Row> = Vec::new();
     let mut closest: Option<(f64, Done)> = None;
-    let mut told = None;
-    let save = |rows: &[Row], told: Option<&Breakdown>| {
-        write((scene, device, options), &truth, (rows, told), folder)
-    };
+    let mut breakdown = None;
     for trial in options.grid.tries(scene) {
         if !go_on() {
             break;
         }
-        let done = trial.bake((device, scene, &options.grid), &truth, &go_on)?;
+        let done = trial.bake(device, scene, &options.grid, &truth, &go_on)?;
         rows.extend(done.rows.iter().cloned());
         mark(&mut rows);
         if let Some(last) = done.rows.last() {
@@ -207,11 +239,11 @@ pub fn run(
                 .as_ref()
                 .is_none_or(|(rms, _)| last.measure.rms < *rms)
             {
-                told = Some(Breakdown::new(scene, &done, &truth));
+                breakdown = Some(Breakdown::new(scene, &done, &truth));
                 closest = Some((last.measure.rms, done));
             }
         }
-        save(&rows, told.as_ref())?;
+        save(&rows, breakdown.as_ref())?;
     }
     if let Some(limit) = options.peers.filter(|_| go_on()) {
         let job = Job {
@@ -229,20 +261,24 @@ pub fn run(
         if let Some(why) = job.mitsuba(&options.python, &folder.join("mitsuba"), &mut add)? {
             println!("Mitsuba 3 is left out: {why}");
         }
-        save(&rows, told.as_ref())?;
+        save(&rows, breakdown.as_ref())?;
     }
+    print_best(&rows);
+    if let (Some(breakdown), Some((_, done))) = (&breakdown, &closest) {
+        let of = done.rows.last().map_or(String::new(), Row::settings);
+        println!("\nerror of the closest bake ({of}) over the mean irradiance:");
+        breakdown.print();
+    }
+    Ok(())
+}
+
+fn print_best(rows: &[Row]) {
     println!("\nbest settings, none of which is slower and further off than another:\n{HEADER}");
     let mut best: Vec<&Row> = rows.iter().filter(|r| r.best).collect();
     best.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
     for row in best {
         println!("{}", line(row));
     }
-    if let (Some(told), Some((_, done))) = (&told, &closest) {
-        let of = done.rows.last().map_or(String::new(), Row::settings);
-        println!("\nerror of the closest bake ({of}) over the mean irradiance:");
-        told.print();
-    }
-    Ok(())
 }
 
 /// Marks the best bakes.
@@ -279,33 +315,17 @@ fn line(row: &Row) -> String {
     )
 }
 
-fn write(
-    (scene, device, options): (&Scene, &Device, &Options),
-    truth: &Truth,
-    (rows, breakdown): (&[Row], Option<&Breakdown>),
-    folder: &Path,
-) -> Result<()> {
-    let found = Found {
-        scene: &scene.name,
-        device: device.name(),
-        elements: scene.triangles.len(),
-        places: truth.triangles.len(),
-        reference_paths: options.wanted.paths,
-        reference_seconds: truth.seconds,
-        reference_noise: truth.noise(),
-        rows,
-        breakdown,
-    };
+fn write(found: &Found<'_>, folder: &Path) -> Result<()> {
     let json = folder.join("pareto.json");
     let text =
-        serde_json::to_string_pretty(&found).map_err(|e| Error::file(&json, e.to_string()))?;
+        serde_json::to_string_pretty(found).map_err(|e| Error::file(&json, e.to_string()))?;
     write_atomically(&json, |out| out.write_all(text.as_bytes()))?;
     write_atomically(&folder.join("pareto.csv"), |out| {
         writeln!(
             out,
             "method,hemicube,emitter_hemicube,source_scale,directions,sources,hemicubes,paths,error_bound,finished,seconds,rms,rms_low,rms_high,bias,bias_interval,best"
         )?;
-        for r in rows {
+        for r in found.rows {
             fn cell<T: ToString>(value: Option<T>) -> String {
                 value.map_or(String::new(), |v| v.to_string())
             }
@@ -334,6 +354,9 @@ fn write(
         }
         Ok(())
     })?;
-    let caption = format!("{}, {} elements", scene.name, scene.triangles.len());
-    plot::write(rows, &caption, folder)
+    let caption = format!(
+        "{}, {} elements",
+        found.conditions.scene, found.conditions.elements
+    );
+    plot::write(found.rows, &caption, folder)
 }

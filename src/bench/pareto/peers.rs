@@ -1,7 +1,8 @@
-//! The same irradiance by other methods: the path tracer, instant radiosity, and Mitsuba 3 where it is installed.
+//! The same irradiance by other methods: the path tracer, instant radiosity, and Mitsuba 3 where it
+//! is installed.
 //!
-//! They find the places alone, so that a small part of the elements' work is done: their time is that for every element, which
-//! grows with the number of places. What is done once, such as walking light paths, counts once.
+//! They compute only the places, a small part of the elements. Their time is scaled to all
+//! elements; work that is done once, such as tracing light paths, counts once.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -27,15 +28,16 @@ const FIRST_PATHS: u32 = 4;
 /// Most paths that are tried.
 const MOST_PATHS: u32 = 1 << 20;
 
-/// Other random numbers than the reference's.
+/// Seed, different from the reference's.
 const SEED: u64 = 0x5eed << 32;
 
-/// The script that asks Mitsuba.
+/// The script that runs Mitsuba.
 const MITSUBA: &str = include_str!("../../../tests/peers/mitsuba_irradiance.py");
 
-/// What the peers are given.
+/// Input of the peers.
 pub(super) struct Job<'a> {
-    /// Whose elements' centroids are the places, and the same with its relief as geometry.
+    /// The scene whose elements' centroids are the places, and the scene with its relief as
+    /// geometry.
     pub scene: &'a Scene,
     pub fine: &'a Scene,
     pub truth: &'a Truth,
@@ -44,7 +46,7 @@ pub(super) struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// Elements for each place.
+    /// Number of elements per place.
     fn share(&self) -> f64 {
         self.scene.triangles.len() as f64 / self.truth.triangles.len() as f64
     }
@@ -116,7 +118,8 @@ impl Job<'_> {
         }
     }
 
-    /// Mitsuba 3 in a process of its own, which reads the scene from `folder`. Where it cannot run, the reason in one line.
+    /// Mitsuba 3 in a separate process, which reads the scene from `folder`. Returns the reason in
+    /// one line where it cannot run.
     pub fn mitsuba(
         &self,
         python: &Path,
@@ -169,7 +172,7 @@ impl Job<'_> {
     }
 }
 
-/// What Mitsuba's script is told beside the mesh.
+/// Input of Mitsuba's script besides the mesh.
 #[derive(Serialize)]
 struct Ask {
     materials: Vec<Surface>,
@@ -195,7 +198,7 @@ struct Point {
     intensity: [f32; 3],
 }
 
-/// A line of its answer.
+/// A line of the script's output.
 #[derive(Deserialize)]
 struct Answer {
     paths: u32,

@@ -1,4 +1,5 @@
-//! Error against time, both axes logarithmic: points with their intervals, and the front of our bakes.
+//! Error against time, both axes logarithmic: points with their intervals, and the front of our
+//! bakes.
 
 use std::path::Path;
 
@@ -15,7 +16,8 @@ const SIZE: (u32, u32) = (1400, 960);
 
 type Drawn = std::result::Result<(), Box<dyn std::error::Error>>;
 
-/// Writes `pareto.svg` and `pareto.png` into `folder`. Without a measurement above 0 there is nothing to draw.
+/// Writes `pareto.svg` and `pareto.png` into `folder`. Without a measurement above 0 there is
+/// nothing to draw.
 pub(super) fn write(rows: &[Row], caption: &str, folder: &Path) -> Result<()> {
     let bad = |path: &Path, e: Box<dyn std::error::Error>| {
         Error::file(path, format!("cannot be drawn: {e}"))
@@ -48,7 +50,7 @@ fn colour(method: Method) -> RGBColor {
     }
 }
 
-/// Ends of an axis that holds the values; it begins at a power of ten, where its marks do.
+/// Ends of an axis that contains the values; it begins at a power of ten, as its marks do.
 fn ends(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
     let (low, high) = values
         .filter(|&v| v > 0.0)
@@ -92,7 +94,7 @@ where
         if of_method.is_empty() {
             continue;
         }
-        // One curve for each setting that was looked at over time; one for all numbers of paths.
+        // One curve for each setting over time; one for all numbers of paths.
         for curve in of_method.chunk_by(|a, b| a.same_curve(b)) {
             let points: Vec<_> = curve.iter().map(|r| place(r)).collect();
             chart.draw_series([PathElement::new(points, colour.mix(0.35))])?;

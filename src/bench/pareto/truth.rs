@@ -8,7 +8,6 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::measure::mean;
 use crate::atomic_file::write_atomically;
 use crate::bench::irradiance::{place_of, places};
 use crate::error::{Error, Result};
@@ -16,10 +15,10 @@ use crate::path_tracer::PathTracer;
 use crate::render::Light;
 use crate::scene::Scene;
 
-/// Changes whenever the reference would be another one.
+/// Incremented when the reference's values change.
 const VERSION: &str = "1";
 
-/// Places that are traced between two looks at whether to go on.
+/// Places that are traced between two calls of `go_on`.
 const CHUNK: usize = 16;
 
 /// Irradiance at the centroids of chosen triangles, `[place]`, W·m⁻², RGB, with its standard error.
@@ -29,10 +28,10 @@ pub struct Truth {
     pub triangles: Vec<usize>,
     pub global: Vec<Vec3>,
     pub global_error: Vec<Vec3>,
-    /// What comes straight from emitters and point lights.
+    /// Light straight from emitters and point lights.
     pub direct: Vec<Vec3>,
     pub direct_error: Vec<Vec3>,
-    /// That it took to trace.
+    /// Time of tracing.
     pub seconds: f64,
 }
 
@@ -55,10 +54,12 @@ pub struct Wanted {
 }
 
 impl Truth {
-    /// Reads the reference of `scene` from `folder`, or traces it in `fine`, the scene with its relief as geometry, and keeps it.
-    /// None when `go_on` said no.
+    /// Reads the reference of `scene` from `folder`; where there is none, traces it in `fine`, the
+    /// scene with its relief as geometry, and keeps it in `folder`. None when `go_on` returned
+    /// false.
     pub fn of(
-        (scene, fine): (&Scene, &Scene),
+        scene: &Scene,
+        fine: &Scene,
         wanted: &Wanted,
         folder: &Path,
         go_on: &impl Fn() -> bool,
@@ -76,7 +77,7 @@ impl Truth {
             if !go_on() {
                 return Ok(None);
             }
-            // A triangle that comes again has other paths.
+            // A triangle that is chosen again gets other paths.
             let trace = |(i, e): (usize, usize), light| {
                 let (centroid, normal) = place_of(scene, e);
                 let seed = (wanted.seed << 32) | i as u64;
@@ -117,7 +118,7 @@ impl Truth {
         Ok(Some(truth))
     }
 
-    /// A kept reference; none where there is none, or one that is damaged, which is then traced again.
+    /// A kept reference; None where there is none or it is damaged: it is then traced again.
     fn load(path: &Path, triangles: &[usize]) -> Option<Self> {
         let text = std::fs::read(path).ok()?;
         let kept: Kept = serde_json::from_slice(&text).ok()?;
@@ -150,13 +151,19 @@ impl Truth {
         (sum / (3.0 * self.global.len() as f64)).sqrt() / mean(&self.global)
     }
 
-    /// The values of chosen places out of `[triangle]`.
+    /// The values at the places, from values `[triangle]`.
     pub fn at_places(&self, values: &[Vec3]) -> Vec<Vec3> {
         self.triangles.iter().map(|&e| values[e]).collect()
     }
 }
 
-/// Sixteen digits that tell references apart.
+/// Mean of the reference, over places and colours, W·m⁻².
+pub fn mean(truth: &[Vec3]) -> f64 {
+    let sum: f64 = truth.iter().map(|t| t.as_dvec3().element_sum()).sum();
+    sum / (3.0 * truth.len() as f64)
+}
+
+/// Sixteen digits that identify a reference.
 fn identity(scene: &Scene, wanted: &Wanted) -> String {
     let mut hash = Sha256::new();
     let Wanted {

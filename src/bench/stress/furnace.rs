@@ -2,11 +2,11 @@
 
 use glam::{DVec3, Vec3};
 
-use super::shapes::Shapes;
 use super::{Case, Check, Context, Size, furnace_material, settings};
 use crate::elements::Elements;
 use crate::error::Result;
 use crate::quality::Quality;
+use crate::scene::shapes::Shapes;
 use crate::solver::Settings;
 use crate::sources::Grouping;
 
@@ -21,12 +21,12 @@ pub(super) const OCCLUDERS: Case = Case {
     run: occluders,
 };
 
-/// Asked for at ρ = 0.999.
+/// Limit at ρ = 0.999.
 const NEARLY_WHITE_MEAN: f64 = 1e-3;
-/// Asked for with occluders, at high quality.
+/// Limit with occluders, at high quality.
 const OCCLUDERS_RMS: f64 = 1e-3;
 const OCCLUDERS_MOST: f64 = 5e-3;
-/// At the small size, with 128² pixels and larger sources: what tests/furnace.rs holds.
+/// At the small size, with 128² pixels and larger sources: as in tests/furnace.rs.
 const SMALL_RMS: f64 = 3e-3;
 const SMALL_MOST: f64 = 2e-2;
 
@@ -41,7 +41,7 @@ fn nearly_white(context: &Context) -> Result<Vec<Check>> {
     shapes.room(DVec3::ZERO, DVec3::new(1.0, 0.9, 1.1), n, material);
     let bake = Settings {
         residual: 0.5,
-        // A shot for each square: the light comes back a thousand times.
+        // One shot for each square: the light is reflected about a thousand times.
         grouping: Grouping {
             max_area: 1.0 / 24.0,
             max_power: 1.0 / 24.0,
@@ -64,8 +64,8 @@ fn nearly_white(context: &Context) -> Result<Vec<Check>> {
     ])
 }
 
-/// A box of n × n squares a side with two balls of 20 · 4^levels triangles, ρ at random in 0..most for each element and
-/// colour, emission 1 − ρ.
+/// A box of n × n squares a side with two balls of 20 · 4^levels triangles, ρ at random in 0..most
+/// for each element and colour, emission 1 − ρ.
 pub fn occluded_elements(n: u32, levels: u32, most: f32) -> Elements {
     let mut shapes = Shapes::new();
     shapes.room(DVec3::ZERO, DVec3::ONE, n, 0);

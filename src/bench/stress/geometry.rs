@@ -1,14 +1,14 @@
-//! Surfaces that touch, cross, hide one another by a hair, or are too small to see.
+//! Surfaces that touch, cross, lie very close together, or are tiny.
 
 use std::f32::consts::PI;
 
 use glam::DVec3;
 
-use super::shapes::Shapes;
 use super::{Case, Check, Context, Size, furnace_limit, furnace_material, settings};
 use crate::error::Result;
 use crate::path_tracer::{NORMAL_95, PathTracer};
 use crate::render::Light;
+use crate::scene::shapes::Shapes;
 use crate::solver::Settings;
 
 pub(super) const TOUCHING: Case = Case {
@@ -37,19 +37,20 @@ pub(super) const ONE_PIXEL: Case = Case {
     run: one_pixel,
 };
 
-/// Contacts: what tests/furnace.rs holds for the largest error with balls afloat.
+/// Contacts: the limit of tests/furnace.rs for the largest error with floating balls.
 const CONTACT_MOST: f64 = 2e-2;
-/// Elements through which the other ball's surface goes send the mean of a lit and a dark part, and their neighbours see it.
+/// Elements crossed by the other ball's surface send the mean of a lit and a dark part, which
+/// affects their neighbours.
 const CROSSING_MEAN: f64 = 1e-2;
-/// Light that comes through a rim of 1e-3 of an element, and what visibility lets through.
+/// Light through a gap of 1e-3 of an element, and the tolerance of visibility.
 const LEAK: f64 = 1e-2;
-/// At such a gap the lamp fills the hemisphere but for 1e-3 of it.
+/// At this gap the lamp fills all but 1e-3 of the hemisphere.
 const FULL: f64 = 1e-2;
-/// Elements of an eighth hold half shadows within them.
+/// Elements of an eighth have penumbrae within them.
 const SHADOW_BIAS: f64 = 0.02;
-/// The two sheets are the same item but for its winding.
+/// The two sheets differ only in their winding.
 const EITHER_WAY: f64 = 1e-6;
-/// All of the ball lies in one or two pixels; its rms is one of plain and far elements.
+/// The whole ball covers one or two pixels; its rms is that of plain and far elements.
 const TINY_RMS: f64 = 1e-2;
 
 fn touching(context: &Context) -> Result<Vec<Check>> {
@@ -118,7 +119,7 @@ fn thin_gap(context: &Context) -> Result<Vec<Check>> {
     };
     let (behind, open) = lit(false)?;
     let (facing, _) = lit(true)?;
-    // Of light that the lamp sends and the ceiling sends back none is sent again: the lamp is black.
+    // The lamp is black: light that the ceiling reflects to it is not reflected again.
     Ok(vec![
         Check::at_most("behind the lamp over beside it", behind / open, LEAK),
         Check::at_most(
@@ -184,8 +185,8 @@ fn one_pixel(context: &Context) -> Result<Vec<Check>> {
     let mut shapes = Shapes::new();
     let material = furnace_material(&mut shapes, 0.6);
     let sides = shapes.room(DVec3::ZERO, DVec3::ONE, 6, material);
-    // A pixel in the middle of a face is 2/16 of its distance wide. The walls' emission is drawn as well: shadow rays would aim at
-    // each of the ball's elements.
+    // A pixel in the middle of a face is 2/16 of its distance wide. The walls' emission is drawn as
+    // well: shadow rays would aim at each of the ball's elements.
     let coarse = Settings {
         hemicube: 16,
         emitter_hemicube: Some(16),

@@ -1,12 +1,12 @@
-//! Triangles as no one should make them.
+//! Badly shaped triangles.
 
 use glam::DVec3;
 
-use super::shapes::Shapes;
 use super::{Case, Check, Context, Size, furnace_limit, furnace_material, settings, through_files};
 use crate::bench::irradiance;
 use crate::error::Result;
 use crate::scene::Scene;
+use crate::scene::shapes::Shapes;
 use crate::solver::Settings;
 
 pub(super) const SLIVERS: Case = Case {
@@ -40,10 +40,10 @@ pub(super) const NON_MANIFOLD: Case = Case {
     run: non_manifold,
 };
 
-/// Two solutions whose last shots fell in another order differ by what they left unshot, and sources cut at other triangles
-/// have other hemicubes, of 64² pixels here.
+/// Two solutions with another order of their last shots differ by their unshot light, and sources
+/// cut at other triangles have other hemicubes, of 64² pixels here.
 const REORDERED: f64 = 1e-5;
-/// Bias and rms against paths: squares of an eighth of the room hold half shadows within them.
+/// Bias and rms against paths: squares of an eighth of the room have penumbrae within them.
 const BIAS: f64 = 0.02;
 const RMS: f64 = 0.10;
 

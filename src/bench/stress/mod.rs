@@ -1,6 +1,6 @@
-//! `mesolux bench stress`: scenes at the ends of what numbers and meshes can do.
+//! `mesolux bench stress`: scenes with extreme numbers and meshes.
 //!
-//! Each case asks for something extreme and measures what comes out against a closed form, an invariance or the path
+//! Each case compares the result of an extreme scene with a closed form, an invariance or the path
 //! tracer. `tests/stress.rs` runs the same cases in their small size.
 
 mod furnace;
@@ -8,7 +8,6 @@ mod geometry;
 mod meshes;
 mod numbers;
 mod relief;
-pub mod shapes;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -22,6 +21,7 @@ use crate::atomic_file::write_atomically;
 use crate::bake;
 use crate::elements::Elements;
 use crate::error::{Error, Result};
+use crate::scene::shapes::Shapes;
 use crate::scene::{BuiltinOptions, PointLight, Scene, load, write_scene};
 use crate::solver::{Report, Settings, Solver};
 use crate::vk::Device;
@@ -33,11 +33,11 @@ pub use furnace::occluded_elements;
 pub enum Size {
     /// Seconds a case, for tests.
     Small,
-    /// As the list asks.
+    /// The sizes of the list.
     Full,
 }
 
-/// What a case solves with.
+/// Device and size of a case.
 pub struct Context {
     pub device: Arc<Device>,
     pub size: Size,
@@ -60,12 +60,12 @@ impl Check {
         }
     }
 
-    /// What must be so: 0 if it is, else 1.
+    /// A condition: 0 if it holds, else 1.
     fn holds(what: impl Into<String>, holds: bool) -> Self {
         Self::at_most(what, f64::from(u8::from(!holds)), 0.0)
     }
 
-    /// Whether the value is within the limit; what is no number never is.
+    /// Whether the value is within the limit; NaN never is.
     pub fn passes(&self) -> bool {
         self.value <= self.limit
     }
@@ -85,7 +85,7 @@ impl std::fmt::Display for Check {
 /// One entry of the list.
 pub struct Case {
     pub name: &'static str,
-    /// What is asked, and what it is measured against.
+    /// The requirement, and its reference.
     pub asked: &'static str,
     run: fn(&Context) -> Result<Vec<Check>>,
 }
@@ -116,24 +116,24 @@ pub const CASES: [Case; 22] = [
     relief::EXTREME_HEIGHTS,
 ];
 
-/// What came of a case.
+/// The result of a case.
 #[derive(Debug, Clone, Serialize)]
 pub struct Verdict {
     pub name: &'static str,
     pub asked: &'static str,
     pub checks: Vec<Check>,
-    /// Of a case that ended early, why.
+    /// The reason why a case ended early.
     pub error: Option<String>,
     pub seconds: f64,
 }
 
 impl Verdict {
-    /// Whether all that was asked came out.
+    /// Whether all requirements are met.
     pub fn passes(&self) -> bool {
         self.error.is_none() && self.checks.iter().all(Check::passes)
     }
 
-    /// What came out, in words.
+    /// The result in words.
     pub fn found(&self) -> String {
         let mut parts: Vec<String> = self.checks.iter().map(Check::to_string).collect();
         parts.extend(self.error.clone());
@@ -142,7 +142,7 @@ impl Verdict {
 }
 
 impl Case {
-    /// Runs it. An error and a panic are verdicts too.
+    /// Runs the case. An error or a panic is a failure.
     pub fn verdict(&self, context: &Context) -> Verdict {
         let start = Instant::now();
         let run = catch_unwind(AssertUnwindSafe(|| (self.run)(context)));
@@ -161,8 +161,8 @@ impl Case {
     }
 }
 
-/// Runs the cases whose names contain `only`, prints each, and writes `stress.json` and `stress.csv` into `folder` if one is
-/// given. Returns how many failed.
+/// Runs the cases whose names contain `only`, prints each, and writes `stress.json` and
+/// `stress.csv` into `folder` if one is given. Returns how many failed.
 ///
 /// # Errors
 /// Files that cannot be written.
@@ -235,7 +235,7 @@ impl Solved {
         sum / area
     }
 
-    /// Rms by area, and largest, of how far radiosities are from 1, all colours.
+    /// Rms by area, and maximum, of the deviation of radiosities from 1, over all colours.
     fn off_one(&self, chosen: impl IntoIterator<Item = usize>) -> (f64, f64) {
         let (mut sum, mut area, mut most) = (0.0, 0.0, 0.0f64);
         for e in chosen {
@@ -264,7 +264,7 @@ impl Context {
         self.solve_elements(elements, &scene.point_lights, settings)
     }
 
-    /// Refuses a solution that holds what is no number, or negative light: no case may take it for an answer.
+    /// Rejects a solution with NaN or negative light, in every case.
     fn solve_elements(
         &self,
         elements: Elements,
@@ -307,23 +307,24 @@ fn settings() -> Settings {
     }
 }
 
-/// The scene as it is after it has been written and read again: by the whole program's way.
+/// The scene written to files and read again, as by the whole program.
 fn through_files(scene: &Scene) -> Result<Scene> {
     let folder = tempfile::tempdir().map_err(|e| Error::write(&std::env::temp_dir(), e))?;
     let path = write_scene(scene, folder.path())?;
     load(&path.to_string_lossy(), &BuiltinOptions::default())
 }
 
-/// Form factors of one receiver onto a closed scene sum to 1 within this: near and far sources are integrated with different
-/// points of the receiver, by rules of degree 1, 2 and 5, in rooms of 2 to 12 squares a side.
+/// Form factors of one receiver onto a closed scene sum to 1 within this: near and far sources are
+/// integrated with different points of the receiver, by rules of degree 1, 2 and 5, in rooms of 2
+/// to 12 squares a side.
 const ROWS: f64 = 1.5e-3;
 
-/// Largest error of a furnace in which nothing hides anything: what each bounce loses or gains, over all bounces.
+/// Largest error of a furnace without occlusion: the error of one bounce, summed over all bounces.
 fn furnace_limit(rho: f64) -> f64 {
     ROWS / (1.0 - rho)
 }
 
 /// Reflectance ρ with the emission 1 − ρ, with which a closed scene has the radiosity 1 everywhere.
-fn furnace_material(shapes: &mut shapes::Shapes, rho: f32) -> u32 {
+fn furnace_material(shapes: &mut Shapes, rho: f32) -> u32 {
     shapes.material(rho, (1.0 - rho) / std::f32::consts::PI)
 }

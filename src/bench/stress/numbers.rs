@@ -1,13 +1,13 @@
-//! Lengths, emission and reflectance from one end of their range to the other.
+//! Lengths, emission and reflectance at the ends of their ranges.
 
 use std::f32::consts::PI;
 
 use glam::DVec3;
 
-use super::shapes::Shapes;
 use super::{Case, Check, Context, ROWS, Size, settings, through_files};
 use crate::error::Result;
 use crate::scene::Scene;
+use crate::scene::shapes::Shapes;
 use crate::solver::{Settings, StopReason};
 
 pub(super) const SCALE: Case = Case {
@@ -46,16 +46,18 @@ pub(super) const MANY_SHOTS: Case = Case {
     run: many_shots,
 };
 
-/// Light of two solutions whose last shots fell in another order differs by what they left unshot.
+/// Light of two solutions with another order of their last shots differs by their unshot light.
 const REORDERED: f64 = 1e-5;
-/// A sphere of 1,280 flat triangles is not the sphere: its form factors err by some 0.3 % of it.
+/// A sphere of 1,280 flat triangles approximates the sphere: its form factors differ by about 0.3
+/// %.
 const SPHERE: f64 = 3e-3;
-/// Energy on the lid: of six sides one takes light, so that it comes back six times over, and the residual of 1e-3.
+/// Energy on the lid: one of six sides absorbs light, so that light passes about six times, and the
+/// residual is 1e-3.
 const ENERGY: f64 = 6.0 * ROWS + 1e-3;
-/// Asked for.
+/// Limit set for this case.
 const DRIFT: f64 = 1e-6;
 
-/// Far below what is asked, since with the last bit of a power the order of two like sources may change.
+/// Not exact, since the last bit of a power may change the order of two equal sources.
 fn fine() -> Settings {
     Settings {
         residual: 3e-6,
@@ -63,7 +65,8 @@ fn fine() -> Settings {
     }
 }
 
-/// A room with a ball, a lamp and a point light, whose emission is `power` times that of the plain one.
+/// A room with a ball, a lamp and a point light, whose emission is `power` times that of the plain
+/// one.
 fn room(power: f32) -> Shapes {
     let mut shapes = Shapes::new();
     let light = shapes.material(0.3, 1.5 * power);
@@ -95,7 +98,7 @@ fn scale(context: &Context) -> Result<Vec<Check>> {
 }
 
 fn offset(context: &Context) -> Result<Vec<Check>> {
-    // Multiples of 2^-20 are held at 10^6 as they are at 0.
+    // Multiples of 2^-20 are exact at 10^6 as at 0.
     let held = |offset: f64| {
         let mut scene = room(1.0).scene;
         for v in &mut scene.vertices {
@@ -161,7 +164,7 @@ fn black(context: &Context) -> Result<Vec<Check>> {
     let dark = shapes.material(0.0, 0.0);
     let lit = shapes.material(0.0, 1.0 / PI);
     let all = shapes.sphere(DVec3::ZERO, 1.0, 3, false, dark);
-    // Cuts the sphere in halves of the same area; no triangle has its centroid in the plane.
+    // Cuts the sphere into halves of equal area; no triangle has its centroid in the plane.
     let axis = DVec3::new(0.31, 0.87, 0.23);
     for e in all.clone() {
         let t = shapes.scene.triangles[e];
@@ -192,7 +195,7 @@ fn white(context: &Context) -> Result<Vec<Check>> {
     for t in &mut shapes.scene.triangles[sides[1].clone()] {
         t.material = white;
     }
-    // Nothing takes light here, so that only a number of shots can end it.
+    // Nothing absorbs light here, so that only a limit of shots ends the bake.
     let shots = Settings {
         shots: Some(4096),
         ..settings()
@@ -210,7 +213,8 @@ fn white(context: &Context) -> Result<Vec<Check>> {
 }
 
 fn many_shots(context: &Context) -> Result<Vec<Check>> {
-    // Each light shoots once for each half of its sphere. A power of two, so that their shares are exact.
+    // Each light shoots once for each half of its sphere. A power of two, so that their shares are
+    // exact.
     let count = match context.size {
         Size::Full => 1 << 16,
         Size::Small => 1 << 11,

@@ -1,11 +1,11 @@
-//! Height maps as no one should paint them.
+//! Extreme height maps.
 
 use glam::DVec3;
 
-use super::shapes::Shapes;
 use super::{Case, Check, Context, Solved, furnace_material, settings};
 use crate::error::{Error, Result};
 use crate::scene::HeightMap;
+use crate::scene::shapes::Shapes;
 
 pub(super) const MAP_SHAPES: Case = Case {
     name: "map_shapes",
@@ -18,7 +18,7 @@ pub(super) const EXTREME_HEIGHTS: Case = Case {
     run: extreme_heights,
 };
 
-/// What tests/relief_transport.rs holds for a furnace with relief.
+/// Limit of tests/relief_transport.rs for a furnace with relief.
 const RELIEF_MOST: f64 = 2e-2;
 
 /// A closed furnace whose floor has that relief, four repeats a side.
@@ -49,7 +49,7 @@ fn map_shapes(context: &Context) -> Result<Vec<Check>> {
     let none = solve(&room(|_, _| {}))?;
     let one = solve(&room(|s, m| s.relief_of(m, (1, 1), |_, _| 0.3)))?;
     let narrow = solve(&room(|s, m| s.relief_of(m, (4, 64), bumps)))?;
-    // Two codes that 8 bits do not tell apart.
+    // Two codes that are equal in 8 bits.
     let folder = tempfile::tempdir().map_err(|e| Error::write(&std::env::temp_dir(), e))?;
     let path = folder.path().join("heights.png");
     let codes: Vec<u16> = (0..16 * 16)

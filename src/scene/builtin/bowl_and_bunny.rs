@@ -14,7 +14,7 @@ const NAME: &str = "bowl-and-bunny";
 const PATCHES: usize = 73_256;
 const SHARE: f64 = 0.21;
 const BOWL_SHARE: f64 = 0.16;
-/// Fewer lose the bunny's ears.
+/// With fewer the bunny loses its ears.
 const LEAST_PATCHES: usize = 6_000;
 
 /// Metres. The light's rectangle is part of the ceiling here.
@@ -27,8 +27,8 @@ const BUNNY_HEIGHT: f64 = 0.26;
 const BUNNY_TURN: f64 = -25.0;
 const BUNNY_FOOT: DVec3 = DVec3::new(0.71, 1e-3, 0.46);
 const BOWL_FOOT: DVec3 = DVec3::new(0.46, 1e-3, 0.40);
-/// Tiles of knit a metre, and how deep it is in metres: a texel is about a third of an element's edge in the default
-/// number, and the slope of the relief 0.27 in the root mean square.
+/// Tiles of knit a metre, and its depth in metres: a texel is about a third of an element's edge in
+/// the default number, and the rms slope of the relief is 0.27.
 const REPEATS: f64 = 11.0;
 const HEIGHT: f32 = 0.0014;
 

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::round_cone::{RoundCone, cone, figure};
 
-/// On the plane x = 0; units of its own, the head looks towards −z, y is up.
+/// Parts on the plane x = 0. The bunny has units of its own; the head looks towards −z, y is up.
 const TRUNK: [RoundCone; 5] = [
     // Rump to chest.
     cone([0.0, 0.34, 0.16], 0.30, [0.0, 0.52, -0.08], 0.235),
@@ -16,7 +16,7 @@ const TRUNK: [RoundCone; 5] = [
     cone([0.0, 0.22, 0.50], 0.09, [0.0, 0.26, 0.53], 0.085),
 ];
 
-/// On the side of positive x; the other side mirrors them.
+/// Parts at positive x, mirrored to the other side.
 const LIMBS: [RoundCone; 7] = [
     // Ear.
     cone([0.075, 1.00, -0.12], 0.050, [0.115, 1.30, -0.07], 0.074),
@@ -32,7 +32,7 @@ const LIMBS: [RoundCone; 7] = [
 ];
 
 const BLEND: f64 = 0.06;
-/// A box around all of it.
+/// A box around the figure.
 pub(super) const LOW: DVec3 = DVec3::new(-0.48, -0.05, -0.52);
 pub(super) const HIGH: DVec3 = DVec3::new(0.48, 1.62, 0.68);
 

@@ -1,4 +1,5 @@
-//! The Cornell box (Goral et al. 1984; measured data of Cornell's Program of Computer Graphics) with a statue in it.
+//! The Cornell box (Goral et al. 1984; measured data of Cornell's Program of Computer Graphics)
+//! with a statue.
 
 use glam::DVec3;
 
@@ -10,7 +11,7 @@ use crate::scene::assemble::Assembly;
 use crate::scene::uv::box_projection;
 use crate::scene::{BuiltinOptions, Camera, Material, Scene, check};
 
-/// Elements if nothing else is asked for.
+/// Default number of elements.
 const PATCHES: usize = 12_000;
 /// The measured box.
 pub(super) const ROOM: Room = Room {
@@ -20,9 +21,9 @@ pub(super) const ROOM: Room = Room {
 };
 /// The greatest extent of the statue over the height of the room.
 pub(super) const STATUE_SIZE: f64 = 0.6;
-/// Turns a head that looks towards −z, to the camera, to the left and half towards it.
+/// Degrees that turn a head that looks towards −z, at the camera, to the left and halfway back.
 pub(super) const STATUE_TURN: f64 = -60.0;
-/// Triangles of the statue made by code: fewer lose the ears, more show no more of it.
+/// Triangles of the statue made by code: with fewer it loses its ears, more show no more detail.
 const STATUE_TRIANGLES: std::ops::RangeInclusive<usize> = 3_000..=25_780;
 
 /// Builds the box in exactly `options.patches` elements, statue and light included.
@@ -40,7 +41,8 @@ pub(super) fn build(options: &BuiltinOptions) -> Result<Scene> {
     stage::place(&mut mesh, STATUE_SIZE * ROOM.size.y, STATUE_TURN, FOOT);
     for triangle in &mut mesh.triangles {
         triangle.material = STATUE_MATERIAL;
-        // Of a mesh from a file the person is told that coordinates were made up; here there is nothing to tell.
+        // The note about made-up texture coordinates is for meshes from files; it does not apply
+        // here.
         if options.statue.is_none() {
             let corners = triangle.corners.map(|v| mesh.positions[v as usize]);
             triangle.uv = Some(box_projection(corners));
@@ -48,7 +50,7 @@ pub(super) fn build(options: &BuiltinOptions) -> Result<Scene> {
     }
     let statue = stage::count(&mesh);
     let least = statue + grid::least_triangles();
-    // Only a statue that was asked for may need more than the patches that were not.
+    // Only a statue given by the user may need more than the default number of patches.
     let patches = match options.patches {
         None => patches.max(2 * statue),
         Some(patches) if patches < least => {

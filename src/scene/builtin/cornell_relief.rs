@@ -10,11 +10,12 @@ use crate::scene::{BuiltinOptions, Material, Scene};
 const NAME: &str = "cornell-relief";
 const PATCHES: usize = 83_160;
 const SHARE: f64 = 0.31;
-/// Fewer lose the horse's ears.
+/// With fewer the horse loses its ears.
 const LEAST_PATCHES: usize = 8_000;
-/// Tiles of hammered metal a metre: a texel is about a third of an element's edge in the default number.
+/// Tiles of hammered metal a metre: a texel is about a third of an element's edge in the default
+/// number.
 const REPEATS: f64 = 1.35;
-/// Metres. The slope of the relief is 0.27 in the root mean square.
+/// Metres. The rms slope of the relief is 0.27.
 const HEIGHT: f32 = 0.03;
 
 /// Builds the room of `cornell` with a horse that has relief.

@@ -1,4 +1,5 @@
-//! The fruit of the platter. Places are metres about the middle of the dish, y above its flat inside.
+//! The fruit of the platter. Places are metres about the middle of the dish, y above its flat
+//! inside.
 
 use glam::{DVec2, DVec3};
 
@@ -22,18 +23,18 @@ pub(super) const ORANGES: [[f64; 3]; 5] = [
 ];
 
 pub(super) struct Fruit {
-    /// With a number of triangles.
+    /// A fruit with its number of triangles.
     pub build: fn(usize) -> Mesh,
     /// The middle of its underside; on the table where y is negative.
     pub at: DVec3,
-    /// Of all the triangles.
+    /// Share of all triangles.
     pub share: f64,
     /// Index into [`materials`], counted from 1.
     pub material: u32,
 }
 
 impl Fruit {
-    /// Whether a stem stands on it.
+    /// Whether it has a stem.
     pub fn has_stem(&self) -> bool {
         [RED_APPLE, GREEN_APPLE, PEAR].contains(&self.material)
     }
@@ -46,7 +47,7 @@ const BANANA: u32 = 4;
 const GRAPES: u32 = 5;
 pub(super) const STEM: u32 = 6;
 pub(super) const STEM_SHARE: f64 = 0.0012;
-/// Metres about its middle that a stem takes.
+/// Radius that a stem needs about the middle, metres.
 pub(super) const STEM_RADIUS: f64 = 0.0033;
 
 /// In the order of [`Fruit::material`].
@@ -80,7 +81,7 @@ pub(super) fn others() -> Vec<Fruit> {
     }
     all.push(fruit(pear, [-0.005, 0.0, 0.135], 0.032, PEAR));
     all.push(fruit(banana, [-0.10, -1.0, -0.328], 0.036, BANANA));
-    // A layer of hexagons and the second in its hollows.
+    // A hexagonal layer, and a second one in its hollows.
     let apart = 2.0 * GRAPE + 3e-4;
     let row = apart * 0.75_f64.sqrt();
     let low = [

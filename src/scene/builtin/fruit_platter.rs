@@ -1,4 +1,5 @@
-//! The fruit platter of the paper's Table 1: a dish of fruit on a table, oranges with a peel, an area light above.
+//! The fruit platter of the paper's Table 1: a dish of fruit on a table, oranges with a peel, an
+//! area light above.
 
 use std::sync::Arc;
 
@@ -13,13 +14,13 @@ use crate::scene::{BuiltinOptions, Camera, Material, Scene};
 
 const NAME: &str = "fruit-platter";
 const PATCHES: usize = 76_304;
-/// Of the oranges, the only ones with relief.
+/// The material of the oranges, the only one with relief.
 const SHARE: f64 = 0.15;
 const DISH_SHARE: f64 = 0.12;
-/// Fewer leave the smallest grape without a shape.
+/// With fewer the smallest grape loses its shape.
 const LEAST_PATCHES: usize = 6_000;
 
-/// Of the smallest solid.
+/// Triangles of the smallest solid.
 const LEAST_TRIANGLES: usize = 24;
 
 /// Metres; the table is its floor.
@@ -28,13 +29,13 @@ const ROOM: Room = Room {
     light_x: [0.45, 0.95],
     light_z: [0.25, 0.65],
 };
-/// Where the dish stands, and the height of its flat inside.
+/// The dish's place, and the height of its flat inside.
 const DISH_FOOT: DVec3 = DVec3::new(0.70, 1e-3, 0.52);
 const DISH_THICKNESS: f64 = 0.010;
-/// Between what lies on something and what it lies on.
+/// Gap between an object and what it lies on, metres.
 const GAP: f64 = 1e-3;
-/// Tiles of peel a metre, and how deep it is in metres: a texel is about a third of an element's edge in the default
-/// number, and the slope of the relief 0.26 in the root mean square.
+/// Tiles of peel a metre, and its depth in metres: a texel is about a third of an element's edge in
+/// the default number, and the rms slope of the relief is 0.26.
 const REPEATS: f64 = 10.0;
 const HEIGHT: f32 = 0.0024;
 
@@ -44,7 +45,7 @@ const DISH: u32 = 6;
 /// Builds the scene in exactly as many elements as asked for.
 ///
 /// # Errors
-/// Too few patches; a statue, for which there is no place.
+/// Too few patches; a statue, which this scene has no place for.
 pub(super) fn build(options: &BuiltinOptions) -> Result<Scene> {
     if options.statue.is_some() {
         return Err(Error::Usage(format!(
@@ -118,7 +119,8 @@ pub(super) fn build(options: &BuiltinOptions) -> Result<Scene> {
     stage.build(options)
 }
 
-/// Lays a fruit at a place about the middle of the dish; its y is above the flat inside, or below it for the table.
+/// Moves a fruit to a place relative to the middle of the dish; y is above the flat inside, or
+/// below it for the table.
 fn lay(mesh: &mut Mesh, at: DVec3) {
     let inside = DISH_FOOT + DVec3::Y * DISH_THICKNESS;
     let y = match at.y < 0.0 {

@@ -1,4 +1,5 @@
-//! A room with an open front as quads on shared lines, and its cut into an exact number of triangles.
+//! A room with an open front as quads on shared lines, and its cut into an exact number of
+//! triangles.
 
 use glam::DVec3;
 
@@ -6,7 +7,7 @@ use glam::DVec3;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Room {
     pub size: DVec3,
-    /// The light in the plane of the ceiling, from and to.
+    /// The light in the plane of the ceiling: its range along x and along z.
     pub light_x: [f64; 2],
     pub light_z: [f64; 2],
 }
@@ -16,7 +17,7 @@ pub(super) enum Part {
     Floor,
     Ceiling,
     Back,
-    /// At the greatest x, on the left for who looks in.
+    /// At the greatest x, on the left seen from the opening.
     Left,
     Right,
     Light,
@@ -28,7 +29,14 @@ struct Quad {
     part: Part,
 }
 
-/// Cells along each stretch of an axis. The lines are the same on every surface they meet, so no edge ends within
+/// A triangle of the room, counter-clockwise seen from inside.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Piece {
+    pub corners: [DVec3; 3],
+    pub part: Part,
+}
+
+/// Cells along each stretch of an axis. All surfaces share the lines, so no edge ends within
 /// another.
 #[derive(Debug, Clone, Copy)]
 struct Cells {
@@ -69,7 +77,7 @@ impl Cells {
                 rounded(room.light_z[1] - room.light_z[0]),
                 rounded(size.y),
             ];
-            // Each count one less, as wanted or one more: 3⁵ choices.
+            // Each count as wanted, one less or one more: 3⁵ choices.
             let best = (0..3_i64.pow(5))
                 .map(|choice| {
                     let count = |axis: usize| {
@@ -101,9 +109,10 @@ pub(super) fn least_triangles() -> usize {
 
 /// The room in exactly `count` triangles, at least [`least_triangles`].
 ///
-/// What a grid leaves over is made up by quads cut in four about their centre, spread evenly (two more each), and, where
-/// one is missing still, by halving a triangle at the opening, whose edge no other triangle shares.
-pub(super) fn triangles(room: &Room, count: usize) -> Vec<([DVec3; 3], Part)> {
+/// Triangles that a grid lacks are made by cutting quads in four about their centre, evenly spread
+/// (two more each). If one is still missing, a triangle at the opening is halved at an edge that no
+/// other triangle shares.
+pub(super) fn triangles(room: &Room, count: usize) -> Vec<Piece> {
     let quads = quads(room, &Cells::within(room, count));
     let more = count - 2 * quads.len();
     let in_four = more / 2;
@@ -111,13 +120,17 @@ pub(super) fn triangles(room: &Room, count: usize) -> Vec<([DVec3; 3], Part)> {
     let mut triangles = Vec::with_capacity(count);
     for (index, quad) in quads.iter().enumerate() {
         let [a, b, c, d] = quad.corners;
+        let piece = |corners| Piece {
+            corners,
+            part: quad.part,
+        };
         let share = |quads_before: usize| quads_before * in_four / quads.len();
         if share(index + 1) > share(index) {
             let centre = (a + b + c + d) / 4.0;
             let about = [[a, b], [b, c], [c, d], [d, a]];
-            triangles.extend(about.map(|[p, q]| ([p, q, centre], quad.part)));
+            triangles.extend(about.map(|[p, q]| piece([p, q, centre])));
         } else {
-            triangles.extend([([a, b, c], quad.part), ([a, c, d], quad.part)]);
+            triangles.extend([piece([a, b, c]), piece([a, c, d])]);
         }
     }
     if more % 2 == 1 {
@@ -126,22 +139,23 @@ pub(super) fn triangles(room: &Room, count: usize) -> Vec<([DVec3; 3], Part)> {
     triangles
 }
 
-fn halve_at_opening(triangles: &mut Vec<([DVec3; 3], Part)>) {
+fn halve_at_opening(triangles: &mut Vec<Piece>) {
     let edge = |corners: &[DVec3; 3]| {
         (0..3).find(|&k| corners[k].z == 0.0 && corners[(k + 1) % 3].z == 0.0)
     };
     let found = triangles
         .iter()
         .enumerate()
-        .find_map(|(index, (corners, _))| Some((index, edge(corners)?)));
+        .find_map(|(index, piece)| Some((index, edge(&piece.corners)?)));
     let Some((index, first)) = found else {
         unreachable!("the opening has edges");
     };
-    let (corners, part) = triangles[index];
+    let Piece { corners, part } = triangles[index];
     let [a, b, c] = [0, 1, 2].map(|k| corners[(first + k) % 3]);
     let middle = (a + b) / 2.0;
-    triangles[index] = ([a, middle, c], part);
-    triangles.insert(index + 1, ([middle, b, c], part));
+    let piece = |corners| Piece { corners, part };
+    triangles[index] = piece([a, middle, c]);
+    triangles.insert(index + 1, piece([middle, b, c]));
 }
 
 fn quads(room: &Room, cells: &Cells) -> Vec<Quad> {

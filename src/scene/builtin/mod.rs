@@ -14,16 +14,28 @@ mod stage;
 mod statue;
 mod surface_nets;
 
-use super::{BuiltinOptions, Scene};
+use std::path::PathBuf;
+
+use super::Scene;
 use crate::error::{Error, Result};
 
-/// What [`super::load`] takes instead of a path. All but the first are those of the paper's Table 1.
+/// Names that [`super::load`] takes instead of a path. All but the first are scenes of the paper's
+/// Table 1.
 pub const NAMES: [&str; 4] = [
     "cornell",
     "fruit-platter",
     "bowl-and-bunny",
     "cornell-relief",
 ];
+
+/// Options of a built-in scene.
+#[derive(Debug, Clone, Default)]
+pub struct BuiltinOptions {
+    /// The exact number of elements.
+    pub patches: Option<usize>,
+    /// An OBJ mesh, y up, head towards −z, in place of the statue made by code.
+    pub statue: Option<PathBuf>,
+}
 
 /// Builds the scene of that name.
 pub(super) fn build(name: &str, options: &BuiltinOptions) -> Result<Scene> {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::super::HeightMap;
 
-/// Texels a side for which the features below are made.
+/// Texels a side that the features below are designed for.
 pub const SIZE: u32 = 64;
 
 /// Round dents that meet in ridges, 8 across the tile.
@@ -22,7 +22,7 @@ pub fn orange_peel(size: u32) -> HeightMap {
     let pits = Scatter { cells: 11, seed: 2 };
     make("orange-peel", size, |u, v| {
         let [nearest, second] = pits.nearest_two(u, v);
-        // Never deeper where two pits meet.
+        // Not deeper where two pits meet.
         let pit = |d: f64| (-d * d / 0.16).exp();
         let uneven = (TAU * (2.0 * u + v)).sin() + (TAU * (u - 3.0 * v)).sin();
         0.05 * uneven - pit(nearest).hypot(pit(second)).min(1.0)
@@ -47,14 +47,15 @@ pub fn brick(size: u32) -> HeightMap {
         let course = (8.0 * v).floor();
         let along = (4.0 * u + 0.5 * course.rem_euclid(2.0)).rem_euclid(1.0);
         let up = (8.0 * v).rem_euclid(1.0);
-        // To the nearest joint, in heights of a course; a brick is two long.
+        // Distance to the nearest joint, in heights of a course; a brick is two long.
         let joint = (2.0 * along.min(1.0 - along)).min(up.min(1.0 - up));
         let t = ((joint - 0.06) / 0.16).clamp(0.0, 1.0);
         t * t * (3.0 - 2.0 * t)
     })
 }
 
-/// The height map of a function on the tile, stretched to 0..=1 in steps of 1/65535, so that a 16-bit PNG holds it.
+/// The height map of a function on the tile, stretched to 0..=1 in steps of 1/65535, so that a
+/// 16-bit PNG holds it.
 fn make(name: &str, size: u32, height: impl Fn(f64, f64) -> f64) -> HeightMap {
     let place = |i: u32| (f64::from(i) + 0.5) / f64::from(size);
     let heights: Vec<f64> = (0..size)
@@ -76,7 +77,7 @@ fn make(name: &str, size: u32, height: impl Fn(f64, f64) -> f64) -> HeightMap {
     }
 }
 
-/// One point in each cell of a square grid on the tile, off its middle at random.
+/// One random point in each cell of a square grid on the tile.
 struct Scatter {
     cells: i32,
     seed: u64,
@@ -102,7 +103,7 @@ impl Scatter {
         found
     }
 
-    /// The point of a cell within it, the same one tile further.
+    /// The random point of a cell, which repeats with the tile.
     fn jitter(&self, x: i32, y: i32) -> [f64; 2] {
         let cell = y.rem_euclid(self.cells) * self.cells + x.rem_euclid(self.cells);
         // SplitMix64, Steele et al. 2014.

@@ -30,8 +30,8 @@ pub(super) fn smooth_union(a: f64, b: f64, blend: f64) -> f64 {
     a.min(b) - h * h * blend / 4.0
 }
 
-/// A figure of parts on the plane x = 0 and parts on the side of positive x that the other side mirrors. Negative inside.
-/// Nearly the distance, which is all that polygonising needs.
+/// A figure of parts on the plane x = 0, and of parts at positive x that are mirrored. Negative
+/// inside; approximately the distance, which is enough to polygonise it.
 pub(super) fn figure(trunk: &[RoundCone], limbs: &[RoundCone], blend: f64, p: DVec3) -> f64 {
     let aside = DVec3::new(p.x.abs(), p.y, p.z);
     let trunk = trunk.iter().map(|part| part.distance(p));
@@ -42,7 +42,8 @@ pub(super) fn figure(trunk: &[RoundCone], limbs: &[RoundCone], blend: f64, p: DV
 }
 
 impl RoundCone {
-    /// Distance to the spheres swept along the axis, the nearest sphere taken straight across it; negative inside.
+    /// Distance to the spheres swept along the axis, the nearest sphere taken perpendicular to it;
+    /// negative inside.
     pub fn distance(&self, p: DVec3) -> f64 {
         let (from, to) = (DVec3::from(self.from), DVec3::from(self.to));
         let axis = to - from;

@@ -8,25 +8,27 @@ use glam::{DVec2, DVec3};
 use super::surface_nets::{Surface, polygonise};
 use crate::scene::assemble::Mesh;
 
-/// Grids to try, and the share of the triangles wanted that is near enough to stop at.
+/// Grids to try, and the share of the wanted triangles that is close enough to stop at.
 const ATTEMPTS: u32 = 60;
 const NEAR_ENOUGH: f64 = 0.93;
 
-/// The surface `distance` = 0 within a box in exactly `count` triangles, which is even: closed, every edge shared by two,
-/// fronts outward.
+/// The surface `distance` = 0 within a box in exactly `count` triangles, which is even: closed,
+/// every edge shared by two, fronts outward.
 pub(super) fn sculpt(
     distance: impl Fn(DVec3) -> f64,
     low: DVec3,
     high: DVec3,
     count: usize,
 ) -> Mesh {
-    // A solid of the box's own surface, to begin with: eight triangles for six cells' worth of it.
+    // The first estimate, a solid with the surface of the box: eight triangles for six cells' worth
+    // of it.
     let size = high - low;
     let faces = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
     let mut cell = (2.0 * faces / count as f64).sqrt();
     let mut best: Option<Surface> = None;
     for attempt in 0..ATTEMPTS {
-        // A saddle that just touches a grid plane is not manifold: other places of the grid are tried.
+        // A saddle that just touches a grid plane is not manifold: other offsets of the grid are
+        // tried.
         let shift = (DVec3::new(0.755, 0.570, 0.430) * f64::from(attempt)).fract();
         let surface = polygonise(&distance, low - shift * cell, high, cell);
         let got = surface.triangles.len();
@@ -38,7 +40,8 @@ pub(super) fn sculpt(
         if found >= NEAR_ENOUGH * count as f64 {
             break;
         }
-        // Aim a little below, by the number that goes with the square of the cell; a step at a time where it is near.
+        // Aim a little below: the number goes with the inverse square of the cell. Near the goal,
+        // one step at a time.
         let aim = (got.max(1) as f64 / (0.97 * count as f64)).sqrt();
         cell *= aim.clamp(0.5, 2.0);
     }
@@ -48,8 +51,8 @@ pub(super) fn sculpt(
     exactly(surface.positions, surface.triangles, count)
 }
 
-/// A solid of revolution about y in exactly `count` triangles. The profile, (radius, height), runs from the axis below to
-/// the axis above, outward on the way.
+/// A solid of revolution about y in exactly `count` triangles. The profile, (radius, height), runs
+/// from the axis at the bottom to the axis at the top, the outside on the right.
 pub(super) fn revolve(profile: &[DVec2], count: usize) -> Mesh {
     let length: f64 = profile.windows(2).map(|p| p[0].distance(p[1])).sum();
     let widest = profile.iter().map(|p| p.x).fold(0.0, f64::max);
@@ -87,7 +90,7 @@ fn resample(profile: &[DVec2], count: usize) -> Vec<DVec2> {
     let stretches: Vec<f64> = profile.windows(2).map(|p| p[0].distance(p[1])).collect();
     let mut cells = vec![1_usize; stretches.len()];
     for _ in stretches.len()..=count {
-        // Of equal ones the last, which is the same on every machine.
+        // The last of equal ones, so that every machine chooses the same.
         let longest = (0..cells.len())
             .max_by(|&a, &b| {
                 (stretches[a] / cells[a] as f64).total_cmp(&(stretches[b] / cells[b] as f64))
@@ -102,7 +105,8 @@ fn resample(profile: &[DVec2], count: usize) -> Vec<DVec2> {
     points.split_off(1)
 }
 
-/// Splits the longest edge of a closed mesh until there are `count` triangles; each split gives two more.
+/// Splits the longest edge of a closed mesh until there are `count` triangles; each split gives two
+/// more.
 fn exactly(mut positions: Vec<DVec3>, mut triangles: Vec<[u32; 3]>, count: usize) -> Mesh {
     assert!(
         triangles.len() <= count && (count - triangles.len()).is_multiple_of(2),
@@ -111,7 +115,7 @@ fn exactly(mut positions: Vec<DVec3>, mut triangles: Vec<[u32; 3]>, count: usize
     );
     let mut beside: HashMap<[u32; 2], usize> = HashMap::new();
     let mut heap = BinaryHeap::new();
-    // Squares of lengths are not negative: their bits are in their order.
+    // Squares of lengths are not negative: their bits sort as they do.
     let entry = |positions: &[DVec3], a: u32, b: u32| {
         let length = positions[a as usize].distance_squared(positions[b as usize]);
         (length.to_bits(), a.min(b), a.max(b))

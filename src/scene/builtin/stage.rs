@@ -1,4 +1,4 @@
-//! What the built-in scenes have in common: rooms, statues from files, and where things stand.
+//! What the built-in scenes share: rooms, statues from files, and placement.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -12,10 +12,10 @@ use crate::scene::material::TextureCache;
 use crate::scene::uv::box_projection;
 use crate::scene::{BuiltinOptions, Camera, Material, PointLight, Scene, check, obj};
 
-/// A scene of solids in a room, ready but for the number of elements.
+/// A scene of solids in a room, complete except for the number of elements.
 pub(super) struct Stage {
     pub name: &'static str,
-    /// The number of elements if nothing else is asked for.
+    /// The default number of elements.
     pub patches: usize,
     pub room: Room,
     /// Index into `materials` for each part of the room.
@@ -28,7 +28,7 @@ pub(super) struct Stage {
 }
 
 impl Stage {
-    /// The scene in exactly as many elements as asked for: the room takes what the solids leave.
+    /// The scene in exactly `options.patches` elements: the room takes what the solids leave.
     ///
     /// # Errors
     /// Fewer patches than solids and coarsest room need.
@@ -36,7 +36,7 @@ impl Stage {
         let solids: usize = self.solids.iter().map(count).sum();
         let least = solids + grid::least_triangles();
         let patches = match options.patches {
-            // Only a statue that was asked for may need more than the patches that were not.
+            // Only a statue given by the user may need more than the default number of patches.
             None if options.statue.is_some() => self.patches.max(2 * solids),
             None => self.patches,
             Some(patches) => patches,
@@ -70,7 +70,7 @@ impl Stage {
 /// The patches to plan for.
 ///
 /// # Errors
-/// Fewer than `least`, below which the figures lose their shape.
+/// Fewer than `least`: the figures would lose their shape.
 pub(super) fn planned(
     name: &str,
     options: &BuiltinOptions,
@@ -86,7 +86,8 @@ pub(super) fn planned(
     Ok(patches)
 }
 
-/// The nearest even number to a share of the patches: a closed mesh has an even number of triangles.
+/// The nearest even number to a share of the patches: a closed mesh has an even number of
+/// triangles.
 pub(super) fn even_share(patches: usize, share: f64) -> usize {
     2 * (share * patches as f64 / 2.0).round() as usize
 }
@@ -111,7 +112,7 @@ pub(super) fn count(mesh: &Mesh) -> usize {
 /// A room in exactly `count` triangles.
 pub(super) fn room(room: &Room, count: usize, material_of: fn(Part) -> u32) -> Mesh {
     let mut mesh = Mesh::default();
-    for (corners, part) in grid::triangles(room, count) {
+    for grid::Piece { corners, part } in grid::triangles(room, count) {
         let first = mesh.positions.len() as u32;
         mesh.positions.extend(corners);
         mesh.triangles.push(MeshTriangle {
@@ -123,7 +124,7 @@ pub(super) fn room(room: &Room, count: usize, material_of: fn(Part) -> u32) -> M
     mesh
 }
 
-/// Gives every triangle a material, and coordinates of which so many repeats span a metre.
+/// Gives every triangle a material, and texture coordinates with the given repeats per metre.
 pub(super) fn cover(mesh: &mut Mesh, material: u32, repeats: f64) {
     for triangle in &mut mesh.triangles {
         let corners = triangle
@@ -134,7 +135,7 @@ pub(super) fn cover(mesh: &mut Mesh, material: u32, repeats: f64) {
     }
 }
 
-/// A mesh that takes the place of the statue made by code, in the material of the scene.
+/// A mesh in place of the statue made by code, in the scene's material.
 pub(super) fn read_statue(path: &Path) -> Result<Mesh> {
     let mut mesh = obj::read(path, &mut TextureCache::default())?;
     if mesh.materials.iter().any(|m| m.name != "default") {
@@ -145,15 +146,15 @@ pub(super) fn read_statue(path: &Path) -> Result<Mesh> {
     }
     let (low, high) = bounds(&mesh);
     let extent = (high - low).max_element();
-    // The placing divides by the extent.
+    // Placement divides by the extent.
     if !(extent.is_finite() && extent > f64::MIN_POSITIVE * 1e9) {
         return Err(Error::file(path, "the statue has no extent to scale by"));
     }
     Ok(mesh)
 }
 
-/// Scales a statue to its greatest extent, turns it about y (degrees) and stands it on `foot`, its lowest vertex at
-/// exactly that height.
+/// Scales a statue to its greatest extent, turns it about y (degrees) and stands it on `foot`, its
+/// lowest vertex at exactly that height.
 pub(super) fn place(mesh: &mut Mesh, extent: f64, turn: f64, foot: DVec3) {
     let (low, high) = bounds(mesh);
     let scale = extent / (high - low).max_element();
@@ -174,7 +175,8 @@ pub(super) fn stand(mesh: &mut Mesh, foot: DVec3) {
     }
 }
 
-/// The lowest place over the middle of a mesh where something of that radius may stand, up to the mesh's own coarseness.
+/// The lowest height over the middle of a mesh where something of that radius can stand, as exact
+/// as the mesh is fine.
 pub(super) fn top(mesh: &Mesh, radius: f64) -> DVec3 {
     let (low, high) = bounds(mesh);
     let middle = (low + high) / 2.0;
@@ -201,7 +203,8 @@ pub(super) fn top(mesh: &Mesh, radius: f64) -> DVec3 {
     DVec3::new(middle.x, y, middle.z)
 }
 
-/// The box around the corners of the triangles; a vertex that no triangle uses must not move what is seen.
+/// The box around the corners of the triangles; a vertex that no triangle uses must not move the
+/// camera.
 fn bounds(mesh: &Mesh) -> (DVec3, DVec3) {
     mesh.triangles
         .iter()

@@ -6,7 +6,7 @@ use super::round_cone::{RoundCone, cone, figure};
 use super::surface_nets::{Surface, polygonise};
 use crate::scene::assemble::Mesh;
 
-/// On the plane x = 0.
+/// Parts on the plane x = 0.
 const TRUNK: [RoundCone; 10] = [
     // Chest, barrel, croup.
     cone([0.0, 1.13, -0.50], 0.27, [0.0, 1.10, 0.00], 0.275),
@@ -24,7 +24,7 @@ const TRUNK: [RoundCone; 10] = [
     cone([0.0, 0.85, 0.97], 0.08, [0.0, 0.50, 0.93], 0.045),
 ];
 
-/// On the side of positive x; the other side mirrors them.
+/// Parts at positive x, mirrored to the other side.
 const LIMBS: [RoundCone; 9] = [
     // Ear.
     cone([0.055, 1.86, -0.95], 0.045, [0.075, 1.97, -0.96], 0.030),
@@ -43,17 +43,18 @@ const LIMBS: [RoundCone; 9] = [
 
 /// Width of the fillets between parts.
 const BLEND: f64 = 0.07;
-/// A box around all of it.
+/// A box around the figure.
 pub(super) const LOW: DVec3 = DVec3::new(-0.5, -0.05, -1.5);
 pub(super) const HIGH: DVec3 = DVec3::new(0.5, 2.1, 1.15);
 /// Triangles times the square of a cell's edge, measured.
 const TRIANGLES_PER_CELL: f64 = 17.5;
 
-/// The horse in about so many triangles: closed, every edge shared by two, fronts outward, one material.
+/// The horse in about `count` triangles: closed, every edge shared by two, fronts outward, one
+/// material.
 pub(super) fn build(triangles: usize) -> Mesh {
     let cell = (TRIANGLES_PER_CELL / triangles as f64).sqrt();
-    // A saddle that just touches a grid plane joins four quads at one edge. Where depends on the grid alone, so other
-    // grids are tried: some two in five are free of it.
+    // A saddle that just touches a grid plane joins four quads at one edge. The place depends on
+    // the grid only, so other grids are tried: about two in five have no such saddle.
     let surface = (0..100)
         .map(|attempt| {
             let shift = (DVec3::new(0.755, 0.570, 0.430) * f64::from(attempt)).fract();
@@ -77,12 +78,14 @@ mod tests {
 
     use super::*;
 
-    /// Every resolution that a number of patches can ask for, in steps, is closed, manifold and wound outward.
+    /// Every resolution that a number of patches can ask for, in steps, is closed, manifold and
+    /// wound outward.
     #[test]
     fn closed_at_every_resolution() {
         for triangles in (3_000..=25_780).step_by(2_278) {
             let mesh = build(triangles);
-            // The edge across from each corner, by its corner: around one vertex they must chain into one loop.
+            // The edge across from each corner, by its corner: around one vertex they must chain
+            // into one loop.
             let mut rims: HashMap<u32, HashMap<u32, u32>> = HashMap::new();
             for [a, b, c] in mesh.triangles.iter().map(|t| t.corners) {
                 for [at, from, to] in [[a, b, c], [b, c, a], [c, a, b]] {

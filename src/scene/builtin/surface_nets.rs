@@ -10,10 +10,12 @@ pub(super) struct Surface {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Polygonises `distance` = 0 on cubes of edge `cell`; the box from `low` to `high` must hold all of the inside.
+/// Polygonises `distance` = 0 on cubes of edge `cell`; the box from `low` to `high` must contain
+/// all of the inside.
 ///
-/// One vertex stands in each cube that the surface crosses, and each grid edge that it crosses gives a quad of the four
-/// cubes around it. So the mesh is closed, but not always manifold: see [`Surface::is_manifold`].
+/// Each cube that the surface crosses has one vertex, and each grid edge that it crosses gives a
+/// quad between the four cubes around it. The mesh is closed, but not always manifold: see
+/// [`Surface::is_manifold`].
 pub(super) fn polygonise(
     distance: impl Fn(DVec3) -> f64,
     low: DVec3,
@@ -53,7 +55,8 @@ pub(super) fn polygonise(
     surface
 }
 
-/// One Newton step on to the surface, at most half a cell: the mean of crossings lies inside wherever it is convex.
+/// One Newton step to the surface, at most half a cell: the mean of crossings lies inside a convex
+/// surface.
 fn towards_surface(distance: impl Fn(DVec3) -> f64, at: DVec3, cell: f64) -> DVec3 {
     let h = cell / 16.0;
     let slope = |axis: DVec3| (distance(at + axis * h) - distance(at - axis * h)) / (2.0 * h);
@@ -123,7 +126,7 @@ impl Grid {
         self.low + point.as_dvec3() * self.cell
     }
 
-    /// Beyond the grid it is outside.
+    /// Points beyond the grid are outside.
     fn value(&self, point: IVec3) -> f64 {
         if point.cmplt(IVec3::ZERO).any() || point.cmpge(self.size).any() {
             return f64::INFINITY;

@@ -1,20 +1,31 @@
 //! A frame of the window: what it asks of the other threads, and what it draws.
 
-use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::Viewer;
 use crate::error::Result;
 use crate::render::{Light, write_png};
-use crate::view::detailer::{PAUSE, Wanted};
+use crate::view::panel_pass::Prepared;
+use crate::view::screen::Captured;
 use crate::view::surface_pass::{self, Laid};
 use crate::vk::Shown;
 
+/// Times of one frame that is being drawn.
+struct Started {
+    at: Instant,
+    /// Time of the first input that this frame answers.
+    unanswered: Option<Instant>,
+    /// What taking the other threads' results took.
+    update: Duration,
+    /// When all was ready to be recorded.
+    prepared: Instant,
+}
+
 impl Viewer {
-    /// Draws a frame if the window has an area; returns what was read back of it, where that was asked for.
+    /// Draws a frame if the window has an area. Returns whether one was shown.
     ///
     /// # Errors
-    /// A device or a display that fails.
+    /// A device or a display that fails; a picture of the frame that cannot be written.
     pub fn frame(&mut self) -> Result<bool> {
         let begin = Instant::now();
         let unanswered = self.unanswered.take();
@@ -23,7 +34,7 @@ impl Viewer {
             self.input.hovered = None;
         }
         self.update()?;
-        let updated = Instant::now();
+        let update = begin.elapsed();
         let seconds = begin.duration_since(self.last_frame).as_secs_f64();
         self.last_frame = begin;
         self.fly(seconds.min(0.1));
@@ -33,14 +44,35 @@ impl Viewer {
         self.stale = false;
         let primitives = self.panel(size)?;
         self.want_detail(size);
-        let prepared = self.panel_pass.prepare(&primitives, size, self.scale)?;
-        let rows = self.eye.rows(&self.scene, size);
+        let panel = self.panel_pass.prepare(&primitives, size, self.scale)?;
+        let shown = self.shown();
+        let started = Started {
+            at: begin,
+            unanswered,
+            update,
+            prepared: Instant::now(),
+        };
+        let (answer, captured) = self.draw(size, &panel, &shown)?;
+        if answer != Shown::Yes {
+            self.stale = true;
+            self.unanswered = unanswered;
+            return Ok(false);
+        }
+        self.count(&started);
+        if let (Some(path), Some(captured)) = (self.capture.take(), captured) {
+            write_png(&path, captured.size, &captured.codes)?;
+        }
+        Ok(true)
+    }
+
+    /// What the surfaces show in this frame.
+    fn shown(&mut self) -> surface_pass::Shown {
         let [all, direct, emission] = match self.switches.part {
             Light::Global => [1.0, 0.0, 1.0],
             Light::Direct => [0.0, 1.0, 1.0],
             Light::Indirect => [1.0, -1.0, 0.0],
         };
-        let laid = match (self.shown_detail().is_some(), self.kept_detail()) {
+        let picture = match (self.shown_detail().is_some(), self.kept_detail()) {
             (true, _) => Laid::Exactly,
             (false, kept) if kept != [false; 2] => {
                 self.surfaces.lay(kept);
@@ -48,19 +80,27 @@ impl Viewer {
             }
             _ => Laid::No,
         };
-        let shown = surface_pass::Shown {
+        surface_pass::Shown {
             exposure: self.exposure().exp2(),
             ambient: self.ambient(),
             parts: [all, direct, emission],
             elements: self.switches.elements,
             sources: self.switches.sources,
-            picture: laid,
+            picture,
             chosen: self.input.chosen.or(self.input.hovered),
-        };
-        let capture = self.capture.is_some();
-        let prepared_at = Instant::now();
+        }
+    }
+
+    /// Records and shows the frame; what was read back of it, where that was asked for.
+    fn draw(
+        &mut self,
+        size: (u32, u32),
+        panel: &Prepared,
+        shown: &surface_pass::Shown,
+    ) -> Result<(Shown, Option<Captured>)> {
+        let rows = self.eye.rows(&self.scene, size);
         let (surfaces, panel_pass) = (&self.surfaces, &self.panel_pass);
-        // A software driver compiles a shader when something is drawn by it first: not while a person waits.
+        // A software driver compiles a shader at its first draw: all are drawn in the first frame.
         let unseen = [
             (Laid::No, false),
             (Laid::FromElsewhere, false),
@@ -69,36 +109,41 @@ impl Viewer {
         let unseen = unseen.map(|(picture, elements)| surface_pass::Shown {
             picture,
             elements,
-            ..shown
+            ..*shown
         });
         let first = !self.timing.has_begun();
-        let (answer, captured) = self.screen.show(capture, |cmd| {
+        self.screen.show(self.capture.is_some(), |cmd| {
             if first {
                 cmd.scissor(0, 0, 1, 1);
-                unseen
-                    .iter()
-                    .for_each(|unseen| surfaces.record(cmd, &rows, unseen));
+                for unseen in &unseen {
+                    surfaces.record(cmd, &rows, unseen);
+                }
                 cmd.scissor(0, 0, size.0, size.1);
             }
             if shown.picture == Laid::Exactly {
-                panel_pass.record_picture(cmd, &prepared);
+                panel_pass.record_picture(cmd, panel);
             }
-            // Of surfaces that the picture shows, what lies over them alone.
-            surfaces.record(cmd, &rows, &shown);
-            panel_pass.record(cmd, &prepared);
-        })?;
-        if answer != Shown::Yes {
-            self.stale = true;
-            self.unanswered = unanswered;
-            return Ok(false);
-        }
-        self.timing.frame(begin.elapsed(), self.is_baking());
+            // Over a picture that covers the frame, only the overlays.
+            surfaces.record(cmd, &rows, shown);
+            panel_pass.record(cmd, panel);
+        })
+    }
+
+    /// Counts the times of a frame that was shown.
+    fn count(&mut self, started: &Started) {
+        let Started {
+            at,
+            unanswered,
+            update,
+            prepared,
+        } = *started;
+        self.timing.frame(at.elapsed(), self.is_baking());
         tracing::debug!(
             "frame: waited {:?}, updated in {:?}, prepared in {:?}, shown in {:?}",
-            unanswered.map(|since| begin - since),
-            updated - begin,
-            prepared_at - updated,
-            prepared_at.elapsed()
+            unanswered.map(|since| at - since),
+            update,
+            prepared - at - update,
+            prepared.elapsed()
         );
         if let Some(since) = unanswered {
             self.timing.answer(since);
@@ -111,48 +156,6 @@ impl Viewer {
         }
         if self.is_lit() {
             self.timing.first_light(self.start);
-        }
-        if let (Some(path), Some(captured)) = (self.capture.take(), captured) {
-            write_png(&path, captured.size, &captured.codes)?;
-        }
-        Ok(true)
-    }
-
-    /// Asks for coarse pictures of a view that changes, and for a whole one once it has stayed for a while.
-    fn want_detail(&mut self, size: (u32, u32)) {
-        let now = self.wanted_now(size);
-        let drawn = self.switches.detail && self.is_lit();
-        match &self.seen {
-            Some((before, _)) if before.looks_like(&now) => {}
-            _ => {
-                self.seen = Some((now.clone(), Instant::now()));
-                let before = self.wanted.take();
-                if drawn {
-                    self.detailer.want(Some(now), true);
-                } else if before.is_some() {
-                    self.detailer.want(None, false);
-                }
-                return;
-            }
-        }
-        let since = self.seen.as_ref().map(|(_, since)| since.elapsed());
-        let stays = since.is_some_and(|since| since >= PAUSE);
-        if !(drawn && stays) {
-            return;
-        }
-        // While a bake goes on, a picture is finished before a brighter one is begun.
-        let same = |wanted: &Wanted| Arc::ptr_eq(&wanted.snapshot, &now.snapshot);
-        let finished = self
-            .detail
-            .as_ref()
-            .is_some_and(|drawn| drawn.size == size && drawn.of.looks_like(&now));
-        let ask = match &self.wanted {
-            None => true,
-            Some(wanted) => !same(wanted) && (finished || now.snapshot.progress.done),
-        };
-        if ask {
-            self.wanted = Some(now.clone());
-            self.detailer.want(Some(now), false);
         }
     }
 }

@@ -1,21 +1,31 @@
-//! What lies over the view: the panel, marks of lights, light by direction, an item buffer.
+//! Overlays of the view: the panel, marks of lights, light by direction, an item buffer.
 
 use std::time::{Duration, Instant};
 
 use egui::TextureHandle;
 
 use super::Viewer;
+use super::input::Input;
 use crate::error::Result;
-use crate::view::input::Input;
 use crate::view::overlay;
-use crate::view::panel::{self, Asked, Changed, Told};
+use crate::view::panel::{self, Asked, Changed, Status};
 
-/// A picture over the view, drawn anew when what it shows changes.
+/// What a picture over the view shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Subject {
+    /// The element or the source.
+    index: u32,
+    /// Number of the light, counted as [`Viewer::lights`].
+    light: u64,
+    /// Bits of the factor of exposure.
+    exposure: u32,
+}
+
+/// A picture over the view; it is redrawn when its subject changes.
 #[derive(Default)]
 pub(super) struct KeptTexture {
-    /// The element or the source, and the light and the exposure by which it is shown.
-    shows: Option<(u32, (u64, u32))>,
-    /// None where there is nothing to be seen.
+    shows: Option<Subject>,
+    /// None where there is nothing to show.
     texture: Option<TextureHandle>,
 }
 
@@ -24,7 +34,7 @@ impl KeptTexture {
         &mut self,
         context: &egui::Context,
         name: &str,
-        shows: (u32, (u64, u32)),
+        shows: Subject,
         draw: impl FnOnce() -> Option<egui::ColorImage>,
     ) -> Option<&TextureHandle> {
         if self.shows != Some(shows) {
@@ -50,7 +60,7 @@ fn marked(input: &Input) -> Option<u32> {
 }
 
 impl Viewer {
-    /// Lays out the panel and what lies over the view; takes what was changed there.
+    /// Lays out the panel and the overlays, and applies the changes made in the panel.
     pub(super) fn panel(
         &mut self,
         (width, height): (u32, u32),
@@ -85,7 +95,7 @@ impl Viewer {
             .viewport_output
             .get(&egui::ViewportId::ROOT)
             .map_or(Duration::MAX, |viewport| viewport.repaint_delay);
-        // Later than an hour is never.
+        // A delay above an hour means never.
         let soon = delay < Duration::from_secs(3600);
         self.repaint = soon.then(|| Instant::now() + delay);
         Ok(context.tessellate(output.shapes, output.pixels_per_point))
@@ -96,7 +106,7 @@ impl Viewer {
         let baking = self.is_baking();
         let marked = marked(&self.input);
         let device = self.screen.device().name().to_owned();
-        let told = Told {
+        let status = Status {
             scene: &self.scene.name,
             triangles: self.scene.triangles.len(),
             device: &device,
@@ -118,10 +128,10 @@ impl Viewer {
             directions: &mut self.directions,
             relief_scale: &mut self.relief_scale,
         };
-        panel::show(context, &told, &mut changed)
+        panel::show(context, &status, &mut changed)
     }
 
-    /// An element in a line.
+    /// One line about an element.
     fn describe(&self, element: u32) -> String {
         let e = element as usize;
         let material = self.scene.triangles[e].material as usize;
@@ -133,7 +143,7 @@ impl Viewer {
         )
     }
 
-    /// What lies over the view: marks of lights, light by direction, an item buffer.
+    /// Draws marks of lights, light by direction and an item buffer over the view.
     fn marks(&mut self, context: &egui::Context, size: (u32, u32)) {
         let layer = egui::LayerId::new(egui::Order::Background, egui::Id::new("marks"));
         let painter = context.layer_painter(layer);
@@ -146,31 +156,37 @@ impl Viewer {
         }
         let exposure = self.exposure().exp2();
         let screen = context.content_rect();
-        let light = (self.lights, exposure.to_bits());
+        let light = self.lights;
+        let subject = |index| Subject {
+            index,
+            light,
+            exposure: exposure.to_bits(),
+        };
         let slots = marked(&self.input).filter(|_| self.switches.slots);
         match (slots, &self.snapshot.relief) {
             (Some(e), Some(relief)) => {
                 let draw = || overlay::hemisphere(relief, e, exposure);
-                let texture = self
-                    .slots_picture
-                    .of(context, "hemisphere", (e, light), draw);
+                let texture =
+                    self.overlays
+                        .slots_picture
+                        .of(context, "hemisphere", subject(e), draw);
                 let at = self.input.pointer.unwrap_or_default();
                 let corner = egui::pos2(at.0 / self.scale + 16.0, at.1 / self.scale + 16.0);
                 lay(&painter, texture, corner, overlay::SIDE as f32);
             }
-            _ => self.slots_picture = KeptTexture::default(),
+            _ => self.overlays.slots_picture = KeptTexture::default(),
         }
         let wanted = self.switches.items && self.input.chosen.is_some();
-        match self.items.as_ref().filter(|_| wanted) {
+        match self.overlays.items.as_ref().filter(|_| wanted) {
             Some(items) => {
                 let draw = || Some(overlay::items(items, &self.snapshot.irradiance, exposure));
-                let key = (items.source, light);
-                let texture = self.items_picture.of(context, "items", key, draw);
+                let key = subject(items.source);
+                let texture = self.overlays.items_picture.of(context, "items", key, draw);
                 let side = 0.35 * screen.width().min(screen.height());
                 let corner = screen.right_bottom() - egui::vec2(side + 8.0, side + 8.0);
                 lay(&painter, texture, corner, side);
             }
-            None => self.items_picture = KeptTexture::default(),
+            None => self.overlays.items_picture = KeptTexture::default(),
         }
     }
 }

@@ -1,7 +1,11 @@
 //! The window's state: what it shows, and how it changes.
 
 mod frame;
+mod input;
 mod layout;
+mod overlays;
+mod pictures;
+mod update;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -12,9 +16,8 @@ use winit::window::Window;
 
 use super::baker::{Baker, Order, Stage};
 use super::camera::Eye;
-use super::detailer::{Detailer, Drawn, PAUSE, Wanted};
+use super::detailer::{Detailer, PAUSE};
 use super::event::Event;
-use super::input::Input;
 use super::lamps::{Lamp, lamps, lit};
 use super::panel_pass::PanelPass;
 use super::screen::Screen;
@@ -23,11 +26,13 @@ use super::surface_pass::SurfacePass;
 use super::switches::Switches;
 use super::timing::Timing;
 use super::{Options, Wake};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::render::Light;
-use crate::scene::Scene;
-use crate::solver::{ItemPicture, Settings, Update};
-use layout::KeptTexture;
+use crate::scene::{Camera, Scene};
+use crate::solver::Settings;
+use input::Input;
+use overlays::Overlays;
+use pictures::Pictures;
 
 pub struct Viewer {
     baker: Baker,
@@ -35,14 +40,15 @@ pub struct Viewer {
     surfaces: SurfacePass,
     panel_pass: PanelPass,
     pub(super) screen: Screen,
-    /// Of the window, and whether its images are to be made anew.
+    /// Pixels of the window, across and down.
     pub(super) size: (u32, u32),
+    /// Whether the window's images must be recreated.
     stale: bool,
     pub(super) scale: f32,
 
-    /// As it was read.
+    /// The scene as it was read.
     base: Scene,
-    /// As it is lit and raised now.
+    /// The scene with the lights and the scale of relief as they are now.
     pub(super) scene: Arc<Scene>,
     settings: Settings,
     pub(super) eye: Eye,
@@ -57,36 +63,25 @@ pub struct Viewer {
     pub(super) epoch: u64,
     progress: Progress,
     bounds: Vec<[f64; 2]>,
-    sources: Vec<u32>,
-    /// Counts the sources that have come, and what was asked for of which.
-    source_lists: u64,
-    asked: Option<(u64, Option<u32>)>,
-    items: Option<ItemPicture>,
-    slots_picture: KeptTexture,
-    items_picture: KeptTexture,
+    overlays: Overlays,
     stage: Option<Stage>,
-    /// Stops by which what is shown is exposed, without the person's own.
+    /// Stops of the exposure, without those set by the user.
     metered: f32,
-    /// Counts the lights that were shown.
+    /// Number of lights shown so far.
     lights: u64,
-    /// The last detailed picture, and what the last whole one is of.
-    detail: Option<Drawn>,
-    whole: Option<Wanted>,
-    wanted: Option<Wanted>,
-    /// What the view was when it last changed.
-    seen: Option<(Wanted, Instant)>,
+    pictures: Pictures,
     messages: Vec<String>,
-    /// Pictures on their way into files.
+    /// Paths of pictures that are being saved.
     pub(super) saving: Vec<PathBuf>,
 
     pub(super) egui: egui::Context,
     pub(super) input: Input,
-    /// When the panel wants to be drawn again.
+    /// When the panel asks to be redrawn.
     repaint: Option<Instant>,
     pub(super) dirty: bool,
-    /// When the lights were changed that are not shown yet, and their epoch.
+    /// Epoch of changed lights that are not shown yet, and when they were changed.
     pub(super) edited: Option<(u64, Instant)>,
-    /// When what was not answered yet was done.
+    /// Time of the first input that no frame has answered yet.
     pub(super) unanswered: Option<Instant>,
     last_frame: Instant,
     start: Instant,
@@ -97,12 +92,18 @@ pub struct Viewer {
 
 /// Most messages that the panel keeps.
 const MOST_MESSAGES: usize = 4;
-/// Stops by which the exposure of a bake under way may be off.
-const MOST_CHANGE: f32 = 0.2;
-/// Directory of pictures that are saved by a key: the working one.
+/// Name of pictures that are saved by a key, in the working directory.
 const PICTURE: &str = "mesolux";
 
+/// Index of the camera that the first key press shows: the one after `camera`.
+fn camera_after(scene: &Scene, camera: &Camera) -> usize {
+    let shown = scene.cameras.iter().position(|c| c == camera);
+    shown.map_or(0, |i| (i + 1) % scene.cameras.len())
+}
+
 impl Viewer {
+    /// # Errors
+    /// A display or a device that fails; a scene that does not fit the device.
     pub fn new(
         options: Options,
         window: &Arc<Window>,
@@ -122,38 +123,32 @@ impl Viewer {
         let screen = Screen::new(window, size, &device)?;
         let scene = Arc::new(base.clone());
         let surfaces = SurfacePass::new(screen.device(), screen.pass(), &scene)?;
-        let panel_pass = PanelPass::new(screen.device(), screen.pass())?;
         let given = (Arc::clone(&scene), settings.clone());
         let baker = Baker::new(&device, given, kept, Arc::clone(&wake));
-        let from_file = bake.is_some();
         let snapshot = Arc::new(match bake {
             Some(bake) => Snapshot::of_bake(&scene, bake),
-            None => Snapshot::unlit(&scene),
+            None => {
+                baker.order(Order::Bake {
+                    scene: Arc::clone(&scene),
+                    settings: Box::new(settings.clone()),
+                    epoch: 0,
+                });
+                Snapshot::unlit(&scene)
+            }
         });
-        if !from_file {
-            baker.order(Order::Bake {
-                scene: Arc::clone(&scene),
-                settings: Box::new(settings.clone()),
-                epoch: 0,
-            });
-        }
         let egui = egui::Context::default();
         egui.set_theme(egui::Theme::Dark);
         let mut viewer = Self {
             baker,
             detailer: Detailer::new(&device, wake),
             surfaces,
-            panel_pass,
+            panel_pass: PanelPass::new(screen.device(), screen.pass())?,
             screen,
             size,
             stale: false,
             scale: 1.0,
             eye: Eye::new(&scene, &camera),
-            next_camera: {
-                // The first key press goes on from the camera that is shown.
-                let shown = scene.cameras.iter().position(|c| *c == camera);
-                shown.map_or(0, |i| (i + 1) % scene.cameras.len())
-            },
+            next_camera: camera_after(&scene, &camera),
             switches: Switches::default(),
             lamps: lamps(&base),
             lamp: 0,
@@ -165,20 +160,12 @@ impl Viewer {
             progress: snapshot.progress,
             epoch: 0,
             bounds: Vec::new(),
-            sources: Vec::new(),
-            source_lists: 0,
-            asked: None,
-            items: None,
-            slots_picture: KeptTexture::default(),
-            items_picture: KeptTexture::default(),
+            overlays: Overlays::default(),
             stage: None,
             metered: snapshot.exposure,
             lights: 0,
             snapshot,
-            detail: None,
-            whole: None,
-            wanted: None,
-            seen: None,
+            pictures: Pictures::default(),
             messages: Vec::new(),
             saving: Vec::new(),
             egui,
@@ -193,8 +180,10 @@ impl Viewer {
             capture: None,
             closing: false,
         };
-        let light = (&viewer.snapshot.corners, &viewer.snapshot.corners_direct);
-        viewer.surfaces.set_light(light.0, light.1);
+        let snapshot = &viewer.snapshot;
+        viewer
+            .surfaces
+            .set_light(&snapshot.corners, &snapshot.corners_direct);
         Ok(viewer)
     }
 
@@ -203,19 +192,19 @@ impl Viewer {
         !self.progress.done
     }
 
-    /// Whether what is shown is the light of a bake that is done.
+    /// Whether the light shown is that of a finished bake.
     pub fn is_baked(&self) -> bool {
         self.snapshot.epoch == self.epoch && self.snapshot.progress.done
     }
 
-    /// Whether there is any light to be shown.
+    /// Whether there is any light to show.
     fn is_lit(&self) -> bool {
         self.snapshot.progress.done || self.snapshot.progress.update.shots > 0
     }
 
     /// Whether the detailed picture of the view is shown, with all its pixels and the last light.
     pub fn is_detailed(&self) -> bool {
-        // What was switched since the last frame counts.
+        // With the switches as they are now, which may differ from the last frame's.
         let now = self.wanted_now(self.size);
         self.shown_detail().is_some_and(|drawn| {
             drawn.is_whole()
@@ -224,16 +213,16 @@ impl Viewer {
         })
     }
 
-    /// Whether the sources and the item buffer are there, where they are to be shown.
+    /// Whether the sources and the item buffer have arrived, if they are to be shown.
     pub fn has_overlays(&self) -> bool {
         let Switches { sources, items, .. } = self.switches;
         let items = items && self.input.chosen.is_some();
         !self.dirty
-            && (!(sources || items) || !self.sources.is_empty())
-            && (!items || self.items.is_some())
+            && (!(sources || items) || !self.overlays.sources.is_empty())
+            && (!items || self.overlays.items.is_some())
     }
 
-    /// When a frame is to be drawn though nothing happens; none: only when something does.
+    /// When the next frame is due without any event; None: only after an event.
     pub fn next_frame(&self, now: Instant) -> Option<Instant> {
         if self.size.0 == 0 || self.size.1 == 0 {
             return None;
@@ -241,14 +230,14 @@ impl Viewer {
         if self.dirty || self.stale || self.input.flies() {
             return Some(now);
         }
-        let paused = self.seen.as_ref().map(|(_, since)| *since + PAUSE);
-        let paused =
-            paused.filter(|_| self.switches.detail && self.wanted.is_none() && self.is_lit());
+        let Pictures { seen, wanted, .. } = &self.pictures;
+        let paused = seen.as_ref().map(|seen| seen.since + PAUSE);
+        let paused = paused.filter(|_| self.switches.detail && wanted.is_none() && self.is_lit());
         [self.repaint, paused].into_iter().flatten().min()
     }
 
     pub fn handle(&mut self, event: Event) {
-        // Before the first frame nobody sees what they do.
+        // Input before the first frame has no answer to measure.
         if event.is_input() && self.timing.has_begun() {
             self.unanswered.get_or_insert_with(Instant::now);
         }
@@ -264,7 +253,7 @@ impl Viewer {
         }
     }
 
-    /// Tells the window that another thread has something new.
+    /// Called when another thread has a new result.
     pub fn wake(&mut self) {
         self.dirty = true;
     }
@@ -276,7 +265,7 @@ impl Viewer {
         self.messages.push(message);
     }
 
-    /// Bakes anew with the directions and the relief that are chosen.
+    /// Starts a new bake with the chosen directions and relief.
     pub(super) fn bake(&mut self) {
         self.settings.relief.directions = crate::directions::Directions::new(self.directions)
             .unwrap_or(self.settings.relief.directions);
@@ -297,7 +286,7 @@ impl Viewer {
         });
     }
 
-    /// Lights the scene by the lamps as they are now.
+    /// Relights the scene by the lamps as they are now.
     pub(super) fn relight(&mut self) {
         self.scene = Arc::new(lit(&self.scene, &self.lamps));
         self.surfaces.set_emission(&self.scene);
@@ -313,38 +302,13 @@ impl Viewer {
         self.epoch += 1;
         self.progress = Progress::default();
         self.bounds.clear();
-        self.items = None;
-        self.asked = None;
+        self.overlays.items = None;
+        self.overlays.asked = None;
         self.stage = None;
         self.dirty = true;
     }
 
-    /// Asks for the sources where they are to be shown and nobody has cut them, and for what the source of the marked element sees.
-    fn ask_sources(&mut self) {
-        let Switches { sources, items, .. } = self.switches;
-        let chosen = self.input.chosen.filter(|_| items);
-        if !sources && chosen.is_none() {
-            return;
-        }
-        let source = chosen.and_then(|e| self.sources.get(e as usize).copied());
-        let wanted = (self.source_lists, source);
-        if self.asked == Some(wanted) || (source.is_none() && !self.sources.is_empty()) {
-            return;
-        }
-        self.asked = Some(wanted);
-        match source {
-            // The bake that is under way tells them.
-            None if self.is_baking() => {}
-            None => self.baker.order(Order::Sources),
-            Some(crate::constants::NONE) => {
-                self.items = None;
-                self.say("the element neither emits nor reflects: no source".into());
-            }
-            Some(source) => self.baker.order(Order::Items { source }),
-        }
-    }
-
-    /// Has the view drawn in a file as `render` would.
+    /// Saves the view to a file, drawn as by `render`; None picks a free name.
     pub(super) fn save(&mut self, path: Option<PathBuf>) {
         let path = path.unwrap_or_else(|| {
             let numbered = (1..).map(|i| PathBuf::from(format!("{PICTURE}-{i:04}.png")));
@@ -354,20 +318,6 @@ impl Viewer {
         let wanted = self.wanted_now(self.size);
         self.saving.push(path.clone());
         self.detailer.save(wanted, path);
-    }
-
-    fn wanted_now(&self, size: (u32, u32)) -> Wanted {
-        Wanted {
-            snapshot: Arc::clone(&self.snapshot),
-            camera: self.eye.camera.clone(),
-            size,
-            part: self.switches.part,
-            shading: self.switches.shading,
-            direct: self.switches.direct,
-            show: self.switches.show,
-            ambient: self.ambient(),
-            exposure: self.exposure(),
-        }
     }
 
     fn ambient(&self) -> Vec3 {
@@ -380,113 +330,5 @@ impl Viewer {
     /// Stops.
     fn exposure(&self) -> f32 {
         self.metered + self.switches.exposure
-    }
-
-    /// The detailed picture if it is of what the window shows.
-    fn shown_detail(&self) -> Option<&Drawn> {
-        let drawn = self.detail.as_ref()?;
-        let (now, _) = self.seen.as_ref()?;
-        (self.switches.detail && drawn.of.looks_like(now)).then_some(drawn)
-    }
-
-    /// Whether the last whole picture and a coarse one after it show surfaces as the window does now.
-    fn kept_detail(&self) -> [bool; 2] {
-        let Some((now, _)) = self.seen.as_ref().filter(|_| self.switches.detail) else {
-            return [false; 2];
-        };
-        let whole = self.whole.as_ref().is_some_and(|of| of.colours_like(now));
-        let coarse = self.detail.as_ref().filter(|drawn| !drawn.is_whole());
-        [
-            whole,
-            coarse.is_some_and(|drawn| drawn.of.colours_like(now)),
-        ]
-    }
-
-    /// Takes what the other threads have found.
-    fn update(&mut self) -> Result<()> {
-        let latest = self.baker.take();
-        if let Some(error) = latest.error {
-            self.progress.done = true;
-            self.edited = None;
-            self.fail(error)?;
-        }
-        if let Some(sources) = latest.sources {
-            self.surfaces.set_sources(&self.scene, sources.clone());
-            self.sources = sources;
-            self.source_lists += 1;
-        }
-        if let Some((epoch, progress)) = latest.progress
-            && epoch == self.epoch
-        {
-            self.progress = progress;
-            let Update {
-                error_bound,
-                elapsed,
-                ..
-            } = progress.update;
-            if let Some(bound) = error_bound {
-                self.bounds.push([elapsed.as_secs_f64(), bound]);
-            }
-        }
-        if let Some(items) = latest.items {
-            self.items = Some(items);
-        }
-        if let Some(snapshot) = latest.snapshot {
-            self.surfaces
-                .set_light(&snapshot.corners, &snapshot.corners_direct);
-            // Stages of one bake are exposed alike, or what was drawn of one would not fit the next.
-            let change = (snapshot.exposure - self.metered).abs();
-            let same = snapshot.epoch == self.snapshot.epoch && self.is_lit();
-            if snapshot.progress.done || !same || change > MOST_CHANGE {
-                self.metered = snapshot.exposure;
-            }
-            self.snapshot = snapshot;
-            self.lights += 1;
-        }
-        if let Some((epoch, stage)) = latest.stage
-            && epoch == self.epoch
-        {
-            self.stage = stage;
-        }
-        self.ask_sources();
-        if let Some(drawn) = self.detailer.take() {
-            // A coarse picture of brighter light does not take the place of a whole one.
-            let whole = (self.detail.as_ref()).filter(|d| d.is_whole() && !drawn.is_whole());
-            if !whole.is_some_and(|whole| whole.of.looks_like(&drawn.of)) {
-                let rows = Eye::new(&self.scene, &drawn.of.camera).rows(&self.scene, drawn.size);
-                let (picture, share) = self.surfaces.set_picture(&drawn, &rows)?;
-                self.panel_pass.set_picture(picture, share)?;
-                if drawn.is_whole() {
-                    self.whole = Some(drawn.of.clone());
-                }
-                self.detail = Some(drawn);
-            }
-        }
-        for (path, saved) in self.detailer.saved() {
-            self.saving.retain(|under_way| *under_way != path);
-            match saved {
-                Ok(exposure) => {
-                    tracing::info!("saved {}, exposure {exposure}", path.display());
-                    self.say(format!("saved {}", path.display()));
-                }
-                Err(error) => self.fail(error)?,
-            }
-        }
-        match self.detailer.error() {
-            Some(error) => self.fail(error),
-            None => Ok(()),
-        }
-    }
-
-    /// A person is told of an error; a script ends with it.
-    fn fail(&mut self, error: Error) -> Result<()> {
-        match self.input.scripted {
-            true => Err(error),
-            false => {
-                tracing::error!("{error}");
-                self.say(error.to_string());
-                Ok(())
-            }
-        }
     }
 }

@@ -1,31 +1,32 @@
-//! Mouse and keys: what they do to the view and to the switches.
+//! Mouse and keys: their effect on the view and the switches.
 //!
-//! As in Blender, the middle button orbits, with Shift it pans, with Ctrl it nears; Alt and the left button stand in for it. As in
-//! games, the right button looks about, and W A S D, Q and E fly.
+//! As in Blender, the middle button orbits, with Shift it pans, with Ctrl it zooms; Alt with the
+//! left button acts as the middle button. As in games, the right button looks about, and W A S D, Q
+//! and E fly.
 
 use egui::RawInput;
 use glam::DVec3;
 
-use super::camera::Eye;
-use super::event::{Event, Key, Modifiers, PointerButton};
-use super::pick::first_hit;
-use super::switches::{DIRECTIONS, EXPOSURES, PARTS, SHADINGS, next};
-use super::viewer::Viewer;
+use super::Viewer;
+use crate::view::camera::Eye;
+use crate::view::event::{Event, Key, Modifiers, PointerButton};
+use crate::view::pick::first_hit;
+use crate::view::switches::{DIRECTIONS, EXPOSURES, PARTS, SHADINGS, next};
 
-/// What the mouse and the keys are at.
+/// State of the mouse and the keys.
 #[derive(Default)]
 pub struct Input {
-    /// For the panel.
+    /// Events for the panel.
     raw: RawInput,
     modifiers: Modifiers,
-    /// Pixels; none while it is elsewhere.
+    /// Pixels; None while the pointer is outside the window.
     pub pointer: Option<(f32, f32)>,
     drag: Option<Drag>,
-    /// A point light that follows the pointer, and where it was.
+    /// A point light that follows the pointer, and its place before.
     grabbed: Option<(usize, DVec3)>,
-    /// Keys held that fly.
+    /// Flying keys that are held down.
     held: Vec<Key>,
-    /// The element under the cursor where something asks for it, and the one that was clicked.
+    /// The element under the cursor, while something needs it, and the one that was clicked.
     pub hovered: Option<u32>,
     pub chosen: Option<u32>,
     /// Whether a script drives the window.
@@ -42,7 +43,7 @@ enum Drag {
     Click,
 }
 
-/// Keys that fly, with their ways: right, up, forward.
+/// Keys that fly, with their directions: right, up, forward.
 const WAYS: [(Key, DVec3); 6] = [
     (Key::W, DVec3::Z),
     (Key::S, DVec3::NEG_Z),
@@ -51,13 +52,13 @@ const WAYS: [(Key, DVec3); 6] = [
     (Key::E, DVec3::Y),
     (Key::Q, DVec3::NEG_Y),
 ];
-/// Times as fast with Shift.
+/// Factor of the speed with Shift.
 const FASTER: f64 = 4.0;
-/// Pixels of a drag that near as far as one step of the wheel.
+/// Pixels of a drag that zoom as far as one step of the wheel.
 const NEARING: f64 = 20.0;
-/// Stops of a key press.
+/// Stops of the exposure for one key press.
 const STOP: f32 = 0.25;
-/// What a key press makes of a light's strength.
+/// Factor of a light's strength for one key press.
 const BRIGHTER: f32 = 1.25;
 
 impl Input {
@@ -70,7 +71,7 @@ impl Input {
         self.raw.take()
     }
 
-    fn tell(&mut self, event: egui::Event) {
+    fn queue(&mut self, event: egui::Event) {
         self.raw.events.push(event);
     }
 }
@@ -82,16 +83,16 @@ impl Viewer {
         let at = |(x, y): (f32, f32)| egui::pos2(x / scale, y / scale);
         match event {
             Event::Pointer { x, y } => {
-                self.input.tell(egui::Event::PointerMoved(at((x, y))));
+                self.input.queue(egui::Event::PointerMoved(at((x, y))));
                 self.move_pointer((x, y));
             }
             Event::PointerGone => {
-                self.input.tell(egui::Event::PointerGone);
+                self.input.queue(egui::Event::PointerGone);
                 self.input.pointer = None;
                 self.input.hovered = None;
             }
             Event::Button { button, pressed } => {
-                self.input.tell(egui::Event::PointerButton {
+                self.input.queue(egui::Event::PointerButton {
                     pos: at(self.input.pointer.unwrap_or_default()),
                     button,
                     pressed,
@@ -100,7 +101,7 @@ impl Viewer {
                 self.press(button, pressed);
             }
             Event::Wheel(steps) => {
-                self.input.tell(egui::Event::MouseWheel {
+                self.input.queue(egui::Event::MouseWheel {
                     unit: egui::MouseWheelUnit::Line,
                     delta: egui::vec2(0.0, steps),
                     modifiers,
@@ -110,7 +111,7 @@ impl Viewer {
                 }
             }
             Event::Key { key, pressed } => {
-                self.input.tell(egui::Event::Key {
+                self.input.queue(egui::Event::Key {
                     key,
                     physical_key: None,
                     pressed,
@@ -119,13 +120,13 @@ impl Viewer {
                 });
                 self.key(key, pressed);
             }
-            Event::Text(text) => self.input.tell(egui::Event::Text(text)),
+            Event::Text(text) => self.input.queue(egui::Event::Text(text)),
             Event::Modifiers(modifiers) => self.input.modifiers = modifiers,
             Event::Focus(focused) => {
                 self.input.raw.focused = focused;
-                self.input.tell(egui::Event::WindowFocused(focused));
+                self.input.queue(egui::Event::WindowFocused(focused));
                 if !focused {
-                    // Their releases go to another window.
+                    // Their releases are sent to another window.
                     self.input.held.clear();
                     self.input.drag = None;
                 }
@@ -158,7 +159,8 @@ impl Viewer {
         self.hover();
     }
 
-    /// Finds the element under the pointer where something asks for it: that takes a while in large scenes.
+    /// Finds the element under the pointer if something needs it: the search is slow in large
+    /// scenes.
     fn hover(&mut self) {
         let wanted = self.switches.slots && self.input.drag.is_none() && !self.is_over_panel();
         let pointer = self.input.pointer.filter(|_| wanted);
@@ -201,7 +203,7 @@ impl Viewer {
         };
     }
 
-    /// Marks the element under the cursor, or none where it was marked.
+    /// Marks the element under the cursor, or unmarks it if it was marked.
     fn click(&mut self) {
         let found = self.input.pointer.and_then(|at| self.element_at(at));
         self.input.chosen = found.filter(|_| found != self.input.chosen);
@@ -277,7 +279,7 @@ impl Viewer {
         }
     }
 
-    /// Flies as the keys held say, for the time of a frame.
+    /// Flies in the direction of the held keys for the time of a frame.
     pub(super) fn fly(&mut self, seconds: f64) {
         let ways = WAYS.iter().filter(|(key, _)| self.input.held.contains(key));
         let way: DVec3 = ways.map(|(_, way)| *way).sum();
@@ -297,7 +299,7 @@ impl Viewer {
         }
     }
 
-    /// The chosen point light follows the pointer from now on.
+    /// Makes the chosen point light follow the pointer.
     fn grab(&mut self) {
         let position = self.lamps.get(self.lamp).and_then(|lamp| lamp.position);
         if let (Some(position), Some(_)) = (position, self.input.pointer) {
@@ -324,7 +326,7 @@ impl Viewer {
         }
     }
 
-    /// Leaves the light where it is, or puts it back.
+    /// Ends the move: leaves the light where it is, or puts it back.
     fn let_go(&mut self, stays: bool) {
         let Some((i, before)) = self.input.grabbed.take() else {
             return;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use crate::scene::{HeightMap, Material, PointLight, Scene, Triangle};
+use super::{HeightMap, Material, PointLight, Scene, Triangle};
 
 /// A scene made piece by piece. Material 0 reflects half and emits nothing.
 #[derive(Debug, Clone)]
@@ -56,7 +56,8 @@ impl Shapes {
         self.scene.vertices.len() as u32 - 1
     }
 
-    /// A parallelogram of n × m cells, two triangles each, facing `u` × `v`. Returns its range of triangles.
+    /// A parallelogram of n × m cells, two triangles each, facing `u` × `v`. Returns its range of
+    /// triangles.
     pub fn quad(
         &mut self,
         origin: DVec3,
@@ -91,7 +92,8 @@ impl Shapes {
         first..self.scene.triangles.len()
     }
 
-    /// The six inner sides of a box; the ranges are floor (y low), ceiling, x low, x high, z low, z high.
+    /// The six inner sides of a box; the ranges are floor (y low), ceiling, x low, x high, z low, z
+    /// high.
     pub fn room(
         &mut self,
         low: DVec3,
@@ -196,12 +198,13 @@ impl Shapes {
         first..self.scene.triangles.len()
     }
 
-    /// Gives a material a relief of so many texels a side, `height` over 0..1 × 0..1, in scene units.
+    /// Gives a material a relief of `size` texels a side: `height` over 0..1 × 0..1, in scene
+    /// units.
     pub fn relief(&mut self, material: u32, size: u32, height: impl Fn(f64, f64) -> f64) {
         self.relief_of(material, (size, size), height);
     }
 
-    /// As [`Shapes::relief`], of so many texels across and down.
+    /// As [`Shapes::relief`], with `width` texels across and `rows` down.
     pub fn relief_of(
         &mut self,
         material: u32,

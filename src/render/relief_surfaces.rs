@@ -1,0 +1,113 @@
+//! Height maps and factors of a scene's relief in the form that the relief pass reads.
+
+use std::collections::HashMap;
+
+use glam::{DVec2, Vec4};
+use rayon::prelude::*;
+
+use crate::meso::{Factors, HeightPyramid, Tile};
+use crate::passes::types::{HeightTile, ReliefSurface};
+use crate::scene::{HeightMap, Material, Scene};
+
+/// Prisms reach beyond the relief's range by this share of it, so that every ray begins above it.
+const MARGIN: f64 = 1e-3;
+
+/// Heights of a relief's prisms, in the map's values with the sign of their scale.
+pub struct HeightRange {
+    pub lowest: f64,
+    pub highest: f64,
+    mean: f64,
+    /// Scene units for a unit of height, positive.
+    scale: f64,
+}
+
+impl HeightRange {
+    fn new(map: &HeightMap, scale: f64) -> Self {
+        let (low, high) = map
+            .values
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| {
+                (low.min(f64::from(v)), high.max(f64::from(v)))
+            });
+        let margin = MARGIN * (high - low);
+        Self {
+            lowest: low - margin,
+            highest: high + margin,
+            mean: map.mean(),
+            scale,
+        }
+    }
+
+    /// Scene units above the mesh.
+    pub fn above(&self, height: f64) -> f64 {
+        self.scale * (height - self.mean)
+    }
+}
+
+/// Structure of arrays, `[surface]`: one surface for each tile.
+#[derive(Default)]
+pub struct Surfaces {
+    pub list: Vec<ReliefSurface>,
+    pub tiles: Vec<HeightTile>,
+    pub ranges: Vec<HeightRange>,
+    /// Sine of the steepest slope's angle: a ray that rises more steeply meets the relief only from
+    /// below.
+    pub steepest: Vec<f64>,
+    /// Values of the tiles' pyramids, one pyramid for each material.
+    pub pyramids: Vec<f32>,
+    /// Corners' factors of the surfaces, one surface after the other.
+    pub factors: Vec<Vec4>,
+}
+
+impl Surfaces {
+    /// `tiles` and `factors` are `[surface]`.
+    pub fn new(scene: &Scene, tiles: &[Tile], factors: &[Factors]) -> Self {
+        let mut all = Self::default();
+        let mut pyramids: HashMap<u32, HeightTile> = HashMap::new();
+        for (tile, factors) in tiles.iter().zip(factors) {
+            let material = &scene.materials[tile.material as usize];
+            let Some(map) = upward(material) else {
+                continue;
+            };
+            let values = &mut all.pyramids;
+            let height_tile = *pyramids.entry(tile.material).or_insert_with(|| {
+                let pyramid = HeightPyramid::new(&map);
+                let tile = HeightTile::new(&pyramid, values.len() as u32);
+                values.extend(&pyramid.values);
+                tile
+            });
+            let range = HeightRange::new(&map, f64::from(material.height_scale.abs()));
+            all.list.push(ReliefSurface {
+                lowest: range.lowest as f32,
+                top: range.highest as f32,
+                mean: range.mean as f32,
+                columns: tile.field.columns,
+                rows: tile.field.rows,
+                rank: factors.rank as u32,
+                first_factor: all.factors.len() as u32,
+                slope: (range.scale / tile.size).as_vec2(),
+            });
+            all.steepest.push(tile.field.steepest());
+            all.tiles.push(height_tile);
+            all.ranges.push(range);
+            all.factors.extend(&factors.corners);
+        }
+        all
+    }
+
+    /// Texels of a surface's height map, across and down.
+    pub fn size(&self, surface: u32) -> DVec2 {
+        let tile = &self.tiles[surface as usize];
+        DVec2::new(f64::from(tile.width), f64::from(tile.height))
+    }
+}
+
+/// The height map with the sign of its scale, so that higher is further out.
+fn upward(material: &Material) -> Option<HeightMap> {
+    let map = material.map_height.as_deref()?;
+    let sign = material.height_scale.signum();
+    Some(HeightMap {
+        values: map.values.par_iter().map(|v| sign * v).collect(),
+        ..map.clone()
+    })
+}

@@ -1,0 +1,119 @@
+//! The result of a bake, in scene units and in the order of the input.
+
+mod file;
+
+use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+
+use crate::elements::Elements;
+use crate::meso::Relief;
+use crate::scene::Scene;
+use crate::solver::{Light, ReliefLight, Report};
+pub use file::{Bake, VERSION};
+
+/// A solution, `[triangle]` in the order of the input.
+pub struct Solution {
+    /// Corners, scene units.
+    pub vertices: Vec<[DVec3; 3]>,
+    /// Scene units squared.
+    pub area: Vec<f64>,
+    pub normal: Vec<DVec3>,
+    /// Index into the scene's materials.
+    pub material: Vec<u32>,
+    /// W·m⁻², RGB, direct and indirect.
+    pub irradiance: Vec<Vec3>,
+    /// W·m⁻², RGB, straight from emitters and point lights.
+    pub irradiance_direct: Vec<Vec3>,
+    /// W·m⁻², RGB: πLe + ρE; of an element with a relief, the mean of what it sends.
+    pub radiosity: Vec<Vec3>,
+    /// Light by direction of the elements with a relief; none where no element has one.
+    pub relief: Option<DirectionalLight>,
+    pub report: Report,
+}
+
+/// Light by direction, `[meso element]` in the order of the input; slots as in
+/// [`crate::directions::Directions`].
+pub struct DirectionalLight {
+    /// Triangles of the input.
+    pub elements: Vec<u32>,
+    /// Middles of the slots in the tangent frame, `[slot]`.
+    pub directions: Vec<DVec3>,
+    /// Tangent (along u), bitangent (along v) and normal.
+    pub frames: Vec<[Vec3; 3]>,
+    /// ∫ L ω dω in the tangent frame, `[meso element][slot][colour]`, W·m⁻².
+    pub incident_moment: Vec<[Vec3; 3]>,
+    /// The part straight from emitters and point lights.
+    pub incident_moment_direct: Vec<[Vec3; 3]>,
+    /// πL sent into each slot, `[meso element][slot]`, RGB, W·m⁻².
+    pub exitant: Vec<Vec3>,
+}
+
+impl DirectionalLight {
+    fn new(elements: &Elements, relief: &Relief, light: &ReliefLight) -> Self {
+        let k = relief.directions.count();
+        let mut order: Vec<usize> = (0..light.elements.len()).collect();
+        let input = |m: usize| elements.input_index[light.elements[m] as usize];
+        order.sort_by_key(|&m| input(m));
+        let slots = |m: usize| m * k..(m + 1) * k;
+        Self {
+            elements: order.iter().map(|&m| input(m)).collect(),
+            directions: (0..k).map(|slot| relief.directions.centre(slot)).collect(),
+            frames: order
+                .iter()
+                .map(|&m| light.elements[m] as usize)
+                .map(|e| {
+                    [
+                        relief.tangent[e],
+                        relief.bitangent[e],
+                        elements.normal[e].as_vec3(),
+                    ]
+                })
+                .collect(),
+            incident_moment: order
+                .iter()
+                .flat_map(|&m| light.moments[slots(m)].to_vec())
+                .collect(),
+            incident_moment_direct: order
+                .iter()
+                .flat_map(|&m| light.moments_direct[slots(m)].to_vec())
+                .collect(),
+            exitant: order
+                .iter()
+                .flat_map(|&m| light.exitant[slots(m)].to_vec())
+                .collect(),
+        }
+    }
+}
+
+/// Where a bake's scene came from: enough to read it again.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Origin {
+    /// As on the command line: a built-in name, or a path made absolute.
+    pub scene: String,
+    pub patches: Option<usize>,
+    pub statue: Option<std::path::PathBuf>,
+    /// [`Scene::hash`].
+    pub hash: String,
+}
+
+impl Solution {
+    pub fn new(scene: &Scene, elements: &Elements, light: &Light, report: Report) -> Self {
+        let unit = elements.unit;
+        let area: Vec<f64> = elements.area.iter().map(|a| a * unit * unit).collect();
+        Self {
+            vertices: scene.triangles.iter().map(|t| scene.corners(t)).collect(),
+            area: elements.to_input_order(&area),
+            normal: elements.to_input_order(&elements.normal),
+            material: elements.to_input_order(&elements.material),
+            irradiance: elements.to_input_order(&light.irradiance),
+            irradiance_direct: elements.to_input_order(&light.irradiance_direct),
+            radiosity: elements.to_input_order(&light.radiosity),
+            relief: elements
+                .relief
+                .as_ref()
+                .zip(light.relief.as_ref())
+                .map(|(relief, light)| DirectionalLight::new(elements, relief, light)),
+            report,
+        }
+    }
+}
