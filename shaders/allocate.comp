@@ -59,7 +59,8 @@ void main() {
         first_word[lane] = mine;
         barrier();
         if (lane == 0) {
-            uint words = block_count;
+            // Factors begin at a whole texel of four words.
+            uint words = (block_count + 3) & ~3u;
             for (uint l = 0; l < SELECT_GROUP; l++) {
                 uint of_lane = first_word[l];
                 first_word[l] = words;

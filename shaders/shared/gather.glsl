@@ -10,8 +10,6 @@
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_ballot : require
 #extension GL_KHR_shader_subgroup_vote : require
-#extension GL_EXT_buffer_reference : require
-#extension GL_EXT_buffer_reference_uvec2 : require
 #include "shared/types.glsl"
 #include "shared/kept.glsl"
 #include "shared/lanes.glsl"
@@ -26,21 +24,24 @@
 #define FLUX float
 #endif
 
-// The workgroup is one subgroup. An invocation takes PAIRS pairs of elements, a pair because two kept factors share a word; the
-// pairs of one step lie side by side.
-layout(constant_id = 0) const uint LANES = GROUP / 2;
+// The workgroup is one subgroup. An invocation takes the FACTORS elements whose factors share a texel,
+// or several such; where there are more lanes than texels in a block, the others only look up slots.
+const uint FACTORS = 8;
+layout(constant_id = 0) const uint LANES = GROUP / FACTORS;
 layout(local_size_x_id = 0) in;
-const uint PAIRS = LANES < GROUP / 2 ? GROUP / 2 / LANES : 1;
+const uint TEXELS = GROUP / FACTORS;
+const uint PER_LANE = LANES < TEXELS ? TEXELS / LANES : 1;
 
-// What each source sends, and where its row lies.
-layout(scalar, binding = 0) readonly buffer Slots { Slot slots[]; };
+// What each row's source sends, times the scale of its form factors, and the first word of the row,
+// [slot][emitted, reflected].
+layout(binding = 0) uniform usamplerBuffer lit_rows;
 // Of emitted or of reflected light.
 layout(scalar, binding = 1) buffer Irradiance { vec3 irradiance[]; };
 layout(scalar, binding = 2) buffer IrradianceError { vec3 irradiance_error[]; };
-// [slot]
-layout(scalar, binding = 3) readonly buffer Rows { KeptRow rows[]; };
-layout(scalar, binding = 4) readonly buffer Chunks { uvec2 chunks[]; };
+// Words of the chunk that holds the rows.
+layout(binding = 3) uniform usamplerBuffer words;
 #ifdef FROM_RELIEF
+layout(scalar, binding = 4) readonly buffer Slots { Slot slots[]; };
 // Light that the sources with a relief send by direction,
 // [slot from first_slot on][emitted, reflected][direction].
 layout(scalar, binding = 5) readonly buffer Exits { vec3 exits[]; };
@@ -71,8 +72,6 @@ layout(push_constant, scalar) uniform Parameters {
 #endif
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Words { uint word[]; };
-
 #include "shared/accumulate.glsl"
 #ifdef FROM_RELIEF
 #include "shared/sent.glsl"
@@ -91,18 +90,14 @@ struct Receiver {
 #endif
 };
 
-// What a slot sends, and the place of its form factors.
+// What a slot sends, and the texel where this block's factors start; 0: the block sees nothing of it.
 struct Sent {
     vec3 light;
-    uint source;
-    float scale;
-    uvec2 address;  // of the chunk with the factors
-    uint block;     // where this block's factors start; 0: it sees nothing of the source
+    uint block;
 };
 
-// Place of the n-th element in its block; past the block where there are more lanes than pairs.
-uint in_block(uint n) {
-    return 2 * (gl_LocalInvocationID.x + n / 2 * LANES) + n % 2;
+uint word_at(uint at) {
+    return texelFetch(words, int(at / 4))[at % 4];
 }
 
 // Light of which the element sees the share f.
@@ -156,52 +151,49 @@ bool by_direction(uint source) {
 
 // This lane's slot, for all lanes to share.
 Sent look_up(uint slot) {
-    Sent sent = Sent(vec3(0.0), NONE, 1.0, uvec2(0), 0);
+    Sent sent = Sent(vec3(0.0), 0);
     if (slot < end_slot) {
-        Slot shot = slots[slot];
-        sent.light = reflected == 1 ? shot.reflected : shot.emitted;
-        sent.source = shot.source;
-        sent.scale = shot.scale;
-    }
-    bool sends = sent.light != vec3(0.0);
+        uvec4 lit = texelFetch(lit_rows, int(2 * slot + reflected));
+        sent.light = uintBitsToFloat(lit.xyz);
+        bool sends = sent.light != vec3(0.0);
 #ifdef FROM_RELIEF
-    // What leaves by direction may sum to nothing.
-    sends = sends || reflected == 1 && by_direction(sent.source);
+        // What leaves by direction may sum to nothing.
+        sends = sends || reflected == 1 && by_direction(slots[slot].source);
 #endif
-    if (sends) {
-        KeptRow row = rows[slot];
-        sent.address = chunks[row.chunk];
-        sent.block = Words(sent.address).word[row.first + first_block + gl_WorkGroupID.x];
-        sent.block += sent.block == 0 ? 0 : row.first;
+        if (sends) {
+            uint at = word_at(lit.w + first_block + gl_WorkGroupID.x);
+            sent.block = at == 0 ? 0 : (lit.w + at) / 4;
+        }
     }
     return sent;
 }
 
-Sent share(Sent sent, uint lane) {
-    return Sent(subgroupBroadcast(sent.light, lane), subgroupBroadcast(sent.source, lane),
-                subgroupBroadcast(sent.scale, lane), subgroupBroadcast(sent.address, lane),
-                subgroupBroadcast(sent.block, lane));
-}
-
-// The two kept form factors of the n-th and the next element.
-void kept_pair(Words words, uint block, uint n, out FLUX f[2]) {
-    uint pair = in_block(n) < GROUP ? words.word[block + in_block(n) / 2] : 0;
-    for (uint side = 0; side < 2; side++) {
-        float factor = kept_factor(side == 0 ? pair & 0xffff : pair >> 16);
+// The factors of the elements of one texel.
+void load(uint block, uint texel, out FLUX f[FACTORS]) {
+    uvec4 pairs = texelFetch(words, int(block + texel));
 #ifdef TO_RELIEF
-        uint direction = words.word[block + GROUP / 2 + in_block(n + side)];
-        f[side] = factor == 0.0 ? vec3(0.0) : factor * kept_direction(direction);
+    uvec4 low = texelFetch(words, int(block + TEXELS + 2 * texel));
+    uvec4 high = texelFetch(words, int(block + TEXELS + 2 * texel + 1));
+#endif
+    for (uint k = 0; k < FACTORS; k++) {
+        uint pair = pairs[k / 2];
+        float factor = kept_factor(k % 2 == 0 ? pair & 0xffff : pair >> 16);
+#ifdef TO_RELIEF
+        uint direction = k < 4 ? low[k % 4] : high[k % 4];
+        f[k] = factor == 0.0 ? vec3(0.0) : factor * kept_direction(direction);
 #else
-        f[side] = factor;
+        f[k] = factor;
 #endif
     }
 }
 
 void main() {
-    Receiver receivers[2 * PAIRS];
-    for (uint n = 0; n < 2 * PAIRS; n++) {
-        uint i = GROUP * gl_WorkGroupID.x + in_block(n);
-        bool inside = in_block(n) < GROUP && i < element_count;
+    Receiver receivers[FACTORS * PER_LANE];
+    uint lane = gl_SubgroupInvocationID;
+    for (uint n = 0; n < FACTORS * PER_LANE; n++) {
+        uint texel = lane + n / FACTORS * LANES;
+        uint i = GROUP * gl_WorkGroupID.x + FACTORS * texel + n % FACTORS;
+        bool inside = texel < TEXELS && i < element_count;
         receivers[n].i = inside ? i : NONE;
         receivers[n].irradiance = vec3(0.0);
 #ifdef FROM_RELIEF
@@ -224,39 +216,57 @@ void main() {
         uvec4 even;
         do {
             first = next;
-            mine = look_up(first + gl_SubgroupInvocationID);
+            mine = look_up(first + lane);
             even = subgroupBallot(mine.block != 0);
             next = first + LANES;
         } while (even == uvec4(0) && next < end_slot);
 #ifdef FROM_RELIEF
-        uvec4 directed = subgroupBallot(mine.block != 0 && by_direction(mine.source));
+        uint source = first + lane < end_slot ? slots[first + lane].source : NONE;
+        uvec4 directed = subgroupBallot(mine.block != 0 && by_direction(source));
         even &= ~directed;
         while (any(notEqual(directed, uvec4(0)))) {
-            uint lane = next_lane(directed);
-            Sent sent = share(mine, lane);
-            Sender s = sender(sent.source);
-            for (uint n = 0; n < 2 * PAIRS; n += 2) {
-                FLUX f[2];
-                kept_pair(Words(sent.address), sent.block, n, f);
-                for (uint side = 0; side < 2; side++) {
-                    receive(receivers[n + side], sent.scale * f[side], sent_to(first + lane, s, receivers[n + side].middle));
+            uint from = next_lane(directed);
+            uint block = subgroupBroadcast(mine.block, from);
+            Slot shot = slots[first + from];
+            Sender s = sender(shot.source);
+            for (uint n = 0; n < PER_LANE; n++) {
+                FLUX f[FACTORS];
+                load(block, min(lane + n * LANES, TEXELS - 1), f);
+                for (uint k = 0; k < FACTORS; k++) {
+                    uint of = FACTORS * n + k;
+                    vec3 light = sent_to(first + from, s, receivers[of].middle);
+                    // Lanes past the block have nothing to add to.
+                    FLUX factor = receivers[of].i != NONE ? shot.scale * f[k] : FLUX(0.0);
+                    receive(receivers[of], factor, light);
                 }
             }
         }
 #endif
         while (any(notEqual(even, uvec4(0)))) {
-            Sent sent = share(mine, next_lane(even));
-            for (uint n = 0; n < 2 * PAIRS; n += 2) {
-                FLUX f[2];
-                kept_pair(Words(sent.address), sent.block, n, f);
-                for (uint side = 0; side < 2; side++) {
-                    receive(receivers[n + side], sent.scale * f[side], sent.light);
+            uint from = next_lane(even);
+            vec3 light = subgroupBroadcast(mine.light, from);
+            uint block = subgroupBroadcast(mine.block, from);
+#ifdef TO_RELIEF
+            float scale = slots[first + from].scale;
+#endif
+            for (uint n = 0; n < PER_LANE; n++) {
+                FLUX f[FACTORS];
+                load(block, min(lane + n * LANES, TEXELS - 1), f);
+                for (uint k = 0; k < FACTORS; k++) {
+#ifdef TO_RELIEF
+                    // How wide the source is follows from its whole form factor.
+                    bool inside = receivers[FACTORS * n + k].i != NONE;
+                    vec3 factor = inside ? scale * f[k] : vec3(0.0);
+                    receive(receivers[FACTORS * n + k], factor, light / scale);
+#else
+                    receive(receivers[FACTORS * n + k], f[k], light);
+#endif
                 }
             }
         }
     }
 
-    for (uint n = 0; n < 2 * PAIRS; n++) {
+    for (uint n = 0; n < FACTORS * PER_LANE; n++) {
         uint i = receivers[n].i;
         if (i == NONE) {
             continue;
@@ -264,7 +274,8 @@ void main() {
         uint e = first_element + i;
         accumulate(irradiance[e], irradiance_error[e], receivers[n].irradiance);
 #ifdef TO_RELIEF
-        accumulate(meso_reflected[i].sum, meso_reflected[i].error, receivers[n].reflected * meso_elements[i].scale);
+        vec3 sum = receivers[n].reflected * meso_elements[i].scale;
+        accumulate(meso_reflected[i].sum, meso_reflected[i].error, sum);
 #endif
     }
 }

@@ -137,7 +137,7 @@ pub fn run(
     let mut rows = Vec::new();
     for size in sizes(options.first, options.largest) {
         for &limit in &options.limits {
-            let Some(row) = bake(device, options, (size, limit), &go_on)? else {
+            let Some(row) = bake(device, options, size, limit, &go_on)? else {
                 return Ok(());
             };
             println!("{}", line(&row));
@@ -160,7 +160,8 @@ pub fn run(
 fn bake(
     device: &Arc<Device>,
     options: &Options,
-    (size, limit): (usize, Option<usize>),
+    size: usize,
+    limit: Option<usize>,
     go_on: &impl Fn() -> bool,
 ) -> Result<Option<Row>> {
     let builtin = BuiltinOptions {

@@ -126,8 +126,13 @@ pub fn run(
         let scene = load(name, &builtin)?;
         let mut under = Vec::new();
         let mut start = |kind: &str, transport, k, minutes| -> Result<()> {
-            let bake = (transport, k);
-            under.push(begin(device, &scene, options, kind, bake, minutes)?);
+            let how = How {
+                kind,
+                transport,
+                k,
+                paper_minutes: minutes,
+            };
+            under.push(begin(device, &scene, options, how)?);
             Ok(())
         };
         start("lambert", Transport::Lambert, 16, None)?;
@@ -149,8 +154,13 @@ pub fn run(
         keep(&low)?;
         if options.high_poly && go_on() {
             let fine = displace(&scene);
-            let lambert = (Transport::Lambert, 16);
-            let under = begin(device, &fine, options, "high-poly", lambert, None)?;
+            let how = How {
+                kind: "high-poly",
+                transport: Transport::Lambert,
+                k: 16,
+                paper_minutes: None,
+            };
+            let under = begin(device, &fine, options, how)?;
             let high = in_turns(vec![under], &fine, &go_on)?;
             keep(&high)?;
             if let [high] = &high[..] {
@@ -168,14 +178,21 @@ pub fn run(
     Ok(())
 }
 
-fn begin(
-    device: &Arc<Device>,
-    scene: &Scene,
-    options: &Options,
-    kind: &str,
-    (transport, k): (Transport, u32),
+/// How a scene is baked, and what the paper's table says of it.
+struct How<'a> {
+    kind: &'a str,
+    transport: Transport,
+    k: u32,
     paper_minutes: Option<f64>,
-) -> Result<Under> {
+}
+
+fn begin(device: &Arc<Device>, scene: &Scene, options: &Options, how: How<'_>) -> Result<Under> {
+    let How {
+        kind,
+        transport,
+        k,
+        paper_minutes,
+    } = how;
     let settings = Settings {
         residual: options.residual,
         relief: ReliefOptions {

@@ -183,6 +183,7 @@ mod tests {
     fn no_list_outgrows_the_largest_buffer() {
         let limits = Limits {
             max_storage_buffer_range: 128 << 20,
+            max_texels: 128 << 20,
             heap_bytes: 16 << 30,
             max_image_side: 16384,
             subgroup_size: 8,

@@ -86,7 +86,8 @@ impl Cull {
         &self,
         cmd: &Commands,
         set: &DescriptorSet,
-        (scene, batch): (&SceneBuffers, &Batch),
+        scene: &SceneBuffers,
+        batch: &Batch,
         part: u32,
     ) {
         let hemicubes = batch.hemicubes();

@@ -70,14 +70,24 @@ const ITEMS: usize = 6;
 const SORT: usize = 9;
 const PLAIN: usize = 12;
 
+/// A shader that lists or evaluates receivers.
+#[derive(Clone, Copy)]
+struct Shader<'a> {
+    name: &'a str,
+    spirv: &'a [u32],
+    /// How many it has, those of what is asked what is seen included.
+    bindings: usize,
+    seen_by: SeenBy,
+}
+
 fn pipeline(
     device: &Arc<Device>,
-    (name, spirv): (&str, &[u32]),
-    bindings: usize,
-    (seen_by, constants): (SeenBy, &[u32]),
+    shader: Shader<'_>,
+    constants: &[u32],
 ) -> Result<ComputePipeline> {
-    let mut kinds = vec![Binding::Storage; bindings];
-    match seen_by {
+    let Shader { name, spirv, .. } = shader;
+    let mut kinds = vec![Binding::Storage; shader.bindings];
+    match shader.seen_by {
         SeenBy::ItemBuffer => kinds[ITEMS] = Binding::Sampled,
         // What the nodes hold comes last.
         SeenBy::ShadowRays => kinds.push(Binding::Storage),
@@ -96,9 +106,15 @@ fn pipeline(
 impl FormFactors {
     pub fn new(device: &Arc<Device>, with_relief: bool, sorting: Sorting) -> Result<Self> {
         let seen_by = sorting.seen_by;
-        let kinds = |shader, bindings| -> Result<Vec<_>> {
+        let shader = |name, spirv, bindings| Shader {
+            name,
+            spirv,
+            bindings,
+            seen_by,
+        };
+        let kinds = |shader| -> Result<Vec<_>> {
             (0..RECEIVE_KINDS)
-                .map(|kind| pipeline(device, shader, bindings, (seen_by, &[kind])))
+                .map(|kind| pipeline(device, shader, &[kind]))
                 .collect()
         };
         let [sort, plain, meso] = match seen_by {
@@ -114,14 +130,14 @@ impl FormFactors {
             ],
         };
         let sort_constants = [sorting.culls.into()];
-        let sort = ("sort receivers", sort);
-        let plain = ("form factors", plain);
-        let meso = ("form factors to relief", meso);
+        let sort = shader("sort receivers", sort, SORT);
+        let plain = shader("form factors", plain, PLAIN);
+        let meso = shader("form factors to relief", meso, PLAIN + 1);
         Ok(Self {
-            sort: pipeline(device, sort, SORT, (seen_by, &sort_constants))?,
-            plain: kinds(plain, PLAIN)?,
+            sort: pipeline(device, sort, &sort_constants)?,
+            plain: kinds(plain)?,
             meso: if with_relief {
-                kinds(meso, PLAIN + 1)?
+                kinds(meso)?
             } else {
                 Vec::new()
             },
@@ -242,7 +258,7 @@ impl FormFactors {
                     let push = parameters(range, slot..slot + 1);
                     let list = u64::from(slot * RECEIVE_KINDS) + kind as u64;
                     let at = size_of::<ReceiverList>() as u64 * list;
-                    cmd.dispatch_indirect(pipeline, set, &push, (&lists.counts, at));
+                    cmd.dispatch_indirect(pipeline, set, &push, &lists.counts, at);
                 }
             }
         }

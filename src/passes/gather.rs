@@ -15,32 +15,46 @@ use super::{groups, shaders};
 use crate::error::Result;
 use crate::vk::{
     Bind, Binding, Buffer, BufferUse, Commands, ComputePipeline, DescriptorSet, Device, Stage,
+    TEXEL_BYTES,
 };
 
-/// Rows and the light that their sources send.
+/// Rows and the light that their sources send; the rows of one chunk behind one another.
 pub struct GatherList {
-    /// [`Slot`] and [`KeptRow`], `[slot]`.
+    /// `[slot]`
     pub slots: Buffer,
-    rows: Buffer,
+    /// Light times the scale of the form factors and the first word of the row,
+    /// `[slot][emitted, reflected]`.
+    lit: Buffer,
 }
 
 impl GatherList {
     /// For as many rows at most.
     pub fn new(device: &Arc<Device>, most: u32) -> Result<Self> {
-        let buffer = |name, size: usize| {
-            let bytes = u64::from(most) * size as u64;
-            Buffer::new(device, name, bytes, BufferUse::Storage)
-        };
+        let most = u64::from(most);
+        let slots = most * size_of::<Slot>() as u64;
         Ok(Self {
-            slots: buffer("gathered sources", size_of::<Slot>())?,
-            rows: buffer("gathered rows", size_of::<KeptRow>())?,
+            slots: Buffer::new(device, "gathered sources", slots, BufferUse::Storage)?,
+            lit: Buffer::new(
+                device,
+                "lit rows",
+                2 * TEXEL_BYTES * most,
+                BufferUse::Texels,
+            )?,
         })
     }
 
     /// Lists these rows from the first slot on.
     pub fn write(&self, device: &Arc<Device>, slots: &[Slot], rows: &[KeptRow]) -> Result<()> {
+        let lit: Vec<[u32; 4]> = (slots.iter().zip(rows))
+            .flat_map(|(slot, row)| {
+                [slot.emitted, slot.reflected].map(|light| {
+                    let [r, g, b] = (light * slot.scale).to_array().map(f32::to_bits);
+                    [r, g, b, row.first]
+                })
+            })
+            .collect();
         write(device, &self.slots, slots)?;
-        write(device, &self.rows, rows)
+        write(device, &self.lit, &lit)
     }
 }
 
@@ -57,10 +71,20 @@ pub struct Gather {
     meso: Option<ComputePipeline>,
 }
 
+/// For each chunk of rows.
+pub struct Sets(Vec<ChunkSets>);
+
 /// For emitted and for reflected light.
-pub struct Sets {
+struct ChunkSets {
     plain: [DescriptorSet; 2],
     meso: Option<[DescriptorSet; 2]>,
+}
+
+/// Slots whose rows lie in one chunk.
+#[derive(Debug, Clone)]
+pub struct ChunkSlots {
+    pub chunk: u32,
+    pub slots: Range<u32>,
 }
 
 #[repr(C)]
@@ -81,9 +105,11 @@ struct Parameters {
 
 /// Bytes of [`Parameters`] in a scene without relief.
 const PLAIN_BYTES: usize = 24;
-/// How many bindings each shader has.
-const PLAIN: usize = 5;
-const FROM_RELIEF: usize = PLAIN + 3;
+/// How many bindings each shader has, and those that are texels.
+const PLAIN: usize = 4;
+const FROM_RELIEF: usize = PLAIN + 4;
+const LIT_ROWS: usize = 0;
+const WORDS: usize = 3;
 const TO_RELIEF: usize = FROM_RELIEF + 4;
 
 /// Slots of a dispatch: a software device ends a shader's loops after 65,535 turns of all together.
@@ -93,7 +119,9 @@ impl Gather {
     pub fn new(device: &Arc<Device>, with_relief: bool) -> Result<Self> {
         let lanes = [device.limits().subgroup_size];
         let make = |name, spirv, bindings: usize, bytes| {
-            let kinds = vec![Binding::Storage; bindings];
+            let mut kinds = vec![Binding::Storage; bindings];
+            kinds[LIT_ROWS] = Binding::Texels;
+            kinds[WORDS] = Binding::Texels;
             ComputePipeline::new(device, name, spirv, &kinds, bytes, &lanes, true)
         };
         if !with_relief {
@@ -117,36 +145,40 @@ impl Gather {
         list: &GatherList,
         relief: Option<&ReliefBuffers>,
     ) -> Result<Sets> {
-        let lights = [
-            (&state.direct, &state.direct_error),
-            (&state.indirect, &state.indirect_error),
-        ];
-        let mut plain = lights.map(|(irradiance, error)| {
-            vec![&list.slots, irradiance, error, &list.rows, &kept.table]
-        });
-        if let Some(relief) = relief {
-            for binds in &mut plain {
-                binds.extend([&relief.exits, &scene.sources, &scene.balls]);
-            }
-        }
-        let meso = match (&self.meso, relief) {
-            (Some(pipeline), Some(relief)) => {
-                let mut meso = plain.clone();
-                for (binds, moments) in meso
-                    .iter_mut()
-                    .zip([&relief.moments_direct, &relief.moments_indirect])
-                {
-                    let receiving = [&relief.elements, &relief.albedos, moments];
-                    binds.extend(receiving.into_iter().chain([&relief.reflected]));
+        let sets = |chunk: &Buffer| {
+            let light = |irradiance, error| {
+                let mut binds = vec![Bind::Texels(&list.lit)];
+                binds.extend([irradiance, error].map(Bind::Buffer));
+                binds.push(Bind::Texels(chunk));
+                if let Some(relief) = relief {
+                    let sending = [&list.slots, &relief.exits, &scene.sources, &scene.balls];
+                    binds.extend(sending.map(Bind::Buffer));
                 }
-                Some(sets(pipeline, "gather to relief", &meso)?)
-            }
-            _ => None,
+                binds
+            };
+            let plain = [
+                light(&state.direct, &state.direct_error),
+                light(&state.indirect, &state.indirect_error),
+            ];
+            let meso = match (&self.meso, relief) {
+                (Some(pipeline), Some(relief)) => {
+                    let mut meso = plain.clone();
+                    let moments = [&relief.moments_direct, &relief.moments_indirect];
+                    for (binds, moments) in meso.iter_mut().zip(moments) {
+                        let receiving = [&relief.elements, &relief.albedos, moments];
+                        binds.extend(receiving.map(Bind::Buffer));
+                        binds.push(Bind::Buffer(&relief.reflected));
+                    }
+                    Some(both(pipeline, "gather to relief", &meso)?)
+                }
+                _ => None,
+            };
+            Ok(ChunkSets {
+                plain: both(&self.plain, "gather", &plain)?,
+                meso,
+            })
         };
-        Ok(Sets {
-            plain: sets(&self.plain, "gather", &plain)?,
-            meso,
-        })
+        Ok(Sets(kept.chunks.iter().map(sets).collect::<Result<_>>()?))
     }
 
     /// One part of the light of `slots` of the list, in steps that software devices finish.
@@ -155,10 +187,12 @@ impl Gather {
         cmd: &Commands,
         sets: &Sets,
         kept: &KeptRows,
-        slots: Range<u32>,
+        of: &ChunkSlots,
         part: Part,
     ) {
         let shape = kept.shape;
+        let slots = &of.slots;
+        let set = &sets.0[of.chunk as usize].plain[part as usize];
         for first in slots.clone().step_by(MOST_SLOTS as usize) {
             let parameters = Parameters {
                 first_element: 0,
@@ -174,7 +208,7 @@ impl Gather {
             let bytes = &bytemuck::bytes_of(&parameters)[..PLAIN_BYTES];
             let push: [u8; PLAIN_BYTES] = bytes.try_into().expect("as many bytes");
             let size = [groups(shape.plain_count), 1, 1];
-            cmd.dispatch(&self.plain, &sets.plain[part as usize], &push, size);
+            cmd.dispatch(&self.plain, set, &push, size);
             cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         }
     }
@@ -187,10 +221,12 @@ impl Gather {
         sets: &Sets,
         kept: &KeptRows,
         relief: &ReliefBuffers,
-        slots: Range<u32>,
+        of: &ChunkSlots,
         part: Part,
     ) {
         let shape = kept.shape;
+        let slots = &of.slots;
+        let sets = &sets.0[of.chunk as usize];
         let plain = Parameters {
             first_element: 0,
             element_count: shape.plain_count,
@@ -221,14 +257,14 @@ impl Gather {
     }
 }
 
-fn sets(
+/// For emitted and for reflected light.
+fn both(
     pipeline: &ComputePipeline,
     name: &str,
-    binds: &[Vec<&Buffer>; 2],
+    binds: &[Vec<Bind<'_>>; 2],
 ) -> Result<[DescriptorSet; 2]> {
-    let set = |buffers: &Vec<&Buffer>| {
-        let binds: Vec<_> = buffers.iter().map(|b| Bind::Buffer(b)).collect();
-        pipeline.bind(name, &binds)
-    };
-    Ok([set(&binds[0])?, set(&binds[1])?])
+    Ok([
+        pipeline.bind(name, &binds[0])?,
+        pipeline.bind(name, &binds[1])?,
+    ])
 }

@@ -25,6 +25,12 @@ pub struct ItemBuffer {
     pipeline: GraphicsPipeline,
 }
 
+/// What lists the triangles of each face.
+pub struct Lists<'a> {
+    pub cull: &'a Cull,
+    pub set: &'a DescriptorSet,
+}
+
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 struct Parameters {
@@ -81,19 +87,24 @@ impl ItemBuffer {
         &self,
         cmd: &Commands,
         set: &DescriptorSet,
-        (cull, cull_set): (&Cull, &DescriptorSet),
-        (scene, batch): (&SceneBuffers, &Batch),
+        lists: &Lists<'_>,
+        scene: &SceneBuffers,
+        batch: &Batch,
         listed: impl FnOnce(),
     ) {
-        cull.record(cmd, cull_set, (scene, batch), 0);
+        let Lists {
+            cull,
+            set: cull_set,
+        } = lists;
+        cull.record(cmd, cull_set, scene, batch, 0);
         cmd.barrier(&[Stage::Compute], &[Stage::Draw]);
         listed();
-        self.draw(cmd, set, (scene, batch), &self.pass);
+        self.draw(cmd, set, scene, batch, &self.pass);
         for part in 1..batch.hemicubes().parts(scene) {
             cmd.barrier(&[Stage::Draw], &[Stage::Compute]);
-            cull.record(cmd, cull_set, (scene, batch), part);
+            cull.record(cmd, cull_set, scene, batch, part);
             cmd.barrier(&[Stage::Compute], &[Stage::Draw]);
-            self.draw(cmd, set, (scene, batch), &self.further);
+            self.draw(cmd, set, scene, batch, &self.further);
         }
     }
 
@@ -101,7 +112,8 @@ impl ItemBuffer {
         &self,
         cmd: &Commands,
         set: &DescriptorSet,
-        (scene, batch): (&SceneBuffers, &Batch),
+        scene: &SceneBuffers,
+        batch: &Batch,
         pass: &RenderPass,
     ) {
         let hemicubes = batch.hemicubes();

@@ -9,7 +9,7 @@ use super::fresh_rows::RowShape;
 use super::types::KeptState;
 use crate::constants::GROUP;
 use crate::error::Result;
-use crate::vk::{Buffer, BufferUse, Device};
+use crate::vk::{Buffer, BufferUse, Device, TEXEL_BYTES};
 
 /// Chunks of device memory with rows, and how far they are filled.
 pub struct KeptRows {
@@ -18,7 +18,9 @@ pub struct KeptRows {
     pub table: Buffer,
     pub state: Buffer,
     pub chunk_words: u32,
-    chunks: Vec<Buffer>,
+    /// All chunks; the last [`SCRATCH`] are for rows that find no room.
+    pub chunks: Vec<Buffer>,
+    lasting: usize,
 }
 
 /// Batches under way at once, each with a chunk of its own for rows that find no room.
@@ -61,13 +63,21 @@ impl KeptRows {
         // A row lies in one chunk, so that a chunk may end with most of a row unused.
         let chunk = match restored {
             Some(restored) => 4 * u64::from(restored.chunk_words),
-            None => most.min(CHUNK).next_multiple_of(4),
+            None => {
+                let texels = device.limits().max_texels * TEXEL_BYTES;
+                most.min(CHUNK).min(texels).next_multiple_of(TEXEL_BYTES)
+            }
         };
         let count = if row > chunk { 0 } else { most.div_ceil(chunk) };
         let least = restored.map_or(0, |restored| restored.chunks as u64);
         let mut chunks = Vec::new();
         for _ in 0..count.max(least) {
-            match Buffer::new(device, "kept form factors", chunk, BufferUse::Addressed) {
+            match Buffer::new(
+                device,
+                "kept form factors",
+                chunk,
+                BufferUse::AddressedTexels,
+            ) {
                 Ok(buffer) => chunks.push(buffer),
                 Err(e) if (chunks.len() as u64) < least => return Err(e),
                 Err(e) => {
@@ -78,34 +88,47 @@ impl KeptRows {
         }
         let bytes = row * u64::from(size.slots);
         let scratch = (0..SCRATCH)
-            .map(|_| Buffer::new(device, "rows without room", bytes, BufferUse::Addressed))
+            .map(|_| {
+                Buffer::new(
+                    device,
+                    "rows without room",
+                    bytes,
+                    BufferUse::AddressedTexels,
+                )
+            })
             .collect::<Result<Vec<_>>>()?;
         let addresses: Vec<u64> = chunks.iter().chain(&scratch).map(Buffer::address).collect();
         let table = upload(device, "row chunks", &addresses, BufferUse::Storage)?;
-        // Shaders reach them by their addresses alone.
+        // Shaders write them by their addresses.
         for chunk in chunks.iter().chain(&scratch) {
             table.refer_to(chunk);
         }
+        let lasting = chunks.len();
+        chunks.extend(scratch);
         Ok(Self {
             shape,
             table,
             state: filled(device, "kept state", size_of::<KeptState>() as u64, 0)?,
             chunk_words: (chunk / 4) as u32,
             chunks,
+            lasting,
         })
     }
 
     /// How far the chunks are filled, and what they hold.
     pub fn download(&self, device: &Arc<Device>) -> Result<(KeptState, Vec<Vec<u32>>)> {
         let state = download::<KeptState>(device, &self.state, 1)?[0];
-        let full = self.chunks.iter().enumerate().map(|(i, chunk)| {
-            let words = match (i as u32).cmp(&state.chunk) {
-                Ordering::Less => self.chunk_words,
-                Ordering::Equal => state.used,
-                Ordering::Greater => 0,
-            };
-            download(device, chunk, words as usize)
-        });
+        let full = self.chunks[..self.lasting]
+            .iter()
+            .enumerate()
+            .map(|(i, chunk)| {
+                let words = match (i as u32).cmp(&state.chunk) {
+                    Ordering::Less => self.chunk_words,
+                    Ordering::Equal => state.used,
+                    Ordering::Greater => 0,
+                };
+                download(device, chunk, words as usize)
+            });
         Ok((state, full.collect::<Result<_>>()?))
     }
 
@@ -117,7 +140,7 @@ impl KeptRows {
         chunks: &[Vec<u32>],
     ) -> Result<()> {
         write(device, &self.state, &[state])?;
-        for (buffer, words) in self.chunks.iter().zip(chunks) {
+        for (buffer, words) in self.chunks[..self.lasting].iter().zip(chunks) {
             write(device, buffer, words)?;
         }
         Ok(())
@@ -125,18 +148,18 @@ impl KeptRows {
 
     /// Whether anything can be kept.
     pub fn keeps(&self) -> bool {
-        !self.chunks.is_empty()
+        self.lasting > 0
     }
 
     /// Chunks whose rows last.
     pub fn chunk_count(&self) -> u32 {
-        self.chunks.len() as u32
+        self.lasting as u32
     }
 }
 
 /// Bytes of a row that all elements see.
 fn row_bytes(shape: RowShape) -> u64 {
     let (plain, meso) = (shape.plain_blocks(), shape.meso_blocks());
-    let table = 4 * u64::from(shape.blocks());
+    let table = (4 * u64::from(shape.blocks())).next_multiple_of(TEXEL_BYTES);
     table + u64::from(GROUP) * (2 * u64::from(plain) + 6 * u64::from(meso))
 }

@@ -151,7 +151,8 @@ impl Shade {
     /// [`LitTriangle`]: super::types::LitTriangle
     pub fn bind(
         &self,
-        (albedo, sampler): (&Image, &Sampler),
+        albedo: &Image,
+        sampler: &Sampler,
         lights: &LightBuffers,
         lit: &Buffer,
     ) -> Result<DescriptorSet> {
@@ -174,7 +175,8 @@ impl Shade {
         cmd: &Commands,
         target: &Target,
         (width, height): (u32, u32),
-        (vertices, indices): (&Buffer, &Buffer),
+        vertices: &Buffer,
+        indices: &Buffer,
         draws: impl Iterator<Item = Draw<'a>>,
         then: impl FnOnce(),
     ) {

@@ -324,7 +324,8 @@ impl<'a> Renderer<'a> {
             cmd,
             target,
             (tile.width * samples, tile.height * samples),
-            (&mesh.vertices, &mesh.indices),
+            &mesh.vertices,
+            &mesh.indices,
             plain,
             || {
                 if let Some(relief) = relief {

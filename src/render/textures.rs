@@ -71,7 +71,7 @@ impl Textures {
     /// # Errors
     /// A device without the memory.
     pub fn bind(&self, shade: &Shade, lights: &LightBuffers, lit: &Buffer) -> Result<Bound> {
-        let set = |image| shade.bind((image, &self.sampler), lights, lit);
+        let set = |image| shade.bind(image, &self.sampler, lights, lit);
         Ok(Bound {
             of_material: self.of_material.clone(),
             sets: self.images.iter().map(set).collect::<Result<_>>()?,

@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::passes::batch::{Batch, BatchSize, Hemicubes};
 use crate::passes::buffers::{SceneBuffers, write};
 use crate::passes::cull::{Cull, Culling};
-use crate::passes::item_buffer::ItemBuffer;
+use crate::passes::item_buffer::{ItemBuffer, Lists};
 use crate::passes::types::Slot;
 use crate::vk::{Buffer, BufferUse, Commands, DescriptorSet, Device, Stage};
 
@@ -64,9 +64,11 @@ impl Drawing {
         batch: &Batch,
         listed: impl FnOnce(),
     ) {
-        let cull = (&self.cull, &self.cull_set);
-        let of = (scene, batch);
-        (self.item_buffer).record(cmd, &self.item_set, cull, of, listed);
+        let lists = Lists {
+            cull: &self.cull,
+            set: &self.cull_set,
+        };
+        (self.item_buffer).record(cmd, &self.item_set, &lists, scene, batch, listed);
     }
 }
 

@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 
 use crate::error::Result;
 use crate::passes::buffers::{SceneBuffers, State, download};
-use crate::passes::gather::{self, Gather, GatherList, Part};
+use crate::passes::gather::{self, ChunkSlots, Gather, GatherList, Part};
 use crate::passes::kept_rows::KeptRows;
 use crate::passes::measure::Measure;
 use crate::passes::measure_relief::MeasureRelief;
@@ -91,6 +91,8 @@ impl Gathering {
         if rows.is_empty() {
             return Ok(());
         }
+        let mut rows = rows.to_vec();
+        rows.sort_by_key(|row| row.row.chunk);
         let slot = |row: &LitRow| Slot {
             emitted: row.emitted,
             source: row.source,
@@ -100,43 +102,55 @@ impl Gathering {
         let slots: Vec<Slot> = rows.iter().map(slot).collect();
         let places: Vec<KeptRow> = rows.iter().map(|row| row.row).collect();
         self.list.write(&self.device, &slots, &places)?;
-        let parts = |rows: &[LitRow]| {
-            let any = |of: fn(&LitRow) -> Vec3| rows.iter().any(|row| of(row) != Vec3::ZERO);
-            let emitted = any(|row| row.emitted).then_some(Part::Emitted);
-            let reflected = any(|row| row.reflected).then_some(Part::Reflected);
-            [emitted, reflected]
-        };
         Commands::run(&self.device, "gather", |cmd| {
             cmd.barrier(&[Stage::Compute, Stage::Transfer], &[Stage::Compute]);
-            let (Some(by_direction), Some(relief)) = (&self.relief, lit.relief) else {
-                for part in parts(rows).into_iter().flatten() {
-                    let all = 0..rows.len() as u32;
-                    self.gather.record(cmd, &self.sets, lit.kept, all, part);
-                }
-                return Ok(());
-            };
-            for first in (0..rows.len()).step_by(relief.slots as usize) {
-                let end = rows.len().min(first + relief.slots as usize);
-                let slots = first as u32..end as u32;
-                let of_relief = relief.first_source..relief.first_source + relief.source_count;
-                if rows[first..end]
-                    .iter()
-                    .any(|row| of_relief.contains(&row.source))
-                {
-                    let ByDirection { send, send_set, .. } = by_direction;
-                    send.record(cmd, send_set, relief, slots.clone());
-                    cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-                }
-                for part in [Part::Emitted, Part::Reflected] {
-                    // By direction a source may have light to move that sums to none.
-                    if part == Part::Reflected || parts(&rows[first..end])[0].is_some() {
-                        let slots = slots.clone();
-                        (self.gather).record_relief(cmd, &self.sets, lit.kept, relief, slots, part);
+            let mut first = 0;
+            for of_chunk in rows.chunk_by(|a, b| a.row.chunk == b.row.chunk) {
+                match (&self.relief, lit.relief) {
+                    (Some(by_direction), Some(relief)) => {
+                        for some in of_chunk.chunks(relief.slots as usize) {
+                            self.record_relief(cmd, lit.kept, by_direction, relief, some, first);
+                            first += some.len() as u32;
+                        }
+                    }
+                    _ => {
+                        let of = chunk_slots(of_chunk, first);
+                        for part in parts(of_chunk) {
+                            self.gather.record(cmd, &self.sets, lit.kept, &of, part);
+                        }
+                        first += of_chunk.len() as u32;
                     }
                 }
             }
             Ok(())
         })
+    }
+
+    /// Finds what those of the rows with a relief send by direction, and gathers; the first has slot
+    /// `first`.
+    fn record_relief(
+        &self,
+        cmd: &Commands,
+        kept: &KeptRows,
+        by_direction: &ByDirection,
+        relief: &ReliefBuffers,
+        rows: &[LitRow],
+        first: u32,
+    ) {
+        let of = chunk_slots(rows, first);
+        let of_relief = relief.first_source..relief.first_source + relief.source_count;
+        let directed = rows.iter().any(|row| of_relief.contains(&row.source));
+        if directed {
+            let ByDirection { send, send_set, .. } = by_direction;
+            send.record(cmd, send_set, relief, of.slots.clone());
+            cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+        }
+        for part in [Part::Emitted, Part::Reflected] {
+            // By direction a source may have light to move that sums to none.
+            if part == Part::Reflected && directed || parts(rows).any(|p| p == part) {
+                (self.gather).record_relief(cmd, &self.sets, kept, relief, &of, part);
+            }
+        }
     }
 
     /// Radiosity that each source reflects of what has been gathered.
@@ -159,4 +173,22 @@ impl Gathering {
     pub fn slots(&self, count: usize) -> Result<Vec<Slot>> {
         download(&self.device, &self.list.slots, count)
     }
+}
+
+/// Rows of one chunk as slots of the list.
+fn chunk_slots(rows: &[LitRow], first: u32) -> ChunkSlots {
+    ChunkSlots {
+        chunk: rows[0].row.chunk,
+        slots: first..first + rows.len() as u32,
+    }
+}
+
+/// The parts of light that any of the rows has.
+fn parts(rows: &[LitRow]) -> impl Iterator<Item = Part> {
+    let emits = rows.iter().any(|row| row.emitted != Vec3::ZERO);
+    let reflects = rows.iter().any(|row| row.reflected != Vec3::ZERO);
+    let emitted = emits.then_some(Part::Emitted);
+    emitted
+        .into_iter()
+        .chain(reflects.then_some(Part::Reflected))
 }

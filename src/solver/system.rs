@@ -25,6 +25,7 @@ pub(super) struct System {
 
 struct Unknown {
     emitted: DVec3,
+    emitted_power: f64,
     /// That radiosity is multiplied by for power: a surface's area, half the sphere of a point light.
     area: f64,
     drawn: bool,
@@ -51,6 +52,7 @@ impl System {
     pub fn new(targets: Targets, sources: &[Source], memory: u64) -> Self {
         let unknown = |source: &Source| Unknown {
             emitted: source.emitted.as_dvec3(),
+            emitted_power: source.emitted_power(),
             area: match source.kind {
                 KIND_POINT => std::f64::consts::TAU,
                 _ => source.area,
@@ -94,7 +96,7 @@ impl System {
         let source = &self.sources[s];
         let emitted = match source.emission_shot {
             true => 0.0,
-            false => source.emitted.element_sum() * source.area,
+            false => source.emitted_power,
         };
         let reflected = (self.reflected(s) - source.shot).abs().element_sum() * source.area;
         (emitted + reflected, emitted)

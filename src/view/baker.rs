@@ -73,6 +73,12 @@ pub struct Latest {
     pub error: Option<Error>,
 }
 
+/// What is baked.
+pub struct Given {
+    pub scene: Arc<Scene>,
+    pub settings: Settings,
+}
+
 /// The window's end of the thread.
 pub struct Baker {
     orders: Option<Sender<Order>>,
@@ -94,13 +100,8 @@ impl Shared {
 
 impl Baker {
     /// Starts the thread, which opens its device with the first order.
-    /// `given` is what a relighting without a bake before it is of, and `kept` what was kept with it.
-    pub fn new(
-        choice: &DeviceChoice,
-        given: (Arc<Scene>, Settings),
-        kept: Option<Visibility>,
-        wake: Wake,
-    ) -> Self {
+    /// `given` is what a relighting without a bake before it is of; `kept` are its rows.
+    pub fn new(choice: &DeviceChoice, given: Given, kept: Option<Visibility>, wake: Wake) -> Self {
         let (orders, received) = channel();
         let shared = Arc::new(Shared {
             latest: Mutex::default(),
@@ -166,7 +167,7 @@ struct Work {
     kept: Option<Visibility>,
     kept_is_whole: bool,
     /// The bake that was asked for last.
-    given: (Arc<Scene>, Settings),
+    given: Given,
     solving: Option<Solving>,
     /// Of a bake from a file: its sources, which nobody solves.
     looked_at: Option<Solver>,
@@ -227,7 +228,10 @@ impl Work {
             } => {
                 // Frees its memory before the new one asks for more.
                 (self.solving, self.looked_at) = (None, None);
-                self.given = (Arc::clone(&scene), (*settings).clone());
+                self.given = Given {
+                    scene: Arc::clone(&scene),
+                    settings: (*settings).clone(),
+                };
                 (self.kept, self.kept_is_whole) = (None, false);
                 self.bake(scene, &settings, epoch)
             }
@@ -252,7 +256,7 @@ impl Work {
             Some(solver) => solver,
             None => {
                 let device = self.choice.open_baking()?;
-                let (scene, settings) = &self.given;
+                let Given { scene, settings } = &self.given;
                 let settings = Settings {
                     visibility_memory: Some(0),
                     ..flat(settings)
@@ -304,7 +308,7 @@ impl Work {
         let Solving { scene, epoch, .. } = flat;
         self.tell(epoch, Some(Stage::Relief));
         let device = self.choice.open_baking()?;
-        let settings = self.given.1.clone();
+        let settings = self.given.settings.clone();
         let elements = bake::elements(&device, &scene, &settings)?;
         let lights = &scene.point_lights;
         let solver = Solver::new(&device, elements.clone(), lights, &settings)?;
@@ -320,7 +324,7 @@ impl Work {
         self.tell(epoch, None);
         self.looked_at = None;
         self.solving = Some(Solving {
-            budget: self.given.1.budget.unwrap_or(Duration::MAX),
+            budget: self.given.settings.budget.unwrap_or(Duration::MAX),
             flat: false,
             shown_from: f64::INFINITY,
             scene,
@@ -335,7 +339,7 @@ impl Work {
 
     /// By what is kept; where nothing is, or another source emits than did, from nothing.
     fn relight(&mut self, scene: Arc<Scene>, epoch: u64) -> Result<()> {
-        let settings = self.given.1.clone();
+        let settings = self.given.settings.clone();
         // What has been lit as if it were flat has kept nothing of use.
         let before = self.solving.take().filter(|before| !before.flat);
         let device = self.choice.open_baking()?;

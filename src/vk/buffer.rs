@@ -21,6 +21,11 @@ pub enum BufferUse {
     Geometry,
     /// Device memory that shaders reach by its address: only the device's memory limits its size.
     Addressed,
+    /// Device memory that shaders write as storage and read as texels of four words. Software devices
+    /// read texels several times as fast as storage.
+    Texels,
+    /// The same, written by its address.
+    AddressedTexels,
     /// Memory that the CPU writes once and the device copies from.
     Upload,
     /// Memory that the CPU writes repeatedly, and that shaders read or that feeds vertices and
@@ -40,6 +45,8 @@ pub struct Buffer {
 
 pub(super) struct BufferOwner {
     pub(super) raw: vk::Buffer,
+    /// As texels of four words; null for other uses.
+    view: vk::BufferView,
     bytes: u64,
     usage: BufferUse,
     /// Locked by the CPU's accesses, which several handles may attempt at once.
@@ -51,6 +58,9 @@ pub(super) struct BufferOwner {
 
 /// Bytes that are allocated at least, so that an empty list still has a buffer to bind.
 const LEAST_BYTES: u64 = 16;
+
+/// Bytes of a texel of four words.
+pub const TEXEL_BYTES: u64 = 16;
 
 impl Buffer {
     /// # Errors
@@ -64,6 +74,18 @@ impl Buffer {
                 bytes,
             });
         }
+        let texels = usage.is_read_as_texels();
+        if texels && bytes / TEXEL_BYTES > device.limits().max_texels {
+            return Err(Error::DeviceMemory {
+                device: device.name().to_owned(),
+                what: format!("{name}, above the device's largest texel buffer"),
+                bytes,
+            });
+        }
+        let bytes = match texels {
+            true => bytes.next_multiple_of(TEXEL_BYTES),
+            false => bytes,
+        };
         let info = vk::BufferCreateInfo::default()
             .size(bytes)
             .usage(usage.flags());
@@ -72,6 +94,7 @@ impl Buffer {
             .map_err(device.error("creating a buffer"))?;
         let mut owner = BufferOwner {
             raw,
+            view: vk::BufferView::null(),
             bytes,
             usage,
             allocation: RwLock::default(),
@@ -95,6 +118,15 @@ impl Buffer {
         // Stored before the check, so that a failure frees it.
         owner.allocation = RwLock::new(Some(allocation));
         bound.map_err(device.error("binding a buffer's memory"))?;
+        if texels {
+            let info = vk::BufferViewCreateInfo::default()
+                .buffer(raw)
+                .format(vk::Format::R32G32B32A32_UINT)
+                .range(vk::WHOLE_SIZE);
+            // SAFETY: the buffer has its memory and is made for texels.
+            owner.view = unsafe { device.raw.create_buffer_view(&info, None) }
+                .map_err(device.error("viewing a buffer as texels"))?;
+        }
         Ok(Self {
             owner: Arc::new(owner),
         })
@@ -110,9 +142,8 @@ impl Buffer {
     /// Commands cannot know which addresses a shader reads: the buffer that contains this one must
     /// [refer to](Self::refer_to) it.
     pub fn address(&self) -> u64 {
-        assert_eq!(
-            self.owner.usage,
-            BufferUse::Addressed,
+        assert!(
+            self.owner.usage.has_address(),
             "only an addressed buffer has an address"
         );
         let info = vk::BufferDeviceAddressInfo::default().buffer(self.owner.raw);
@@ -120,11 +151,19 @@ impl Buffer {
         unsafe { self.owner.device.raw.get_buffer_device_address(&info) }
     }
 
+    /// Of a buffer that is read as texels.
+    pub(super) fn view(&self) -> vk::BufferView {
+        assert!(
+            self.owner.usage.is_read_as_texels(),
+            "only a buffer of texels is bound as such"
+        );
+        self.owner.view
+    }
+
     /// Keeps `addressed` alive as long as this buffer, which contains its address.
     pub fn refer_to(&self, addressed: &Self) {
         assert!(
-            addressed.owner.usage == BufferUse::Addressed
-                && self.owner.usage != BufferUse::Addressed,
+            addressed.owner.usage.has_address() && !self.owner.usage.has_address(),
             "addressed buffers are referred to by buffers of other kinds"
         );
         lock(&self.owner.referred).hold(&addressed.owner);
@@ -168,12 +207,18 @@ impl BufferUse {
             Self::Geometry => all | F::VERTEX_BUFFER | F::INDEX_BUFFER | F::INDIRECT_BUFFER,
             Self::Stream => all | F::VERTEX_BUFFER | F::INDEX_BUFFER,
             Self::Addressed => all | F::SHADER_DEVICE_ADDRESS,
+            Self::Texels => all | F::UNIFORM_TEXEL_BUFFER,
+            Self::AddressedTexels => all | F::UNIFORM_TEXEL_BUFFER | F::SHADER_DEVICE_ADDRESS,
         }
     }
 
     fn location(self) -> MemoryLocation {
         match self {
-            Self::Storage | Self::Geometry | Self::Addressed => MemoryLocation::GpuOnly,
+            Self::Storage
+            | Self::Geometry
+            | Self::Addressed
+            | Self::Texels
+            | Self::AddressedTexels => MemoryLocation::GpuOnly,
             Self::Upload | Self::Stream => MemoryLocation::CpuToGpu,
             Self::Readback => MemoryLocation::GpuToCpu,
         }
@@ -181,14 +226,28 @@ impl BufferUse {
 
     /// Whether descriptor sets bind such buffers, which limits their size.
     fn is_bound_by_sets(self) -> bool {
-        matches!(self, Self::Storage | Self::Geometry | Self::Stream)
+        matches!(
+            self,
+            Self::Storage | Self::Geometry | Self::Stream | Self::Texels
+        )
+    }
+
+    fn has_address(self) -> bool {
+        matches!(self, Self::Addressed | Self::AddressedTexels)
+    }
+
+    fn is_read_as_texels(self) -> bool {
+        matches!(self, Self::Texels | Self::AddressedTexels)
     }
 }
 
 impl Drop for BufferOwner {
     fn drop(&mut self) {
-        // SAFETY: sets and commands that use the buffer hold its owner, so none is left.
-        unsafe { self.device.raw.destroy_buffer(self.raw, None) };
+        // SAFETY: sets and commands that use the buffer or its view hold its owner, so none is left.
+        unsafe {
+            self.device.raw.destroy_buffer_view(self.view, None);
+            self.device.raw.destroy_buffer(self.raw, None);
+        }
         let allocation = self.allocation.get_mut().unwrap_or_else(|e| e.into_inner());
         if let Some(allocation) = allocation.take() {
             self.device.free(allocation);

@@ -14,6 +14,8 @@ pub enum Binding {
     Storage,
     /// An image with its sampler.
     Sampled,
+    /// A buffer as texels of four words.
+    Texels,
 }
 
 /// What is bound at one place.
@@ -21,6 +23,8 @@ pub enum Binding {
 pub enum Bind<'a> {
     Buffer(&'a Buffer),
     Image(&'a Image, &'a Sampler),
+    /// A [`super::BufferUse::Texels`] or [`super::BufferUse::AddressedTexels`] buffer.
+    Texels(&'a Buffer),
 }
 
 /// The bindings of a pipeline.
@@ -99,7 +103,7 @@ impl DescriptorLayout {
     /// A set without content, in a pool that has room for this set alone.
     fn allocate(&self, name: &str) -> Result<DescriptorSetOwner> {
         let device = &self.device;
-        let sizes: Vec<_> = [Binding::Storage, Binding::Sampled]
+        let sizes: Vec<_> = [Binding::Storage, Binding::Sampled, Binding::Texels]
             .into_iter()
             .filter_map(|kind| {
                 let count = self.kinds.iter().filter(|k| **k == kind).count() as u32;
@@ -157,6 +161,11 @@ impl DescriptorSetOwner {
                     .sampler(sampler.owner.raw)];
                 self.update(write.image_info(&infos));
             }
+            Bind::Texels(buffer) => {
+                self.bound.hold(&buffer.owner);
+                let views = [buffer.view()];
+                self.update(write.texel_buffer_view(&views));
+            }
         }
     }
 
@@ -171,6 +180,7 @@ impl Bind<'_> {
         match self {
             Self::Buffer(_) => Binding::Storage,
             Self::Image(..) => Binding::Sampled,
+            Self::Texels(_) => Binding::Texels,
         }
     }
 }
@@ -180,6 +190,7 @@ impl Binding {
         match self {
             Self::Storage => vk::DescriptorType::STORAGE_BUFFER,
             Self::Sampled => vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
+            Self::Texels => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
         }
     }
 }

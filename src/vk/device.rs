@@ -41,6 +41,8 @@ pub(super) struct MemoryRequest<'a> {
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
     pub max_storage_buffer_range: u64,
+    /// Texels of a buffer that is read as such.
+    pub max_texels: u64,
     pub max_image_side: u32,
     pub subgroup_size: u32,
     /// Fractional bits of a rasterised vertex's position, in pixels.
@@ -237,6 +239,7 @@ impl Limits {
     fn new(candidate: &Candidate, limits: &vk::PhysicalDeviceLimits) -> Self {
         Self {
             max_storage_buffer_range: candidate.max_storage_buffer_range,
+            max_texels: limits.max_texel_buffer_elements.into(),
             max_image_side: candidate.max_image_side,
             subgroup_size: candidate.subgroup_size,
             subpixel_bits: limits.sub_pixel_precision_bits.clamp(4, 16),

@@ -29,7 +29,7 @@ mod timestamps;
 use std::sync::{Mutex, MutexGuard};
 
 pub use barrier::Stage;
-pub use buffer::{Buffer, BufferUse};
+pub use buffer::{Buffer, BufferUse, TEXEL_BYTES};
 pub use commands::Commands;
 pub use compute::ComputePipeline;
 pub use descriptors::{Bind, Binding, DescriptorLayout, DescriptorSet};

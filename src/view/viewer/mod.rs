@@ -14,7 +14,7 @@ use std::time::Instant;
 use glam::Vec3;
 use winit::window::Window;
 
-use super::baker::{Baker, Order, Stage};
+use super::baker::{Baker, Given, Order, Stage};
 use super::camera::Eye;
 use super::detailer::{Detailer, PAUSE};
 use super::event::Event;
@@ -123,7 +123,10 @@ impl Viewer {
         let screen = Screen::new(window, size, &device)?;
         let scene = Arc::new(base.clone());
         let surfaces = SurfacePass::new(screen.device(), screen.pass(), &scene)?;
-        let given = (Arc::clone(&scene), settings.clone());
+        let given = Given {
+            scene: Arc::clone(&scene),
+            settings: settings.clone(),
+        };
         let baker = Baker::new(&device, given, kept, Arc::clone(&wake));
         let snapshot = Arc::new(match bake {
             Some(bake) => Snapshot::of_bake(&scene, bake),

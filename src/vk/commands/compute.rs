@@ -33,7 +33,8 @@ impl Commands {
         pipeline: &ComputePipeline,
         set: &DescriptorSet,
         push: &T,
-        (counts, offset): (&Buffer, u64),
+        counts: &Buffer,
+        offset: u64,
     ) {
         self.bind_compute(pipeline, set, push);
         self.hold(&counts.owner);
