@@ -1,27 +1,27 @@
 //! Radiosity by hemicube item buffers on Vulkan.
 //!
 //! ```text
-//! scene ─► elements ─► sources, meshlets ─┐
-//!                                         ▼
-//!           ┌───────────────────────── solver ──────────────────────────┐
-//!           │ measure ─► select ─► cull ─► item buffer ─► bin receivers │
-//!           └───────────────────────────────────────────────────────────┘
-//!                                         ▼
-//!                        light ─► solution (file) ─► render (picture)
+//! scene ─► mesh (elements, sources, occluders) ─┐
+//!                                               ▼
+//!              ┌──────────────── solver ─────────────────┐
+//!              │ rows ─► coupling ─► solve ─► gather     │
+//!              └─────────────────────────────────────────┘
+//!                                               ▼
+//!                        light ─► bake (file) ─► render (picture)
 //!
 //! scene ─► displaced ─► path_tracer (the truth, to compare with)
 //! ```
 //!
 //! | of the paper | where |
 //! | --- | --- |
-//! | equation (1), F_ij = Σ ΔF_q | `shaders/bin_pixels.comp`, [`hemicube::delta_form_factor`] |
-//! | equation (2), ΔIrrad = ΔB ΔF A_i / A_j | `shaders/apply_pixels.comp`, [`reference::bin_pixels`] |
-//! | the same by reciprocity and Lambert's formula | `shaders/form_factors.comp`, [`form_factor`] |
+//! | equation (1), F_ij = Σ ΔF_q | `shaders/bin_pixels.comp`, [`math::hemicube::delta_form_factor`] |
+//! | equation (2), ΔIrrad = ΔB ΔF A_i / A_j | `shaders/pixel_rows.comp`, [`reference::bin_pixels`] |
+//! | the same by reciprocity and Lambert's formula | `shaders/form_factors.comp`, [`math::form_factor`] |
 //! | equation (3), light sent by direction | [`meso`], `shaders/send_relief.comp` |
-//! | equation (4), light received by direction | [`directions`], `shaders/gather_to_relief.comp` |
+//! | equation (4), light received by direction | [`math::directions`], `shaders/gather_to_relief.comp` |
 //! | Figure 1, from elements to vertices | [`meso::MesoVertices`] |
 //! | drawing by relief mapping | [`render`], `shaders/relief.frag` |
-//! | hemicubes | [`hemicube`], [`passes::item_buffer`] |
+//! | hemicubes | [`math::hemicube`], [`passes::item_buffer`] |
 //!
 //! Cargo features: `cli` (the program and its benchmarks) and `window` (`view`) are on by default, and
 //! nothing else needs them; `formats`, part of `cli`, brings scene.toml, JPEG and OpenEXR.
@@ -31,30 +31,19 @@
 
 pub mod atomic_file;
 pub mod bake;
-pub mod bake_cache;
 #[cfg(feature = "cli")]
 pub mod bench;
-pub mod charts;
 pub mod constants;
-pub mod contour;
-pub mod corners;
-pub mod directions;
-pub mod elements;
 pub mod error;
-pub mod form_factor;
-pub mod hemicube;
-pub mod meshlets;
+pub mod math;
+pub mod mesh;
 pub mod meso;
-pub mod occluders;
 pub mod passes;
 pub mod path_tracer;
-pub mod quality;
 pub mod reference;
 pub mod render;
 pub mod scene;
-pub mod solution;
 pub mod solver;
-pub mod sources;
 #[cfg(feature = "window")]
 pub mod view;
 pub mod vk;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use common::{Build, assert_silent, device};
 use glam::{DVec3, Vec3};
 use mesolux::bake;
-use mesolux::directions::Directions;
+use mesolux::math::directions::Directions;
 use mesolux::meso::{Options, Transport};
 use mesolux::scene::Scene;
 use mesolux::solver::{Estimator, Report, Settings, Solver, StopReason, Visibility, open_devices};

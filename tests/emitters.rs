@@ -6,8 +6,8 @@ use std::ops::Range;
 
 use common::{Build, Solved, assert_silent, device};
 use glam::DVec3;
+use mesolux::mesh::sources::Grouping;
 use mesolux::solver::{Estimator, Report, Settings, Solver, StopReason};
-use mesolux::sources::Grouping;
 
 /// Pixels a side of the ordinary hemicubes.
 const FACE: u32 = 32;

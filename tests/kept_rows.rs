@@ -5,7 +5,7 @@ mod common;
 use common::{Build, assert_silent, device};
 use glam::{DVec3, Vec3};
 use mesolux::bake;
-use mesolux::directions::Directions;
+use mesolux::math::directions::Directions;
 use mesolux::meso::{Options, Transport};
 use mesolux::solver::{Light, Report, Settings, Visibility};
 
@@ -334,7 +334,7 @@ fn sources_with_relief_send_by_direction_in_the_end() {
     let kept = exits.expect("it has relief").kept;
     let of_relief = &solver.sources.list[solver.sources.relief.clone()];
     let directions = kept.len() / of_relief.len();
-    let power = |source: &mesolux::sources::Source, light: Vec3| {
+    let power = |source: &mesolux::mesh::sources::Source, light: Vec3| {
         source.area * f64::from(light.element_sum())
     };
     let (mut all, mut even) = (0.0, 0.0);
@@ -346,7 +346,7 @@ fn sources_with_relief_send_by_direction_in_the_end() {
         }
     }
     let emitted: f64 = (solver.sources.list.iter())
-        .map(mesolux::sources::Source::emitted_power)
+        .map(mesolux::mesh::sources::Source::emitted_power)
         .sum();
     println!(
         "sent evenly alone {:.2e} of what relief sends, all {:.2e} of the emission",

@@ -5,7 +5,7 @@ mod common;
 use common::sheet::{light_on, parallel, sheet};
 use glam::{DVec3, Vec3};
 use mesolux::constants::MOST_CLUSTERS;
-use mesolux::directions::Directions;
+use mesolux::math::directions::Directions;
 use mesolux::meso::{
     Cluster, CornerLight, Face, FaceClusters, MesoVertices, NEAR_PARALLEL_COS, clusters,
 };

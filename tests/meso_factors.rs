@@ -4,7 +4,7 @@ mod common;
 
 use common::device;
 use glam::{DVec2, DVec3, Vec3};
-use mesolux::directions::Directions;
+use mesolux::math::directions::Directions;
 use mesolux::meso::{Factors, HeightField, Shading};
 use mesolux::passes::relief_visibility::ReliefVisibility;
 

@@ -4,10 +4,10 @@ mod common;
 
 use common::sheet::{light_on, parallel, sheet};
 use glam::{DVec3, Vec3};
-use mesolux::directions::Directions;
+use mesolux::bake::solution::DirectionalLight;
+use mesolux::math::directions::Directions;
 use mesolux::meso::MesoVertices;
 use mesolux::scene::Scene;
-use mesolux::solution::DirectionalLight;
 
 fn world(frame: [Vec3; 3], v: Vec3) -> Vec3 {
     frame[0] * v.x + frame[1] * v.y + frame[2] * v.z

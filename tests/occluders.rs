@@ -7,10 +7,10 @@ use std::f64::consts::PI;
 
 use common::{Build, Solved, assert_silent, device, solve};
 use glam::{DQuat, DVec3};
-use mesolux::charts::Connections;
 use mesolux::constants::NONE;
-use mesolux::elements::Elements;
-use mesolux::occluders::Occluders;
+use mesolux::mesh::charts::Connections;
+use mesolux::mesh::elements::Elements;
+use mesolux::mesh::occluders::Occluders;
 use mesolux::solver::{Estimator, Settings, Solver};
 
 struct Merged {

@@ -8,7 +8,7 @@ use std::process::{Command, Output};
 
 use common::Build;
 use glam::DVec3;
-use mesolux::form_factor::to_polygon;
+use mesolux::math::form_factor::to_polygon;
 use mesolux::path_tracer::{PathTracer, VirtualLights};
 
 /// A lamp over a dark floor, and a point light beside it.
@@ -152,7 +152,7 @@ fn a_preset_gives_way_to_what_is_given() {
         assert!(run.status.success(), "{}", text(&run.stderr));
         serde_json::from_slice(&run.stdout).expect("JSON")
     };
-    let draft = mesolux::quality::Quality::Draft.settings();
+    let draft = mesolux::bake::quality::Quality::Draft.settings();
     assert_eq!(report(&[])["hemicube"], 128);
     assert_eq!(report(&["--quality", "draft"])["hemicube"], draft.hemicube);
     let both = ["--quality", "draft", "--hemicube", "32"];

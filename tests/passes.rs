@@ -8,12 +8,12 @@ use std::collections::BTreeSet;
 use common::{Build, assert_silent, device};
 use glam::DVec3;
 use mesolux::constants::NONE;
-use mesolux::elements::Elements;
+use mesolux::mesh::elements::Elements;
+use mesolux::mesh::sources::Source;
 use mesolux::passes::cull::Culling;
 use mesolux::passes::occluder_tree::shadow_occluders;
 use mesolux::reference;
 use mesolux::solver::{Estimator, Report, Settings, Solver};
-use mesolux::sources::Source;
 
 const FACE: u32 = 32;
 

@@ -7,14 +7,14 @@ use std::path::PathBuf;
 use common::{Build, assert_silent, device, show};
 use glam::DVec3;
 use mesolux::bake::bake;
+use mesolux::bake::solution::Solution;
 use mesolux::bench::pictures::Reference;
 use mesolux::bench::relief_room::{self, REPEAT, TEXELS, bumps};
-use mesolux::directions::Directions;
+use mesolux::math::directions::Directions;
 use mesolux::meso::{Options, Transport};
 use mesolux::path_tracer::PathTracer;
 use mesolux::render::{Comparison, Light, Lighting, ReliefShading, View, render};
 use mesolux::scene::{Camera, Scene, displace};
-use mesolux::solution::Solution;
 use mesolux::solver::Settings;
 
 /// Pixels a side of the pictures.

@@ -5,7 +5,7 @@ mod common;
 use common::{Build, assert_silent, device};
 use glam::{DVec2, DVec3, Vec3};
 use mesolux::constants::NONE;
-use mesolux::directions::Directions;
+use mesolux::math::directions::Directions;
 use mesolux::meso::{
     Footprints, HeightField, MOST_FOOTPRINTS, Options, Response, Scattering, Transport, tiles,
 };
@@ -41,7 +41,7 @@ struct Parts {
 }
 
 fn parts(build: &Build, directions: &Directions, most: usize) -> Parts {
-    let elements = mesolux::elements::Elements::new(&build.scene);
+    let elements = mesolux::mesh::elements::Elements::new(&build.scene);
     let (mut tiles, _) = tiles(&build.scene, &elements).expect("the relief is sound");
     let tile = tiles.pop().expect("the plate has one");
     let visibility = ReliefVisibility::new(&device())

@@ -5,13 +5,13 @@ mod common;
 use common::{Build, assert_silent, device};
 use glam::{DVec3, Vec3};
 use mesolux::constants::{KIND_POINT, NONE};
-use mesolux::directions::Directions;
+use mesolux::math::directions::Directions;
+use mesolux::mesh::sources::Grouping;
 use mesolux::meso::{Options, Transport};
 use mesolux::reference;
 use mesolux::reference::pixels_relief::{Light, Received};
 use mesolux::reference::send_relief::send_relief;
 use mesolux::solver::{Estimator, Settings, Solver};
-use mesolux::sources::Grouping;
 
 const BATCH: u32 = 6;
 const FACE: u32 = 32;

@@ -4,7 +4,7 @@ mod common;
 
 use common::{Build, Solved};
 use glam::{DVec3, Vec3};
-use mesolux::directions::Directions;
+use mesolux::math::directions::Directions;
 use mesolux::meso::{Options, Transport};
 use mesolux::solver::{Estimator, Settings};
 

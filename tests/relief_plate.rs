@@ -10,7 +10,7 @@ use common::random::Random;
 use common::{Build, assert_silent, device};
 use glam::{DVec3, Vec3A};
 use mesolux::bake::solve;
-use mesolux::directions::{Directions, FineCell};
+use mesolux::math::directions::{Directions, FineCell};
 use mesolux::meso::{Options, Transport};
 use mesolux::solver::Settings;
 use obvhs::BvhBuildParams;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use common::{assert_silent, device};
 use glam::{DVec2, DVec3, Vec3};
 use mesolux::constants::{AZIMUTHS, RAY_STRATA};
-use mesolux::directions::Directions;
+use mesolux::math::directions::Directions;
 use mesolux::meso::{HeightField, Response};
 use mesolux::passes::relief_visibility::ReliefVisibility;
 use mesolux::reference::relief_visibility::{exchange, horizon};

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use common::{Build, Solved};
 use glam::{DVec3, Vec3};
-use mesolux::directions::Directions;
+use mesolux::math::directions::Directions;
 use mesolux::meso::{Options, Transport};
 use mesolux::scene::displace;
 use mesolux::solver::Settings;

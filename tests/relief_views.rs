@@ -5,11 +5,11 @@ mod common;
 use common::{Build, assert_silent, device};
 use glam::{DVec3, Vec3};
 use mesolux::bake::bake;
-use mesolux::directions::Directions;
+use mesolux::bake::solution::Solution;
+use mesolux::math::directions::Directions;
 use mesolux::meso::Options;
 use mesolux::render::{Lighting, Renderer, SAMPLES, Show, View, render, slot_colour};
 use mesolux::scene::{Camera, Scene};
-use mesolux::solution::Solution;
 use mesolux::solver::Settings;
 
 /// Scene units from the lowest to the highest of the plates.

@@ -8,10 +8,10 @@ use std::process::{Command, Output};
 use common::{assert_silent, device};
 use glam::DVec3;
 use mesolux::bake::bake;
+use mesolux::bake::solution::Bake;
 use mesolux::bench::relief_room::{CASES, room};
 use mesolux::render::{Lighting, Renderer, SAMPLES, View, render};
 use mesolux::scene::{BuiltinOptions, Camera, camera_path, load};
-use mesolux::solution::Bake;
 use mesolux::solver::Settings;
 
 /// Places of cameras are a few products of numbers about 1, each rounded to 2⁻⁵³.

@@ -9,9 +9,10 @@ use std::sync::OnceLock;
 use common::{Build, assert_silent, device, show};
 use glam::{DVec3, Vec3};
 use mesolux::bake::bake;
+use mesolux::bake::solution::Solution;
 use mesolux::bench::pictures::Reference;
 use mesolux::bench::relief_room::{REPEAT, TEXELS, bumps, smooth_step};
-use mesolux::directions::Directions;
+use mesolux::math::directions::Directions;
 use mesolux::meso::{Options, Transport};
 use mesolux::passes::shadow_rays::{ShadowRays, ShadowTree};
 use mesolux::passes::types::{ShadowRay, ShadowTriangle};
@@ -21,7 +22,6 @@ use mesolux::render::{
     Comparison, Direct, Light, Lighting, ReliefShading, Renderer, SAMPLES, View, render,
 };
 use mesolux::scene::{Camera, Material, PointLight, Scene, displace};
-use mesolux::solution::Solution;
 use mesolux::solver::Settings;
 
 /// Pixels a side of the pictures.

@@ -5,8 +5,8 @@ use std::collections::HashMap;
 use glam::Vec3;
 use serde::Serialize;
 
+use crate::mesh::sources::triangle_area;
 use crate::scene::{Scene, Triangle};
-use crate::sources::triangle_area;
 
 /// Difference of irradiance over triangles that two scenes share, by area, colours together.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

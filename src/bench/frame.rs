@@ -11,12 +11,12 @@ use super::bars::{Bar, Bars};
 use super::spread;
 use crate::atomic_file::write_atomically;
 use crate::bake;
-use crate::directions::Directions;
+use crate::bake::solution::Solution;
 use crate::error::{Error, Result};
+use crate::math::directions::Directions;
 use crate::meso::Options as ReliefOptions;
 use crate::render::{Direct, Lighting, ReliefShading, Renderer, View};
 use crate::scene::{Camera, Scene};
-use crate::solution::Solution;
 use crate::solver::Settings;
 use crate::vk::Device;
 

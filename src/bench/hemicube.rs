@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::spread;
-use crate::elements::Elements;
 use crate::error::Result;
+use crate::mesh::elements::Elements;
 use crate::passes::cull::Culling;
 use crate::scene::Scene;
 use crate::solver::{Settings, Solver};

@@ -15,12 +15,12 @@ use super::lines::{Line, Lines};
 use super::power_law::PowerLaw;
 use super::{irradiance, memory};
 use crate::atomic_file::write_atomically;
-use crate::elements::Elements;
 use crate::error::{Error, Result};
+use crate::mesh::elements::Elements;
+use crate::mesh::sources::Grouping;
 use crate::meso::Transport;
 use crate::scene::{BuiltinOptions, load};
 use crate::solver::{Settings, Solver, StopReason};
-use crate::sources::Grouping;
 use crate::vk::Device;
 
 /// What is to be measured.

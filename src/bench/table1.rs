@@ -9,12 +9,12 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 
 use crate::bake;
-use crate::directions::Directions;
+use crate::bake::solution::Solution;
 use crate::error::{Error, Result};
+use crate::math::directions::Directions;
 use crate::meso::{Options as ReliefOptions, Transport};
 use crate::render::{Lighting, ReliefShading, Renderer, View};
 use crate::scene::{BuiltinOptions, Scene, displace, load};
-use crate::solution::Solution;
 use crate::solver::{Settings, Solver, StopReason};
 use crate::vk::Device;
 

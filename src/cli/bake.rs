@@ -9,14 +9,14 @@ use serde::Serialize;
 
 use super::progress::{Bar, catch_interrupts, interrupted};
 use super::{BakingDevices, Builtin};
-use mesolux::directions::Directions;
+use mesolux::bake::quality::Quality;
+use mesolux::bake::solution::{Origin, Solution};
 use mesolux::error::{Error, Result};
+use mesolux::math::directions::Directions;
+use mesolux::mesh::sources::Grouping;
 use mesolux::meso::{self, Transport};
-use mesolux::quality::Quality;
 use mesolux::scene::Scene;
-use mesolux::solution::{Origin, Solution};
 use mesolux::solver::{Estimator, Report, Settings, Solver, Update, Visibility};
-use mesolux::sources::Grouping;
 use mesolux::vk::Device;
 
 /// Solve a scene and write the light on every element

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::{Builtin, DeviceOptions};
+use mesolux::bake::solution::Bake;
 use mesolux::bench::{frame, hemicube, irradiance, scaling, stress, table1};
 use mesolux::error::{Error, Result};
-use mesolux::solution::Bake;
 
 /// Measure speeds on this machine; use a release build
 #[derive(Args)]
@@ -265,7 +265,7 @@ fn run_table1(options: &Table1Options) -> Result<()> {
 }
 
 fn run_scaling(options: &ScalingOptions) -> Result<()> {
-    let own = mesolux::sources::Grouping::default().max_elements;
+    let own = mesolux::mesh::sources::Grouping::default().max_elements;
     let limits = match options.max_elements.is_empty() {
         true => vec![Some(own), None],
         false => options

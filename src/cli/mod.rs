@@ -20,9 +20,9 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
+use mesolux::bake::solution::Bake;
 use mesolux::error::{Error, Result};
 use mesolux::scene::{BuiltinOptions, Scene};
-use mesolux::solution::Bake;
 use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::prelude::*;
 

@@ -12,11 +12,11 @@ use super::reference::{self, ReferenceOptions};
 use super::series::{self, SeriesOptions};
 use super::show::ShowOptions;
 use super::{Builtin, DeviceOptions};
-use mesolux::bake_cache::CachedBake;
+use mesolux::bake::cache::CachedBake;
+use mesolux::bake::solution::Bake;
 use mesolux::error::{Error, Result};
 use mesolux::render::{FileKind, Lighting, Picture, Renderer, SAMPLES, View};
 use mesolux::scene::{Camera, Scene};
-use mesolux::solution::Bake;
 use mesolux::solver::Settings;
 use mesolux::vk::Device;
 

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::MesoVertices;
 use crate::constants::{MOST_CLUSTERS, MOST_DIRECTIONS};
-use crate::directions::Directions;
+use crate::math::directions::Directions;
 
 /// Cosine of 12°, the greatest angle between a cluster's strongest moment and the others that join
 /// it. The angle is above 10°, the farthest a moment of K = 64 strays from its slot's middle, so

@@ -17,7 +17,7 @@ use super::transfer::{CELLS, Facets, Fit, Sight};
 use super::visibility::RAYS;
 use super::{HeightField, Visibility};
 use crate::constants::{MOST_RANK, NONE};
-use crate::directions::Directions;
+use crate::math::directions::Directions;
 
 /// Factors of one tile.
 #[derive(Debug, Clone)]

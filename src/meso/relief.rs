@@ -13,9 +13,9 @@ use super::scattering::Scattering;
 use super::tiles::{Frame, Shading, Tile, tiles};
 use super::{Footprints, HeightField, Response, Visibility};
 use crate::constants::NONE;
-use crate::directions::Directions;
-use crate::elements::Elements;
 use crate::error::Result;
+use crate::math::directions::Directions;
+use crate::mesh::elements::Elements;
 use crate::passes::types::{MesoTexel, TextureFacet};
 use crate::scene::Scene;
 

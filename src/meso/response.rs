@@ -13,7 +13,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::directions::Directions;
+use crate::math::directions::Directions;
 
 /// A slot's block: `[colour]` rows, each of which multiplies the moment of that colour.
 pub type Block = [Vec3; 3];

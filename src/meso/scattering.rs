@@ -17,7 +17,7 @@ use super::footprints::Footprints;
 use super::response::{Block, Response};
 use super::transfer::{CELLS, Facets, Fit};
 use super::{HeightField, Visibility};
-use crate::directions::{Directions, FineCell};
+use crate::math::directions::{Directions, FineCell};
 
 /// Bounces stop when the largest change is this share of the largest value.
 const CONVERGED: f32 = 1e-6;

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use glam::{DVec2, DVec3, Vec3};
 
 use super::HeightField;
-use crate::elements::Elements;
 use crate::error::{Error, Result};
+use crate::mesh::elements::Elements;
 use crate::scene::{Material, Scene};
 
 /// Octaves by which the width or height of a tile may vary within a class.

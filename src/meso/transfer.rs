@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::visibility::Azimuth;
 use super::{HeightField, Visibility};
-use crate::directions::{Directions, FINE, FineCell};
+use crate::math::directions::{Directions, FINE, FineCell};
 
 /// The facets of a tile with the visibility of the sky, `[facet]`; rows are over the fine cells.
 pub(super) struct Facets {

@@ -9,7 +9,7 @@ use super::occluder_tree::OccluderTree;
 use super::types::{Draw, Slot, View};
 use crate::constants::{FACES, MESHLET_TRIANGLES, NONE, RECEIVE_KINDS};
 use crate::error::Result;
-use crate::hemicube::pixel_count;
+use crate::math::hemicube::pixel_count;
 use crate::vk::{
     Buffer, BufferUse, Device, Format, Framebuffer, Image, ImageUse, Limits, RenderPass, Sampler,
 };

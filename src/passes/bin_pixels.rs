@@ -10,7 +10,7 @@ use super::buffers::{SceneBuffers, upload};
 use super::fresh_rows::FreshRows;
 use super::{groups, shaders};
 use crate::error::{Error, Result};
-use crate::hemicube::{fixed_point_tables, pixel_count};
+use crate::math::hemicube::{fixed_point_tables, pixel_count};
 use crate::vk::{
     Bind, Binding, Buffer, BufferUse, Commands, ComputePipeline, DescriptorSet, Device, Stage,
 };

@@ -7,12 +7,12 @@ use glam::Vec3;
 
 use super::receiver_blocks::receiver_blocks;
 use super::types::{Component, Meshlet, Source, Triangle, contour_corners};
-use crate::charts::Connections;
-use crate::elements::Elements;
 use crate::error::Result;
-use crate::meshlets;
-use crate::occluders::Occluders;
-use crate::sources::Sources;
+use crate::mesh::charts::Connections;
+use crate::mesh::elements::Elements;
+use crate::mesh::meshlets;
+use crate::mesh::occluders::Occluders;
+use crate::mesh::sources::Sources;
 use crate::vk::{Buffer, BufferUse, Commands, Device, Stage};
 
 /// The scene in internal units: read by the passes, never written.

@@ -12,7 +12,7 @@ use super::shaders;
 use super::types::Draw;
 use crate::constants::{FACES, NONE};
 use crate::error::Result;
-use crate::hemicube::face_rectangle;
+use crate::math::hemicube::face_rectangle;
 use crate::vk::{
     Attachment, Bind, Binding, Commands, DescriptorSet, Device, Format, GraphicsPipeline,
     GraphicsState, RenderPass, Stage, VertexAttribute,

@@ -6,10 +6,10 @@ use std::sync::Arc;
 use super::buffers::upload;
 use super::shadow_rays::{Casts, ShadowTree};
 use super::types::ShadowOccluder;
-use crate::charts::Connections;
-use crate::elements::Elements;
 use crate::error::Result;
-use crate::occluders::Occluders;
+use crate::mesh::charts::Connections;
+use crate::mesh::elements::Elements;
+use crate::mesh::occluders::Occluders;
 use crate::vk::{Buffer, BufferUse, Device};
 use glam::Vec3;
 

@@ -10,7 +10,7 @@ use super::buffers::{SceneBuffers, State, upload};
 use super::relief_buffers::ReliefBuffers;
 use super::{groups, shaders};
 use crate::error::Result;
-use crate::hemicube::pixel_form_factors;
+use crate::math::hemicube::pixel_form_factors;
 use crate::vk::{
     Bind, Binding, BufferUse, Commands, ComputePipeline, DescriptorSet, Device, Stage,
 };

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::types::ReceiverBlock;
 use crate::constants::GROUP;
-use crate::elements::Elements;
+use crate::mesh::elements::Elements;
 
 /// Room for the rounding to f32 and of the shader.
 const MARGIN: f64 = 1e-7;

@@ -7,11 +7,11 @@ use glam::Vec3;
 
 use super::buffers::upload;
 use super::types::{MesoElement, Reflected};
-use crate::directions::Directions;
-use crate::elements::Elements;
 use crate::error::{Error, Result};
+use crate::math::directions::Directions;
+use crate::mesh::elements::Elements;
+use crate::mesh::sources::Sources;
 use crate::meso::{Relief, slot_shares};
-use crate::sources::Sources;
 use crate::vk::{Buffer, BufferUse, Commands, Device};
 
 /// The elements with a relief, in their order.

@@ -5,9 +5,9 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 
 use crate::constants::{KIND_SURFACE, LEAF_TRIANGLES};
-use crate::meshlets;
+use crate::mesh::meshlets;
+use crate::mesh::sources;
 use crate::meso::HeightPyramid;
-use crate::sources;
 
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]

@@ -30,7 +30,7 @@ const BOX_MARGIN: f32 = BOX_SCALE as f32 / (1u32 << 17) as f32;
 const CUBE: f64 = 1.0 + 1.0 / 16.0;
 
 /// The scene's triangles in internal units: about the scene's middle, coordinates in −1..1, as
-/// [`crate::elements`] has them.
+/// [`crate::mesh::elements`] has them.
 pub struct Geometry {
     pub origin: DVec3,
     /// Scene units of one internal unit.

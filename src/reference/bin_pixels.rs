@@ -1,9 +1,9 @@
 //! Twin of the pixel estimator: the paper's equations (1) and (2).
 
 use crate::constants::{KIND_POINT, NONE};
-use crate::elements::Elements;
-use crate::hemicube::{Pixel, delta_form_factor, solid_angle_share};
-use crate::sources::Source;
+use crate::math::hemicube::{Pixel, delta_form_factor, solid_angle_share};
+use crate::mesh::elements::Elements;
+use crate::mesh::sources::Source;
 
 /// Form factor from a source to each element, equation (1): the sum of the delta form factors of
 /// its pixels. For a point light, the element's share of half the sphere. A back blocks light and

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::elements::Elements;
+use crate::mesh::elements::Elements;
 use crate::passes::types::CouplingTarget;
 
 /// The words of one row: Σ A_j F_js / A_t of a target of one reflectance, Σ ρ_j A_j F_js / A_t by colour

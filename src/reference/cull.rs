@@ -3,12 +3,12 @@
 
 use std::collections::BTreeSet;
 
-use crate::charts::Connections;
 use crate::constants::NONE;
-use crate::elements::Elements;
-use crate::hemicube::{Pixel, face_rectangle};
-use crate::occluders::Occluders;
-use crate::sources::Source;
+use crate::math::hemicube::{Pixel, face_rectangle};
+use crate::mesh::charts::Connections;
+use crate::mesh::elements::Elements;
+use crate::mesh::occluders::Occluders;
+use crate::mesh::sources::Source;
 
 /// Elements as which the pixels of a face are drawn.
 pub fn shown(

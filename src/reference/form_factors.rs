@@ -4,10 +4,10 @@
 use glam::DVec3;
 
 use crate::constants::{KIND_POINT, NONE};
-use crate::elements::Elements;
-use crate::form_factor::to_polygon;
-use crate::hemicube::{direction_of, pixel_of};
-use crate::sources::Source;
+use crate::math::form_factor::to_polygon;
+use crate::math::hemicube::{direction_of, pixel_of};
+use crate::mesh::elements::Elements;
+use crate::mesh::sources::Source;
 
 /// Rounding of a plane's height at a point, as in the shader.
 const HEIGHT_EPSILON: f64 = 1e-6;

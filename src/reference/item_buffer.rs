@@ -2,12 +2,12 @@
 
 use glam::DVec3;
 
-use crate::charts::Connections;
 use crate::constants::{KIND_SURFACE, NONE};
-use crate::elements::Elements;
-use crate::hemicube::{Pixel, direction_of};
-use crate::occluders::Occluders;
-use crate::sources::Source;
+use crate::math::hemicube::{Pixel, direction_of};
+use crate::mesh::charts::Connections;
+use crate::mesh::elements::Elements;
+use crate::mesh::occluders::Occluders;
+use crate::mesh::sources::Source;
 
 /// Distance of the near plane, as in the pass; a ray's largest component in the source's frame is
 /// 1.

@@ -3,8 +3,8 @@
 use glam::{DVec3, Vec3};
 
 use crate::constants::KIND_POINT;
-use crate::elements::Elements;
-use crate::sources::Source;
+use crate::mesh::elements::Elements;
+use crate::mesh::sources::Source;
 
 /// Mean by area over a source's members of reflectance times irradiance, RGB, `[source]`.
 pub fn measure(elements: &Elements, sources: &[Source], irradiance: &[Vec3]) -> Vec<DVec3> {

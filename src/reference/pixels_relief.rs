@@ -4,10 +4,10 @@
 use glam::{DVec2, DVec3};
 
 use crate::constants::{KIND_POINT, NONE};
-use crate::elements::Elements;
-use crate::hemicube::{Pixel, delta_form_factor, direction_of, solid_angle_share};
+use crate::math::hemicube::{Pixel, delta_form_factor, direction_of, solid_angle_share};
+use crate::mesh::elements::Elements;
+use crate::mesh::sources::Source;
 use crate::meso::{Relief, slot_shares};
-use crate::sources::Source;
 
 /// Least cosine that the light of a grazing pixel is taken to come from.
 const LEAST_HEIGHT: f64 = 1e-3;

@@ -2,9 +2,9 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::elements::Elements;
+use crate::mesh::elements::Elements;
+use crate::mesh::sources::Source;
 use crate::meso::{Relief, slot_shares};
-use crate::sources::Source;
 
 /// Light by direction of the hemicube's frame, `[direction]`, as radiosity πL.
 pub struct Sent {

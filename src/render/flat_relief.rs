@@ -7,8 +7,8 @@ use glam::{DVec3, Vec3};
 use super::Show;
 use super::relief_scene::ReliefScene;
 use super::seen_scene::SeenScene;
+use crate::bake::solution::DirectionalLight;
 use crate::constants::WIDEST_SAMPLE;
-use crate::solution::DirectionalLight;
 
 /// Triangles with relief that need no rays, by their index in the scene.
 pub struct FlatRelief {

@@ -5,12 +5,12 @@ use std::path::Path;
 use glam::Vec3;
 use rayon::prelude::*;
 
+use crate::bake::solution::{Bake, DirectionalLight, Solution};
 use crate::constants::{
     SHADING_NORMAL, SHADING_PARALLAX, SHADING_RELIEF, VIEW_ALBEDO, VIEW_HEIGHT, VIEW_IRRADIANCE,
     VIEW_NORMAL, VIEW_OVERDRAW, VIEW_SHADED, VIEW_SLOTS,
 };
 use crate::scene::Scene;
-use crate::solution::{Bake, DirectionalLight, Solution};
 
 /// Which part of the light is drawn.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

@@ -11,10 +11,10 @@ use super::shafts::Shafts;
 use super::{Lighting, Projection};
 use crate::constants::{KIND_POINT, KIND_SURFACE, LIGHT_POINTS, LIGHT_SETS};
 use crate::error::Result;
+use crate::mesh::sources::triangle_area;
 use crate::passes::shadow_rays::{LightBuffers, ShadowTree};
 use crate::passes::types::{LightPoint, ShadowTriangle};
 use crate::scene::Scene;
-use crate::sources::triangle_area;
 use crate::vk::Device;
 
 /// A light point in scene units.

@@ -12,14 +12,14 @@ use super::relief_scene::ReliefScene;
 use super::seen_scene::SeenScene;
 use super::slots::slot_colour;
 use super::{Light, Lighting, ReliefShading};
+use crate::bake::solution::DirectionalLight;
 use crate::constants::MOST_RANK;
-use crate::directions::Directions;
 use crate::error::Result;
+use crate::math::directions::Directions;
 use crate::meso::{Cluster, Face, FaceClusters};
 use crate::passes::relief::{Buffers, Parts};
 use crate::passes::types::{ParallelLight, Prism};
 use crate::scene::{Triangle, relief_normals};
-use crate::solution::DirectionalLight;
 use crate::vk::Device;
 
 /// The relief of a scene on the device.

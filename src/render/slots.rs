@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::directions::Directions;
+use crate::math::directions::Directions;
 
 /// Chroma of a slot that has all of the light. It is above what sRGB can show at every hue, and is
 /// clipped.

@@ -4,7 +4,7 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use crate::corners::Corners;
+use crate::mesh::corners::Corners;
 use crate::scene::Scene;
 
 /// Irradiance at each corner, `[triangle][corner]`, W·m⁻², RGB: the mean of [`Corners::smooth`].

@@ -3,8 +3,8 @@
 use glam::{DVec3, Vec3};
 
 use super::{Method, Solver};
-use crate::elements::Elements;
 use crate::error::Result;
+use crate::mesh::elements::Elements;
 
 /// How unshot light would arrive if it were spread evenly over the whole scene.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

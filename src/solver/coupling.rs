@@ -8,9 +8,9 @@
 use glam::{DVec3, Vec3};
 
 use crate::constants::KIND_POINT;
-use crate::elements::Elements;
+use crate::mesh::elements::Elements;
+use crate::mesh::sources::Source;
 use crate::passes::types::CouplingTarget;
-use crate::sources::Source;
 
 /// Where a source's share of a coupling row lies.
 #[derive(Debug, Clone, Copy)]

@@ -99,7 +99,7 @@ impl Drawing {
 /// The item buffers of a batch as they were drawn last, `[row][slot][column]`.
 pub(super) fn read_items(device: &Arc<Device>, batch: &Batch) -> Result<Vec<u32>> {
     let hemicubes = batch.hemicubes();
-    let pixels = crate::hemicube::pixel_count(hemicubes.face_size);
+    let pixels = crate::math::hemicube::pixel_count(hemicubes.face_size);
     let texels = pixels * batch.slot_count as usize;
     let bytes = 4 * texels as u64;
     let readback = Buffer::new(device, "item readback", bytes, BufferUse::Readback)?;

@@ -13,7 +13,7 @@ pub struct ItemPicture {
     /// Pixels a side of a face.
     pub face: u32,
     /// Triangles by their place in the input, or [`NONE`], `[row][column]` of a column of N × 3N pixels; see
-    /// [`crate::hemicube::face_rectangle`].
+    /// [`crate::math::hemicube::face_rectangle`].
     pub items: Vec<u32>,
 }
 

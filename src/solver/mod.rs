@@ -32,16 +32,16 @@ use std::time::Instant;
 
 use glam::Vec3;
 
-use crate::charts::Connections;
-use crate::elements::Elements;
 use crate::error::Result;
-use crate::occluders::Occluders;
+use crate::mesh::charts::Connections;
+use crate::mesh::elements::Elements;
+use crate::mesh::occluders::Occluders;
+use crate::mesh::sources::{self, Sources};
 use crate::passes::batch::Hemicubes;
 use crate::passes::buffers::{SceneBuffers, State, download};
 use crate::passes::relief_buffers::ReliefBuffers;
 use crate::passes::types::{CouplingTarget, Reflected, Slot};
 use crate::scene::{PointLight, Scene};
-use crate::sources::{self, Sources};
 use crate::vk::Device;
 
 pub use ambient::Ambient;

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::{Settings, StopReason};
-use crate::elements::Elements;
+use crate::mesh::elements::Elements;
 
 /// How far a solution has come.
 #[derive(Debug, Clone, Copy, Default)]

@@ -5,14 +5,14 @@ use std::sync::Arc;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::elements::Elements;
 use crate::error::Result;
+use crate::mesh::elements::Elements;
 use crate::meso::Relief;
 use crate::passes::buffers::download;
 use crate::passes::relief_buffers::ReliefBuffers;
 use crate::vk::Device;
 
-/// Light of the elements with a relief, in internal order; `slot` is an index of [`crate::directions::Directions`] in the
+/// Light of the elements with a relief, in internal order; `slot` is an index of [`crate::math::directions::Directions`] in the
 /// element's tangent frame.
 pub struct ReliefLight {
     /// The elements, `[meso element]`.

@@ -6,10 +6,10 @@ use serde::Serialize;
 
 use super::rows::{Row, Stages};
 use super::{Estimator, Settings};
-use crate::elements::Elements;
+use crate::mesh::elements::Elements;
+use crate::mesh::sources::Sources;
 use crate::meso::{Class, Relief, Transport};
 use crate::passes::cull::Culling;
-use crate::sources::Sources;
 use crate::vk::Device;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use crate::charts::Connections;
-use crate::elements::Elements;
 use crate::error::Result;
-use crate::occluders::Occluders;
+use crate::mesh::charts::Connections;
+use crate::mesh::elements::Elements;
+use crate::mesh::occluders::Occluders;
+use crate::mesh::sources::Sources;
 use crate::passes::buffers::SceneBuffers;
 use crate::passes::occluder_tree::shadow_occluders;
 use crate::passes::types::ShadowOccluder;
-use crate::sources::Sources;
 use crate::vk::Device;
 
 #[derive(Clone, Copy)]

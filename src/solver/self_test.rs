@@ -6,13 +6,13 @@ use glam::DVec3;
 
 use super::Settings;
 use super::drawing::Drawing;
-use crate::elements::Elements;
 use crate::error::{Error, Result};
-use crate::occluders::Occluders;
+use crate::mesh::elements::Elements;
+use crate::mesh::occluders::Occluders;
+use crate::mesh::sources;
 use crate::passes::batch::BatchSize;
 use crate::passes::buffers::SceneBuffers;
 use crate::scene::{Material, Scene, Triangle};
-use crate::sources;
 use crate::vk::{Candidate, Device, Instance};
 
 /// Opens the device asked for, by index or part of its name, or else the best one that can run this program.

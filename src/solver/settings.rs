@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use crate::error::{Error, Result};
+use crate::mesh::sources::Grouping;
 use crate::meso;
 use crate::passes::cull::Culling;
-use crate::sources::Grouping;
 
 /// How form factors are taken from the item buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -52,7 +52,7 @@ pub struct Settings {
     pub seed: u64,
     pub grouping: Grouping,
     pub culling: Culling,
-    /// Draws connected elements of one plane as few triangles; see [`crate::occluders`]. The `pixel` estimator asks for every
+    /// Draws connected elements of one plane as few triangles; see [`crate::mesh::occluders`]. The `pixel` estimator asks for every
     /// element and does without.
     pub merging: bool,
     /// Sources of a batch that are drawn, at most.

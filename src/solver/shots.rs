@@ -13,6 +13,7 @@ use super::spine::On;
 use super::{Report, StopReason};
 use crate::constants::{FACES, KIND_POINT, NONE};
 use crate::error::Result;
+use crate::mesh::sources::least_strong;
 use crate::passes::batch::Batch;
 use crate::passes::buffers::{State, download};
 use crate::passes::measure::Measure;
@@ -21,7 +22,6 @@ use crate::passes::pixels_relief::PixelsRelief;
 use crate::passes::relief_buffers::ReliefBuffers;
 use crate::passes::send_relief::SendRelief;
 use crate::passes::types::Slot;
-use crate::sources::least_strong;
 use crate::vk::{Buffer, BufferUse, Commands, Device, Stage, Timestamps};
 
 pub(super) struct Shots {
@@ -71,7 +71,7 @@ impl Shots {
         })?;
         let list = &on.parts.sources.list;
         let least = least_strong(list, &on.settings.grouping);
-        let shot = |source: &crate::sources::Source| Shot {
+        let shot = |source: &crate::mesh::sources::Source| Shot {
             strong: least > 0.0 && source.emitted_power() >= least,
             emitted: source.emitted.as_dvec3(),
             area: match source.kind {

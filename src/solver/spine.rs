@@ -20,12 +20,12 @@ use super::visibility::Visibility;
 use super::{DrawnBatch, Report, Settings, StopReason};
 use crate::constants::KIND_POINT;
 use crate::error::Result;
+use crate::mesh::sources::least_strong;
 use crate::passes::buffers::{SceneBuffers, State};
 use crate::passes::fresh_rows::RowShape;
 use crate::passes::kept_rows::{KeptRows, KeptSize};
 use crate::passes::relief_buffers::{ReliefBuffers, meso_elements};
 use crate::passes::types::KeptRow;
-use crate::sources::least_strong;
 use crate::vk::Device;
 
 /// A solution under way.
@@ -127,7 +127,7 @@ impl Spine {
         let least = least_strong(list, &on.settings.grouping);
         let of_relief = &on.parts.sources.relief;
         let looks = looks_closer(device, on.settings);
-        let drawn = |(s, source): (usize, &crate::sources::Source)| Drawn {
+        let drawn = |(s, source): (usize, &crate::mesh::sources::Source)| Drawn {
             strong: looks && least > 0.0 && source.emitted_power() >= least,
             relief: of_relief.contains(&s),
             ..Drawn::default()

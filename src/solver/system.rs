@@ -9,7 +9,7 @@ use glam::DVec3;
 
 use super::coupling::{Arrived, CouplingRow, Targets};
 use crate::constants::KIND_POINT;
-use crate::sources::Source;
+use crate::mesh::sources::Source;
 
 /// The sources of a scene as unknowns.
 pub(super) struct System {

@@ -16,10 +16,10 @@ use egui::Color32;
 
 use super::snapshot::{Snapshot, even_moments};
 use super::{DeviceChoice, Wake};
+use crate::bake::solution::DirectionalLight;
 use crate::error::Result;
 use crate::render::{Direct, Light, Lighting, ReliefShading, Renderer, SAMPLES, Show, View};
 use crate::scene::Camera;
-use crate::solution::DirectionalLight;
 use crate::vk::Device;
 use glam::Vec3;
 

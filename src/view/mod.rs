@@ -39,9 +39,9 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Instant;
 
+use crate::bake::solution::Bake;
 use crate::error::Result;
 use crate::scene::{Camera, Scene};
-use crate::solution::Bake;
 use crate::solver::{self, Settings, Visibility};
 use crate::vk::{Device, Instance};
 

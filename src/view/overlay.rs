@@ -3,10 +3,10 @@
 use egui::{Color32, ColorImage, Painter, Pos2, Sense, Shape, Stroke, Ui, Vec2, pos2, vec2};
 use glam::{DVec3, Vec3};
 
-use crate::directions::Directions;
-use crate::hemicube::face_rectangle;
+use crate::bake::solution::DirectionalLight;
+use crate::math::directions::Directions;
+use crate::math::hemicube::face_rectangle;
 use crate::render::tone;
-use crate::solution::DirectionalLight;
 use crate::solver::ItemPicture;
 
 /// Pixels a side of the picture of a hemisphere.
@@ -166,7 +166,7 @@ mod tests {
                 assert!(seen.insert(place), "face {face}, {at:?}");
             }
         }
-        assert_eq!(seen.len(), crate::hemicube::pixel_count(n));
+        assert_eq!(seen.len(), crate::math::hemicube::pixel_count(n));
         assert_eq!(
             unfolded(1, (0, n / 2 - 1), n / 2).0,
             n / 2 + n,

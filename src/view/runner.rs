@@ -127,7 +127,7 @@ fn set(viewer: &mut Viewer, words: &[String]) -> Result<()> {
     match words {
         [name, value] if name == "directions" => {
             let count = value.parse().map_err(|_| wrong())?;
-            crate::directions::Directions::new(count)?;
+            crate::math::directions::Directions::new(count)?;
             viewer.directions = count;
             viewer.bake();
         }

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
+use crate::bake::solution::{Bake, DirectionalLight, Solution};
 use crate::error::Result;
 use crate::render::{Lighting, corner_irradiance, tone};
 use crate::scene::{Scene, Triangle};
-use crate::solution::{Bake, DirectionalLight, Solution};
 use crate::solver::{Ambient, Solver, StopReason, Update};
 
 /// How far a bake has come.

@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use mesolux::bench::relief_room::{REPEAT, TEXELS};
-use mesolux::elements::Elements;
+use mesolux::mesh::elements::Elements;
 use mesolux::render::{Picture, side_by_side};
 use mesolux::scene::shapes::Shapes;
 use mesolux::scene::{PointLight, Scene};

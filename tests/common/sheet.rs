@@ -1,9 +1,9 @@
 //! A bent sheet, and light on its elements.
 
 use glam::{DVec3, Vec3};
-use mesolux::directions::Directions;
+use mesolux::bake::solution::DirectionalLight;
+use mesolux::math::directions::Directions;
 use mesolux::scene::Scene;
-use mesolux::solution::DirectionalLight;
 
 use super::Build;
 

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3};
-use mesolux::form_factor::to_polygon;
+use mesolux::math::form_factor::to_polygon;
 use mesolux::path_tracer::PathTracer;
 use mesolux::render::Light;
 

@@ -11,14 +11,14 @@ use std::path::PathBuf;
 use common::{Build, assert_silent, device};
 use glam::DVec3;
 use mesolux::bake::bake;
+use mesolux::bake::solution::{Bake, Origin, Solution};
 use mesolux::bench::relief_room::{REPEAT, TEXELS, bumps, camera, noise};
-use mesolux::directions::Directions;
+use mesolux::math::directions::Directions;
 use mesolux::meso::{Options, Transport};
 use mesolux::render::{
     Comparison, Light, Lighting, Picture, ReliefShading, SAMPLES, Show, View, render,
 };
 use mesolux::scene::{Camera, Scene};
-use mesolux::solution::{Bake, Origin, Solution};
 use mesolux::solver::Settings;
 
 /// Pixels a side of the pictures.

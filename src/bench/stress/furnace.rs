@@ -3,12 +3,12 @@
 use glam::{DVec3, Vec3};
 
 use super::{Case, Check, Context, Size, furnace_material, settings};
-use crate::elements::Elements;
+use crate::bake::quality::Quality;
 use crate::error::Result;
-use crate::quality::Quality;
+use crate::mesh::elements::Elements;
+use crate::mesh::sources::Grouping;
 use crate::scene::shapes::Shapes;
 use crate::solver::Settings;
-use crate::sources::Grouping;
 
 pub(super) const NEARLY_WHITE: Case = Case {
     name: "nearly_white",

@@ -19,8 +19,8 @@ use serde::Serialize;
 
 use crate::atomic_file::write_atomically;
 use crate::bake;
-use crate::elements::Elements;
 use crate::error::{Error, Result};
+use crate::mesh::elements::Elements;
 use crate::scene::shapes::Shapes;
 use crate::scene::{BuiltinOptions, PointLight, Scene, load, write_scene};
 use crate::solver::{Report, Settings, Solver};

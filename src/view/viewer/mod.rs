@@ -270,7 +270,7 @@ impl Viewer {
 
     /// Starts a new bake with the chosen directions and relief.
     pub(super) fn bake(&mut self) {
-        self.settings.relief.directions = crate::directions::Directions::new(self.directions)
+        self.settings.relief.directions = crate::math::directions::Directions::new(self.directions)
             .unwrap_or(self.settings.relief.directions);
         for (material, before) in self
             .base

@@ -1,13 +1,17 @@
 //! From a scene to a solution: the library's main entry.
 
+pub mod cache;
+pub mod quality;
+pub mod solution;
+
 use std::sync::Arc;
 
-use crate::elements::Elements;
+use crate::bake::solution::Solution;
 use crate::error::Result;
+use crate::mesh::elements::Elements;
 use crate::meso::{self, HeightField, Relief};
 use crate::passes::relief_visibility::ReliefVisibility;
 use crate::scene::Scene;
-use crate::solution::Solution;
 use crate::solver::{self, Settings, Solver, Update, Visibility};
 use crate::vk::Device;
 

@@ -9,7 +9,7 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::{Boundable, BvhBuildParams};
 
-use crate::elements::Elements;
+use crate::mesh::elements::Elements;
 
 /// Heights above an element's plane below which a place lies in the plane, in internal units.
 const FLAT: f64 = 1e-6;
@@ -148,7 +148,7 @@ fn spread([a, b, c]: [DVec3; 3], most: f64) -> impl Iterator<Item = DVec3> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::charts::{Connections, charts, morton_order};
+    use crate::mesh::charts::{Connections, charts, morton_order};
     use crate::scene::{BuiltinOptions, load};
 
     /// The tree finds what a look at all pairs finds.

@@ -13,11 +13,11 @@ mod single;
 
 use glam::{DVec3, Vec3};
 
-use crate::charts::Connections;
 use crate::constants::KIND_POINT;
-use crate::contour::Loop;
-use crate::elements::Elements;
 use crate::error::{Error, Result};
+use crate::mesh::charts::Connections;
+use crate::mesh::contour::Loop;
+use crate::mesh::elements::Elements;
 use crate::scene::PointLight;
 use cut::{Limits, cut};
 pub(crate) use eyes::least_strong;

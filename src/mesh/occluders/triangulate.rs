@@ -9,7 +9,7 @@ use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
 use super::outline::Outline;
 use super::region::Region;
-use crate::elements::Elements;
+use crate::mesh::elements::Elements;
 
 /// Largest relative difference of the triangles' area from the elements'.
 const AREA: f64 = 1e-6;

@@ -12,8 +12,8 @@ mod triangulate;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::charts::Connections;
-use crate::elements::Elements;
+use crate::mesh::charts::Connections;
+use crate::mesh::elements::Elements;
 use outline::outlines;
 use region::{Region, regions};
 

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use crate::elements::Elements;
+use crate::mesh::elements::Elements;
 
 /// A closed loop of corners; the last is joined to the first.
 pub type Loop = Vec<DVec3>;

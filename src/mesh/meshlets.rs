@@ -4,10 +4,10 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use crate::charts::Connections;
 use crate::constants::MESHLET_TRIANGLES;
-use crate::elements::Elements;
-use crate::occluders::Occluders;
+use crate::mesh::charts::Connections;
+use crate::mesh::elements::Elements;
+use crate::mesh::occluders::Occluders;
 
 #[derive(Debug, Clone, Copy)]
 pub struct Meshlet {

@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 
-use crate::charts::Connections;
 use crate::constants::NONE;
-use crate::elements::Elements;
+use crate::mesh::charts::Connections;
+use crate::mesh::elements::Elements;
 
 /// Elements of one plane.
 pub struct Region {
@@ -20,7 +20,7 @@ const PLANE: f64 = 2e-7;
 /// Largest sine of the angle between a member's normal and the item's, beyond the effect of
 /// rounding.
 const SINE: f64 = 1e-6;
-/// How far two corners' rounding (see [`crate::elements`]) may lift one over the other: √3 steps of
+/// How far two corners' rounding (see [`crate::mesh::elements`]) may lift one over the other: √3 steps of
 /// 2⁻²⁶, and a margin.
 const ROUNDING: f64 = 4e-8;
 

@@ -8,8 +8,8 @@ use std::time::SystemTime;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
+use crate::bake::solution::{Bake, Origin, Solution, VERSION};
 use crate::error::{Error, Result};
-use crate::solution::{Bake, Origin, Solution, VERSION};
 use crate::solver::{Settings, StopReason};
 
 /// Most bakes that are kept, and most bytes in all; the least recently used are deleted first.

@@ -5,7 +5,7 @@ mod file;
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::elements::Elements;
+use crate::mesh::elements::Elements;
 use crate::meso::Relief;
 use crate::scene::Scene;
 use crate::solver::{Light, ReliefLight, Report};
@@ -32,7 +32,7 @@ pub struct Solution {
 }
 
 /// Light by direction, `[meso element]` in the order of the input; slots as in
-/// [`crate::directions::Directions`].
+/// [`crate::math::directions::Directions`].
 pub struct DirectionalLight {
     /// Triangles of the input.
     pub elements: Vec<u32>,

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 
 use glam::DVec3;
 
-use crate::elements::Elements;
+use crate::mesh::elements::Elements;
 
 /// Elements that touch over an edge, and the connected parts that they form.
 pub struct Connections {

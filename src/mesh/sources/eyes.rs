@@ -6,7 +6,7 @@ use super::cut::Limits;
 use super::group::holds;
 use super::{Grouping, Source, triangle_area};
 use crate::constants::KIND_SURFACE;
-use crate::elements::Elements;
+use crate::mesh::elements::Elements;
 
 /// Turns the hemicube of each source about its axis by an angle of its own.
 pub(super) fn turn_frames(sources: &mut [Source], seed: u64) {

@@ -3,10 +3,10 @@
 use glam::DVec3;
 
 use super::{Part, Source};
-use crate::charts::Connections;
 use crate::constants::KIND_SURFACE;
-use crate::contour::contour;
-use crate::elements::Elements;
+use crate::mesh::charts::Connections;
+use crate::mesh::contour::contour;
+use crate::mesh::elements::Elements;
 
 /// Largest distance from the mean plane, as a share of the extent, at which a group still counts as
 /// plane.

@@ -1,8 +1,8 @@
 //! The outline of a region.
 
-use crate::charts::Connections;
 use crate::constants::NONE;
-use crate::elements::Elements;
+use crate::mesh::charts::Connections;
+use crate::mesh::elements::Elements;
 
 use super::region::Region;
 

@@ -1,8 +1,8 @@
 //! Presets of a bake's settings, from coarse and quick to fine and slow; `mesolux bench pareto`
 //! measures error against time.
 
+use crate::mesh::sources::Grouping;
 use crate::solver::Settings;
-use crate::sources::Grouping;
 
 /// Quality of a bake.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

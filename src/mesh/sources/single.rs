@@ -3,9 +3,9 @@
 use glam::DVec3;
 
 use super::{Source, triangle_area};
-use crate::charts::Connections;
 use crate::constants::{KIND_POINT, KIND_SURFACE, NONE};
-use crate::elements::Elements;
+use crate::mesh::charts::Connections;
+use crate::mesh::elements::Elements;
 use crate::scene::PointLight;
 
 /// An element, or a piece of one.

@@ -3,8 +3,8 @@
 use super::Grouping;
 use super::group::{Shape, bisect};
 use super::near::Surroundings;
-use crate::charts::{Connections, charts, morton_order};
-use crate::elements::Elements;
+use crate::mesh::charts::{Connections, charts, morton_order};
+use crate::mesh::elements::Elements;
 
 /// A scene's limits of area and power of one source.
 pub(super) struct Limits<'a> {

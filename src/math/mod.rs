@@ -1,0 +1,5 @@
+//! Pure mathematics in f64: directions, the hemicube, form factors.
+
+pub mod directions;
+pub mod form_factor;
+pub mod hemicube;

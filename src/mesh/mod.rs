@@ -1,0 +1,9 @@
+//! A scene as the solver sees it: elements, groups of them that send light, and triangles that hide it.
+
+pub mod charts;
+pub mod contour;
+pub mod corners;
+pub mod elements;
+pub mod meshlets;
+pub mod occluders;
+pub mod sources;
