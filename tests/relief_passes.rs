@@ -65,8 +65,6 @@ fn solver_by(estimator: Estimator, transport: Transport, k: u32, shots: Option<u
         emitter_hemicube: Some(FACE),
         batch: BATCH,
         shots,
-        // Every shot is drawn, so that a batch is BATCH of them.
-        visibility_memory: Some(0),
         // Sources that few batches see twice.
         grouping: Grouping {
             max_area: 1.0 / 512.0,

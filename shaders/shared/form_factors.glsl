@@ -18,12 +18,12 @@
 // kind has a pipeline of its own.
 layout(constant_id = 0) const uint KIND = RECEIVE_OUTLINE;
 
-// Words of vec4: a corner; w: 1 where a loop of the contour starts (each loop ends with its first corner again).
-layout(scalar, binding = 7) readonly buffer Contours { uint contour_words[]; };
-// Words of struct Triangle.
-layout(scalar, binding = 8) readonly buffer Triangles { uint triangle_words[]; };
-// Of curved sources: centroid and sum of area times normal, two words unused.
-layout(scalar, binding = 9) readonly buffer Parts { uint part_words[]; };
+// xyz: a corner; w: 1 where a loop of the contour starts (each loop ends with its first corner again).
+layout(binding = 7) uniform usamplerBuffer contours;
+// TRIANGLE_TEXELS an element.
+layout(binding = 8) uniform usamplerBuffer triangles;
+// Of curved sources: centroid and sum of area times normal, two words unused; PART_TEXELS a part.
+layout(binding = 9) uniform usamplerBuffer parts;
 // 1 where any element of a block of GROUP sees the source, [slot][block]. Whoever reads it sets it to 0 again.
 layout(scalar, binding = 10) writeonly buffer Occupied { uint occupied[]; };
 // [slot][element of this dispatch]
@@ -32,30 +32,29 @@ layout(scalar, binding = 11) writeonly buffer Fresh { FLUX fresh[]; };
 layout(scalar, binding = 12) readonly buffer MesoElements { MesoElement meso_elements[]; };
 #endif
 
-const uint PART_WORDS = 8;
-const uint TRIANGLE_WORDS = 16;
+const uint PART_TEXELS = 2;
+const uint TRIANGLE_TEXELS = 4;
 
 Triangle load_triangle(uint index) {
-    vec4 word[TRIANGLE_WORDS / 4];
-    for (uint i = 0; i < TRIANGLE_WORDS / 4; i++) {
-        word[i] = LOAD4(triangle_words, index * TRIANGLE_WORDS + 4 * i);
+    vec4 word[TRIANGLE_TEXELS];
+    for (uint i = 0; i < TRIANGLE_TEXELS; i++) {
+        word[i] = fetch(triangles, TRIANGLE_TEXELS * index + i);
     }
     return Triangle(word[0].xyz, word[0].w, word[1].xyz, word[1].w, word[2].xyz, word[2].w, word[3].xyz, word[3].w);
 }
 
 vec3 own_corner(uint element, uint corner) {
-    uint at = element * TRIANGLE_WORDS + 4 * corner;
-    return uintBitsToFloat(uvec3(triangle_words[at], triangle_words[at + 1], triangle_words[at + 2]));
+    return fetch(triangles, TRIANGLE_TEXELS * element + corner).xyz;
 }
 
 // Form factor (see FLUX) of the source's outline, of whose edges none is seen under more than a right angle and none lies below the
 // horizon of n.
 FLUX outline_above(vec3 p, vec3 n, Source s) {
     FLUX sum = FLUX(0.0);
-    vec3 last = LOAD4(contour_words, 4 * s.first_contour).xyz - p;
+    vec3 last = fetch(contours, s.first_contour).xyz - p;
     float inverse_last = inversesqrt(dot(last, last));
     for (uint i = 1; i < s.contour_count; i++) {
-        vec4 corner = LOAD4(contour_words, 4 * (s.first_contour + i));
+        vec4 corner = fetch(contours, s.first_contour + i);
         vec3 next = corner.xyz - p;
         float inverse_next = inversesqrt(dot(next, next));
         float scale = corner.w == 1.0 ? 0.0 : inverse_last * inverse_next;
@@ -70,9 +69,9 @@ FLUX outline_above(vec3 p, vec3 n, Source s) {
 // The same of any outline, cut at the horizon.
 FLUX outline(vec3 p, vec3 n, Source s) {
     Contour contour = contour_begin();
-    vec3 last = LOAD4(contour_words, 4 * s.first_contour).xyz - p;
+    vec3 last = fetch(contours, s.first_contour).xyz - p;
     for (uint i = 1; i < s.contour_count; i++) {
-        vec4 corner = LOAD4(contour_words, 4 * (s.first_contour + i));
+        vec4 corner = fetch(contours, s.first_contour + i);
         vec3 next = corner.xyz - p;
         if (corner.w == 1.0) {
             contour_close(contour, n);
@@ -89,9 +88,9 @@ FLUX outline(vec3 p, vec3 n, Source s) {
 FLUX parts_as_points(vec3 p, vec3 n, Source s) {
     FLUX sum = FLUX(0.0);
     for (uint i = 0; i < s.part_count; i++) {
-        uint word = (s.first_part + i) * PART_WORDS;
-        vec4 low = LOAD4(part_words, word);
-        vec4 high = LOAD4(part_words, word + 4);
+        uint at = PART_TEXELS * (s.first_part + i);
+        vec4 low = fetch(parts, at);
+        vec4 high = fetch(parts, at + 1);
         vec3 way = low.xyz - p;
         vec3 vector_area = vec3(low.w, high.xy);
         float square = dot(way, way);
@@ -110,8 +109,8 @@ FLUX members(vec3 p, vec3 n, uint element, Source s) {
         // leaves out.
         bool shows;
         do {
-            float height = LOAD4(triangle_words, member * TRIANGLE_WORDS + 4).w;
-            vec3 normal = LOAD4(triangle_words, member * TRIANGLE_WORDS + 12).xyz;
+            float height = fetch(triangles, TRIANGLE_TEXELS * member + 1).w;
+            vec3 normal = fetch(triangles, TRIANGLE_TEXELS * member + 3).xyz;
             shows = member != element && dot(normal, p) > height;
             member++;
         } while (subgroupBallot(shows) == uvec4(0) && member < end);
@@ -229,10 +228,11 @@ void main() {
     uint i = listed[list * element_count + at];
     uint e = first_element + i;
     Source s = load_source(slots[first_slot].source);
-    FLUX f = mean_form_factor(e, balls[e], planes[e].xyz, s);
+    vec3 n = fetch(planes, e).xyz;
+    FLUX f = mean_form_factor(e, fetch(balls, e), n, s);
 #ifdef VECTOR_FLUX
     MesoElement meso = meso_elements[i];
-    vec3 local = vec3(dot(meso.tangent, f), dot(meso.bitangent, f), dot(planes[e].xyz, f));
+    vec3 local = vec3(dot(meso.tangent, f), dot(meso.bitangent, f), dot(n, f));
     float strength = as_kept(length(local));
     f = strength > 0.0 ? strength * kept_direction(direction_code(local / strength)) : vec3(0.0);
     bool lit = strength > 0.0;

@@ -13,9 +13,9 @@
 #include "shared/types.glsl"
 #include "shared/kept.glsl"
 #include "shared/lanes.glsl"
+#include "shared/texels.glsl"
 #ifdef FROM_RELIEF
 #include "shared/directions.glsl"
-#include "shared/load4.glsl"
 #endif
 #ifdef TO_RELIEF
 #include "shared/disc.glsl"
@@ -45,8 +45,8 @@ layout(scalar, binding = 4) readonly buffer Slots { Slot slots[]; };
 // Light that the sources with a relief send by direction,
 // [slot from first_slot on][emitted, reflected][direction].
 layout(scalar, binding = 5) readonly buffer Exits { vec3 exits[]; };
-// Words of struct Source.
-layout(scalar, binding = 6) readonly buffer Sources { uint source_words[]; };
+// SOURCE_TEXELS a source.
+layout(binding = 6) uniform usamplerBuffer sources;
 layout(scalar, binding = 7) readonly buffer Balls { vec4 balls[]; };
 #endif
 #ifdef TO_RELIEF
@@ -97,7 +97,7 @@ struct Sent {
 };
 
 uint word_at(uint at) {
-    return texelFetch(words, int(at / 4))[at % 4];
+    return fetch_words(words, at / 4)[at % 4];
 }
 
 // Light of which the element sees the share f.
@@ -133,9 +133,9 @@ struct Sender {
 
 // All lanes want the same one.
 Sender sender(uint source) {
-    uint first = source * SOURCE_WORDS;
-    return Sender(LOAD4(source_words, first + 8).xyz, LOAD4(source_words, first + 12).xyz,
-                  LOAD4(source_words, first + 4).xyz, LOAD4(source_words, first + 24).yzw);
+    uint at = SOURCE_TEXELS * source;
+    return Sender(fetch(sources, at + 2).xyz, fetch(sources, at + 3).xyz,
+                  fetch(sources, at + 1).xyz, fetch(sources, at + 6).yzw);
 }
 
 vec3 sent_to(uint slot, Sender s, vec3 middle) {
@@ -153,7 +153,7 @@ bool by_direction(uint source) {
 Sent look_up(uint slot) {
     Sent sent = Sent(vec3(0.0), 0);
     if (slot < end_slot) {
-        uvec4 lit = texelFetch(lit_rows, int(2 * slot + reflected));
+        uvec4 lit = fetch_words(lit_rows, 2 * slot + reflected);
         sent.light = uintBitsToFloat(lit.xyz);
         bool sends = sent.light != vec3(0.0);
 #ifdef FROM_RELIEF
@@ -170,10 +170,10 @@ Sent look_up(uint slot) {
 
 // The factors of the elements of one texel.
 void load(uint block, uint texel, out FLUX f[FACTORS]) {
-    uvec4 pairs = texelFetch(words, int(block + texel));
+    uvec4 pairs = fetch_words(words, block + texel);
 #ifdef TO_RELIEF
-    uvec4 low = texelFetch(words, int(block + TEXELS + 2 * texel));
-    uvec4 high = texelFetch(words, int(block + TEXELS + 2 * texel + 1));
+    uvec4 low = fetch_words(words, block + TEXELS + 2 * texel);
+    uvec4 high = fetch_words(words, block + TEXELS + 2 * texel + 1);
 #endif
     for (uint k = 0; k < FACTORS; k++) {
         uint pair = pairs[k / 2];

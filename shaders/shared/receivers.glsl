@@ -5,17 +5,17 @@
 #extension GL_KHR_shader_subgroup_ballot : require
 #include "shared/types.glsl"
 #include "shared/hemicube.glsl"
-#include "shared/load4.glsl"
+#include "shared/texels.glsl"
 
 layout(local_size_x = GROUP) in;
 
 layout(scalar, binding = 0) readonly buffer Slots { Slot slots[]; };
-// Words of struct Source.
-layout(scalar, binding = 1) readonly buffer Sources { uint source_words[]; };
+// SOURCE_TEXELS a source.
+layout(binding = 1) uniform usamplerBuffer sources;
 // xyz: unit normal n; w: n · x on the plane.
-layout(scalar, binding = 2) readonly buffer Planes { vec4 planes[]; };
+layout(binding = 2) uniform usamplerBuffer planes;
 // xyz: centroid; w: radius of the ball about it that holds the element.
-layout(scalar, binding = 3) readonly buffer Balls { vec4 balls[]; };
+layout(binding = 3) uniform usamplerBuffer balls;
 // How many elements each list holds, [slot][kind].
 layout(scalar, binding = 4) buffer Counts { ReceiverList lists[]; };
 // The elements, counted from the first of the dispatch, [slot][kind][element].
@@ -65,7 +65,7 @@ bool visible(vec3 p, vec3 n, uint element, uint slot, Source s, bool asks) {
     if (!asks || item == NONE || item == element) {
         return asks;
     }
-    vec4 plane = planes[item];
+    vec4 plane = fetch(planes, item);
     float eye_height = dot(plane.xyz, s.eye) - plane.w;
     float height = dot(plane.xyz, p) - plane.w;
     float depth = eye_height >= 0.0 ? -height : height;
@@ -93,14 +93,16 @@ bool visible(vec3 p, vec3 n, uint element, uint slot, Source s, bool asks) {
 #endif
 
 Source load_source(uint index) {
-    vec4 word[SOURCE_WORDS / 4];
-    for (uint i = 0; i < SOURCE_WORDS / 4; i++) {
-        word[i] = LOAD4(source_words, index * SOURCE_WORDS + 4 * i);
+    vec4 word[SOURCE_TEXELS];
+    for (uint i = 0; i < SOURCE_TEXELS; i++) {
+        word[i] = fetch(sources, SOURCE_TEXELS * index + i);
     }
-    return Source(word[0].xyz, word[0].w, word[1].xyz, word[1].w, word[2].xyz, word[2].w, word[3].xyz, word[3].w,
-                  word[4].xyz, floatBitsToUint(word[4].w), floatBitsToUint(word[5].x), floatBitsToUint(word[5].y),
-                  floatBitsToUint(word[5].z), floatBitsToUint(word[5].w), floatBitsToUint(word[6].x), word[6].yzw, word[7].x, word[7].y, floatBitsToUint(word[7].z),
-                  floatBitsToUint(word[7].w));
+    uvec4 ranges = floatBitsToUint(word[5]);
+    uvec2 parts = floatBitsToUint(word[7].zw);
+    return Source(word[0].xyz, word[0].w, word[1].xyz, word[1].w, word[2].xyz, word[2].w,
+                  word[3].xyz, word[3].w, word[4].xyz, floatBitsToUint(word[4].w), ranges.x,
+                  ranges.y, ranges.z, ranges.w, floatBitsToUint(word[6].x), word[6].yzw, word[7].x,
+                  word[7].y, parts.x, parts.y);
 }
 
 // Whether every member shows p its front: the cone of normals and the ball bound their heights.

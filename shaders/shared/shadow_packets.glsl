@@ -2,13 +2,13 @@
 // together, from one eye to RAYS places a lane, so that what all look at is loaded once. Nodes stand in depth-first
 // order, and each knows the one to go on with if no lane meets its box. src/reference/occluder_rays.rs is the same in f64.
 
-// Words of struct ShadowNode.
-layout(scalar, binding = 6) readonly buffer ShadowNodes { uint node_words[]; };
-// Words of struct ShadowOccluder.
-layout(scalar, binding = SHADOW_OCCLUDERS) readonly buffer ShadowOccluders { uint occluder_words[]; };
+// NODE_TEXELS a node.
+layout(binding = 6) uniform usamplerBuffer shadow_nodes;
+// OCCLUDER_TEXELS an occluder.
+layout(binding = SHADOW_OCCLUDERS) uniform usamplerBuffer shadow_occluders;
 
-const uint NODE_WORDS = 8;
-const uint OCCLUDER_WORDS = 16;
+const uint NODE_TEXELS = 2;
+const uint OCCLUDER_TEXELS = 4;
 // Components of a way below this count as this, so that their reciprocals are finite: boxes are padded by far more.
 const float LEAST_WAY = 1e-18;
 // Height above a plane from which on boxes of what lies in it are not met.
@@ -29,12 +29,11 @@ struct Met {
 // What lies in one plane with the eye hides nothing, nor do the backs of a closed part that the source is on: its group does not
 // stand behind them.
 Met met(Source s, uint triangle) {
-    uvec4 word_a;
-    uvec4 word_b;
-    uvec4 word_c;
-    uvec4 normal;
-    LOAD8(occluder_words, OCCLUDER_WORDS * triangle, word_a, word_b)
-    LOAD8(occluder_words, OCCLUDER_WORDS * triangle + 8, word_c, normal)
+    uint first = OCCLUDER_TEXELS * triangle;
+    uvec4 word_a = fetch_words(shadow_occluders, first);
+    uvec4 word_b = fetch_words(shadow_occluders, first + 1);
+    uvec4 word_c = fetch_words(shadow_occluders, first + 2);
+    uvec4 normal = fetch_words(shadow_occluders, first + 3);
     precise vec3 a = uintBitsToFloat(word_a.xyz) - s.eye;
     precise vec3 b = uintBitsToFloat(word_b.xyz) - s.eye;
     precise vec3 c = uintBitsToFloat(word_c.xyz) - s.eye;
@@ -77,7 +76,7 @@ void look(Source s, vec4 p[RAYS], vec3 n[RAYS], inout bool open[RAYS]) {
         float falls = -dot(way[r], n[r]);
         end[r] = falls > 0.0 ? max(1.0 - CLEAR / falls, 0.5) : 1.0;
     }
-    uint count = node_words[3];
+    uint count = fetch_words(shadow_nodes, 0).w;
     uint at = 0;
     while (at < count) {
         // On to the next leaf that a ray enters, in a loop of its own: a software device works through what a branch leaves out.
@@ -85,9 +84,8 @@ void look(Source s, vec4 p[RAYS], vec3 n[RAYS], inout bool open[RAYS]) {
         bool enters[RAYS];
         uint leaf = 0;
         do {
-            uvec4 low_word;
-            uvec4 high_word;
-            LOAD8(node_words, NODE_WORDS * at, low_word, high_word)
+            uvec4 low_word = fetch_words(shadow_nodes, NODE_TEXELS * at);
+            uvec4 high_word = fetch_words(shadow_nodes, NODE_TEXELS * at + 1);
             vec3 low = uintBitsToFloat(low_word.xyz) - s.eye;
             vec3 high = uintBitsToFloat(high_word.xyz) - s.eye;
             bool any_enters = false;

@@ -68,13 +68,14 @@ uint kind_of(Source s, vec4 ball, vec3 n, out bool near) {
 
 // Whether `kind_of` is RECEIVE_KINDS for every element of a block. Each lane may ask of another source.
 bool none_sees(ReceiverBlock block, uint source) {
-    uint word = source * SOURCE_WORDS;
-    vec3 normal = uintBitsToFloat(uvec3(source_words[word + 4], source_words[word + 5], source_words[word + 6]));
-    float radius = uintBitsToFloat(source_words[word + 7]);
-    float cone_sin = uintBitsToFloat(source_words[word + 11]);
-    float cone_cos = uintBitsToFloat(source_words[word + 15]);
-    bool is_point = source_words[word + 19] == KIND_POINT;
-    vec3 middle = uintBitsToFloat(uvec3(source_words[word + 25], source_words[word + 26], source_words[word + 27]));
+    uint at = SOURCE_TEXELS * source;
+    vec4 facing = fetch(sources, at + 1);
+    vec3 normal = facing.xyz;
+    float radius = facing.w;
+    float cone_sin = fetch(sources, at + 2).w;
+    float cone_cos = fetch(sources, at + 3).w;
+    bool is_point = fetch_words(sources, at + 4).w == KIND_POINT;
+    vec3 middle = fetch(sources, at + 6).yzw;
     vec3 d = block.centre - middle;
     float square = dot(d, d);
     // Whether the source lies behind the element that is turned to it most.
@@ -136,8 +137,8 @@ void main() {
         vec3 n[SORT_ELEMENTS];
         for (uint j = 0; j < SORT_ELEMENTS; j++) {
             uint e = first_element + min(first + j * gl_SubgroupSize, last_element);
-            ball[j] = balls[e];
-            n[j] = planes[e].xyz;
+            ball[j] = fetch(balls, e);
+            n[j] = fetch(planes, e).xyz;
         }
         while (sighted != 0) {
             uint slot = first_slot + findLSB(sighted);

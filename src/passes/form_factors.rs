@@ -67,6 +67,11 @@ struct Parameters {
 
 /// Place of the item buffer, or of the tree's nodes, among the bindings, and how many there are for sorting and in all.
 const ITEMS: usize = 6;
+/// Texels: sources, planes, balls; contours, triangles, parts.
+const SOURCES: usize = 1;
+const BALLS: usize = 3;
+const CONTOURS: usize = 7;
+const PARTS: usize = 9;
 const SORT: usize = 9;
 const PLAIN: usize = 12;
 
@@ -90,7 +95,14 @@ fn pipeline(
     match shader.seen_by {
         SeenBy::ItemBuffer => kinds[ITEMS] = Binding::Sampled,
         // What the nodes hold comes last.
-        SeenBy::ShadowRays => kinds.push(Binding::Storage),
+        SeenBy::ShadowRays => {
+            kinds[ITEMS] = Binding::Texels;
+            kinds.push(Binding::Texels);
+        }
+    }
+    kinds[SOURCES..=BALLS].fill(Binding::Texels);
+    if shader.bindings >= PLAIN {
+        kinds[CONTOURS..=PARTS].fill(Binding::Texels);
     }
     ComputePipeline::new(
         device,
@@ -155,35 +167,24 @@ impl FormFactors {
         let (seen, last) = match &batch.sight {
             Sight::Hemicubes(h) => (Bind::Image(&h.items, &h.sampler), None),
             Sight::Rays(tree) => (
-                Bind::Buffer(&tree.nodes),
-                Some(Bind::Buffer(&tree.occluders)),
+                Bind::Texels(&tree.nodes),
+                Some(Bind::Texels(&tree.occluders)),
             ),
         };
         let bind =
             |pipelines: &[ComputePipeline], lists: &ReceiverLists, fresh, more: Option<&Buffer>| {
-                let mut binds: Vec<_> = [
-                    &batch.slots,
-                    &scene.sources,
-                    &scene.planes,
-                    &scene.balls,
-                    &lists.counts,
-                    &lists.listed,
-                ]
-                .map(Bind::Buffer)
-                .to_vec();
+                let mut binds = vec![Bind::Buffer(&batch.slots)];
+                let receivers = [&scene.sources, &scene.planes, &scene.balls];
+                binds.extend(receivers.map(Bind::Texels));
+                binds.extend([&lists.counts, &lists.listed].map(Bind::Buffer));
                 binds.push(seen);
                 let mut sort = binds.clone();
                 sort.extend([&rows.facing_away, &scene.receiver_blocks].map(Bind::Buffer));
                 sort.extend(last);
                 let sort = self.sort.bind("sort receivers", &sort)?;
-                let rest = [
-                    &scene.contours,
-                    &scene.triangles,
-                    &scene.parts,
-                    &rows.occupied,
-                    fresh,
-                ];
-                binds.extend(rest.map(Bind::Buffer));
+                let shapes = [&scene.contours, &scene.triangles, &scene.parts];
+                binds.extend(shapes.map(Bind::Texels));
+                binds.extend([&rows.occupied, fresh].map(Bind::Buffer));
                 binds.extend(more.map(Bind::Buffer));
                 binds.extend(last);
                 let kinds = pipelines.iter().map(|p| p.bind("form factors", &binds));

@@ -110,6 +110,7 @@ const PLAIN: usize = 4;
 const FROM_RELIEF: usize = PLAIN + 4;
 const LIT_ROWS: usize = 0;
 const WORDS: usize = 3;
+const SOURCES: usize = 6;
 const TO_RELIEF: usize = FROM_RELIEF + 4;
 
 /// Slots of a dispatch: a software device ends a shader's loops after 65,535 turns of all together.
@@ -122,6 +123,9 @@ impl Gather {
             let mut kinds = vec![Binding::Storage; bindings];
             kinds[LIT_ROWS] = Binding::Texels;
             kinds[WORDS] = Binding::Texels;
+            if bindings > PLAIN {
+                kinds[SOURCES] = Binding::Texels;
+            }
             ComputePipeline::new(device, name, spirv, &kinds, bytes, &lanes, true)
         };
         if !with_relief {
@@ -151,8 +155,9 @@ impl Gather {
                 binds.extend([irradiance, error].map(Bind::Buffer));
                 binds.push(Bind::Texels(chunk));
                 if let Some(relief) = relief {
-                    let sending = [&list.slots, &relief.exits, &scene.sources, &scene.balls];
-                    binds.extend(sending.map(Bind::Buffer));
+                    binds.extend([&list.slots, &relief.exits].map(Bind::Buffer));
+                    binds.push(Bind::Texels(&scene.sources));
+                    binds.push(Bind::Buffer(&scene.balls));
                 }
                 binds
             };

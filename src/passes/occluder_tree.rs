@@ -56,10 +56,10 @@ impl OccluderTree {
     /// A device without the memory.
     pub fn new(device: &Arc<Device>, occluders: Vec<ShadowOccluder>) -> Result<Self> {
         let tree = ShadowTree::new(occluders);
-        let storage = BufferUse::Storage;
+        let texels = BufferUse::Texels;
         Ok(Self {
-            nodes: upload(device, "occluder nodes", tree.nodes(), storage)?,
-            occluders: upload(device, "shadow occluders", &tree.triangles, storage)?,
+            nodes: upload(device, "occluder nodes", tree.nodes(), texels)?,
+            occluders: upload(device, "shadow occluders", &tree.triangles, texels)?,
         })
     }
 }

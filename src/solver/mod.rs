@@ -190,6 +190,11 @@ impl Solver {
         };
         let mut report = Report::new(devices, settings, &elements, &sources, slots);
         report.set_meshlets(scene.meshlet_count);
+        let least = sources::least_strong(&sources.list, &settings.grouping);
+        let power = sources::Source::emitted_power;
+        if least > 0.0 && sources.list.iter().any(|source| power(source) >= least) {
+            report.emitter_hemicube = rows::emitter_face(device, settings);
+        }
         report.skipped.triangles_merged = (elements.len() - occluders.len()) as u64;
         report.seconds.setup = start.elapsed().as_secs_f64();
         Ok(Self {

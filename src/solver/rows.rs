@@ -259,6 +259,14 @@ pub(super) fn looks_closer(device: &Device, settings: &Settings) -> bool {
     emitter_looks(device, settings, Vec::new).is_some()
 }
 
+/// Pixels a side of the hemicubes of strong emitters, if they are drawn by hemicubes.
+pub(super) fn emitter_face(device: &Device, settings: &Settings) -> u32 {
+    match emitter_looks(device, settings, Vec::new) {
+        Some(Looks::Hemicubes(face)) => face,
+        _ => settings.hemicube,
+    }
+}
+
 /// What strong emitters are looked at with, if not as all others are.
 pub(super) fn emitter_looks(
     device: &Device,
