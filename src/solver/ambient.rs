@@ -38,7 +38,7 @@ impl Solver {
     /// The estimate for what is unshot now: since the last [`Solver::run`].
     pub fn ambient(&self) -> Result<Ambient> {
         let unshot = match &self.method {
-            Method::Rows(spine) => spine.unshot_by_colour(),
+            Method::Rows(spine) => spine.ledger.unshot_by_colour(),
             Method::Shots(shots) => shots.unshot_by_colour(&self.state)?,
         };
         Ok(Ambient::new(unshot, &self.elements))

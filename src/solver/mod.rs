@@ -13,6 +13,7 @@ mod devices;
 mod drawing;
 mod estimate;
 mod gather;
+mod ledger;
 mod look;
 mod progress;
 mod relief_light;
@@ -21,6 +22,7 @@ mod rows;
 mod scene_parts;
 mod self_test;
 mod settings;
+mod several;
 mod shots;
 mod spine;
 mod system;
@@ -266,7 +268,7 @@ impl Solver {
         let unshot = match &mut self.method {
             Method::Rows(spine) => {
                 spine.run(on, report, &mut watch)?;
-                spine.unshot()
+                spine.ledger.unshot()
             }
             Method::Shots(shots) => {
                 shots.run(on, report, &mut watch)?;
@@ -325,8 +327,8 @@ impl Solver {
         }
         let (state, chunks) = spine.kept.download(&self.device)?;
         let kept = visibility::Kept {
-            rows: spine.rows(),
-            coupling: spine.system.rows().collect(),
+            rows: spine.ledger.rows(),
+            coupling: spine.ledger.system.rows().collect(),
             state,
             chunks,
             chunk_words: spine.kept.chunk_words,
@@ -371,7 +373,7 @@ impl Solver {
     /// The sources as they receive, in the order of the words of [`DrawnBatch::coupling`].
     pub fn coupling_targets(&self) -> &[CouplingTarget] {
         match &self.method {
-            Method::Rows(spine) => &spine.system.targets.list,
+            Method::Rows(spine) => &spine.ledger.system.targets.list,
             Method::Shots(_) => &[],
         }
     }

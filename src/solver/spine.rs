@@ -7,10 +7,11 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 use super::coupling::{CouplingRow, Targets};
 use super::gather::{Gathering, Lit, LitRow};
+use super::ledger::{Candidates, Drawn, Ledger};
 use super::progress::Watch;
 use super::rows::{Factors, Made, looks_closer};
 use super::scene_parts::SceneParts;
@@ -25,7 +26,6 @@ use crate::passes::buffers::{SceneBuffers, State};
 use crate::passes::fresh_rows::RowShape;
 use crate::passes::kept_rows::{KeptRows, KeptSize};
 use crate::passes::relief_buffers::{ReliefBuffers, meso_elements};
-use crate::passes::types::KeptRow;
 use crate::vk::Device;
 
 /// A solution under way.
@@ -33,12 +33,11 @@ pub(super) struct Spine {
     devices: Vec<Arc<Device>>,
     /// Made when a source is first to be drawn.
     team: Option<Team>,
-    pub system: System,
+    pub ledger: Ledger,
     pub kept: KeptRows,
     gathering: Gathering,
-    /// `[source]`
-    sources: Vec<Drawn>,
-    size: SpineSize,
+    /// Sources of a batch.
+    slots: u32,
 }
 
 /// What a solution is made for.
@@ -62,25 +61,6 @@ pub(super) struct On<'a> {
     pub relief: Option<&'a ReliefBuffers>,
 }
 
-/// What has been done with a source.
-#[derive(Debug, Clone, Copy, Default)]
-struct Drawn {
-    /// It emits strongly.
-    strong: bool,
-    /// Its elements have a relief.
-    relief: bool,
-    under_way: bool,
-    /// Times that it was drawn.
-    times: u32,
-    /// Where its row is kept.
-    row: Option<KeptRow>,
-    emission_gathered: bool,
-    /// Reflected radiosity that the elements have received.
-    gathered: DVec3,
-    /// With a relief: what it sends has been corrected by direction.
-    directed: bool,
-}
-
 /// What is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
@@ -90,20 +70,14 @@ enum Phase {
     Again,
 }
 
-/// Of the unshot power at which the solution is done: what undrawn sources may have, what sweeps may
-/// leave, and what need not be drawn again.
-const UNDRAWN: f64 = 0.9;
+/// Of the unshot power at which the solution is done: what sweeps may leave.
 const UNSOLVED: f64 = 0.01;
-const UNGATHERED: f64 = 0.04;
 
 /// Between batches sweeps leave this share of what the undrawn sources have: it orders them well enough.
 const ORDERED: f64 = 0.1;
 
 /// Times that light is measured and corrected, at most.
 const CORRECTIONS: u32 = 50;
-
-/// About the share of a relief's light that leaves in other directions than if it left evenly.
-const UNEVEN: f64 = 0.1;
 
 impl Spine {
     /// With the rows of `restored`, which lie behind one another in the order of the sources.
@@ -153,10 +127,13 @@ impl Spine {
             gathering: Gathering::new(device, lit, most)?,
             devices: devices.to_vec(),
             team: None,
-            system,
+            ledger: Ledger {
+                system,
+                sources,
+                stop_power: size.stop_power,
+            },
             kept,
-            sources,
-            size,
+            slots: size.slots,
         })
     }
 
@@ -164,18 +141,18 @@ impl Spine {
     pub fn run(&mut self, on: On<'_>, report: &mut Report, watch: &mut Watch<'_>) -> Result<()> {
         let mut corrections = 0;
         while self.draw(on, Phase::First, report, watch)? {
-            self.solve(UNSOLVED * self.size.stop_power, report);
+            self.solve(UNSOLVED * self.ledger.stop_power, report);
             self.gather_kept(on, corrections > 0, report)?;
             if !self.draw(on, Phase::Again, report, watch)? {
                 break;
             }
             // By coupling alone the light is solved where every source has its row, and sends evenly.
-            if on.relief.is_none() && self.system.is_whole() {
+            if on.relief.is_none() && self.ledger.system.is_whole() {
                 break;
             }
             self.measure(on)?;
-            let left = self.unshot();
-            if corrections > u32::from(on.relief.is_some()) && left <= self.size.stop_power {
+            let left = self.ledger.unshot();
+            if corrections > u32::from(on.relief.is_some()) && left <= self.ledger.stop_power {
                 break;
             }
             if corrections == CORRECTIONS {
@@ -183,21 +160,26 @@ impl Spine {
                 break;
             }
             corrections += 1;
-            self.system.shoot_unknown();
+            self.ledger.system.shoot_unknown();
         }
         if watch.stop.is_some() {
-            self.solve(UNSOLVED * self.size.stop_power, report);
+            self.solve(UNSOLVED * self.ledger.stop_power, report);
         }
         let limit = on.settings.shots.unwrap_or(u32::MAX);
-        let reached = report.shots >= limit && self.unshot() > self.size.stop_power;
+        let reached = report.shots >= limit && self.ledger.unshot() > self.ledger.stop_power;
         let done = match reached {
             true => StopReason::Shots,
             false => StopReason::Residual,
         };
         watch.stop.get_or_insert(done);
-        report.kept_sources = self.sources.iter().filter(|d| d.row.is_some()).count() as u64;
-        report.coupling_bytes = self.system.bytes();
-        report.sweeps = self.system.sweeps;
+        report.kept_sources = self
+            .ledger
+            .sources
+            .iter()
+            .filter(|d| d.row.is_some())
+            .count() as u64;
+        report.coupling_bytes = self.ledger.system.bytes();
+        report.sweeps = self.ledger.system.sweeps;
         Ok(())
     }
 
@@ -217,7 +199,7 @@ impl Spine {
         loop {
             while let Some(batch) = self.choose(on, phase, report)? {
                 for &source in &batch.sources {
-                    self.sources[source as usize].under_way = true;
+                    self.ledger.sources[source as usize].under_way = true;
                 }
                 if let Some(team) = &mut self.team {
                     team.submit(batch)?;
@@ -226,7 +208,7 @@ impl Spine {
             if !self.take(on, phase, report)? {
                 return Ok(watch.stop.is_none());
             }
-            let share = watch.share(self.unshot());
+            let share = watch.share(self.ledger.unshot());
             if !watch.look(report.shots, share) {
                 while self.take(on, phase, report)? {}
                 return Ok(false);
@@ -244,27 +226,35 @@ impl Spine {
         };
         self.take_in(on, made, report)?;
         if phase == Phase::First {
-            let undrawn = self.system.unshot().undrawn;
-            self.solve(ORDERED * undrawn.max(self.size.stop_power), report);
+            let undrawn = self.ledger.system.unshot().undrawn;
+            self.solve(ORDERED * undrawn.max(self.ledger.stop_power), report);
         }
         Ok(true)
     }
 
     /// The sources of the next batch, if one is to be drawn and can begin.
     fn choose(&mut self, on: On<'_>, phase: Phase, report: &Report) -> Result<Option<Batch>> {
-        let under_way = self.sources.iter().filter(|d| d.under_way).count() as u32;
+        let under_way = self.ledger.sources.iter().filter(|d| d.under_way).count() as u32;
         let limit = on.settings.shots.unwrap_or(u32::MAX);
         let left = limit.saturating_sub(report.shots + under_way) as usize;
         let candidates = match phase {
-            Phase::First => self.undrawn(),
-            Phase::Again => self.owing(),
+            Phase::First => self.ledger.undrawn(),
+            Phase::Again => self.ledger.owing(),
         };
-        let Some((mut candidates, strong)) = candidates.filter(|_| left > 0) else {
+        let Some(Candidates { powers, strong }) = candidates.filter(|_| left > 0) else {
             return Ok(None);
         };
-        let slots = self.size.slots;
+        let mut candidates = powers;
+        let slots = self.slots;
         let kept = &self.kept;
-        let team = Self::team(&mut self.team, on, &self.devices, &self.system, kept, slots)?;
+        let team = Self::team(
+            &mut self.team,
+            on,
+            &self.devices,
+            &self.ledger.system,
+            kept,
+            slots,
+        )?;
         if !team.has_room(strong) {
             return Ok(None);
         }
@@ -276,136 +266,42 @@ impl Spine {
         Ok(Some(Batch { sources, strong }))
     }
 
-    /// Sources that are to be drawn first, with their unshot power: the strong emitters, and after them
-    /// all others, until all emission is drawn and little is left. And whether they are strong.
-    fn undrawn(&self) -> Option<(Vec<(u32, f64)>, bool)> {
-        let mut strong = Vec::new();
-        let mut others = Vec::new();
-        let (mut emitted_left, mut power_left) = (0.0, 0.0);
-        for (s, drawn) in self.sources.iter().enumerate() {
-            if self.system.is_drawn(s) || drawn.under_way {
-                continue;
-            }
-            let (power, emitted) = self.system.unshot_power(s);
-            if power > 0.0 {
-                emitted_left += emitted;
-                power_left += power;
-                let list = if drawn.strong {
-                    &mut strong
-                } else {
-                    &mut others
-                };
-                list.push((s as u32, power));
-            }
-        }
-        if !strong.is_empty() {
-            return Some((strong, true));
-        }
-        let done = emitted_left == 0.0 && power_left <= UNDRAWN * self.size.stop_power;
-        (!done).then_some((others, false))
-    }
-
-    /// Sources without rows that owe the elements light, with its power, unless little is left.
-    fn owing(&self) -> Option<(Vec<(u32, f64)>, bool)> {
-        let owes = |(s, drawn): (usize, &Drawn)| {
-            let loose = self.system.is_drawn(s) && drawn.row.is_none() && !drawn.under_way;
-            let power = self.owed_power(s);
-            (loose && power > 0.0).then_some((s as u32, power))
-        };
-        let mut owing: Vec<(u32, f64)> = self.sources.iter().enumerate().filter_map(owes).collect();
-        owing.sort_by(|a, b| b.1.total_cmp(&a.1));
-        // The last ones may keep what is little together.
-        let mut kept_back = 0.0;
-        while let Some(&(_, power)) = owing.last()
-            && kept_back + power <= UNGATHERED * self.size.stop_power
-        {
-            kept_back += power;
-            owing.pop();
-        }
-        let strong = owing.iter().any(|&(s, _)| self.sources[s as usize].strong);
-        owing.retain(|&(s, _)| self.sources[s as usize].strong == strong);
-        (!owing.is_empty()).then_some((owing, strong))
-    }
-
-    /// What a source has to send the elements: emitted and reflected radiosity.
-    fn owed(&self, s: usize) -> (Vec3, DVec3) {
-        let drawn = &self.sources[s];
-        let emitted = match self.system.emission_is_shot(s) && !drawn.emission_gathered {
-            true => self.system.emitted(s).as_vec3(),
-            false => Vec3::ZERO,
-        };
-        let shot = self.system.shot(s);
-        let reflected = shot - drawn.gathered;
-        // What rounding to f32 has left is nothing.
-        let rounding = f64::from(f32::EPSILON) * shot.abs();
-        let reflected = DVec3::select(reflected.abs().cmpgt(rounding), reflected, DVec3::ZERO);
-        (emitted, reflected)
-    }
-
-    fn owed_power(&self, s: usize) -> f64 {
-        let drawn = &self.sources[s];
-        let (emitted, reflected) = self.owed(s);
-        let turned = match drawn.relief && !drawn.directed {
-            true => UNEVEN * drawn.gathered.abs(),
-            false => DVec3::ZERO,
-        };
-        let light = emitted.as_dvec3() + reflected.abs() + turned;
-        self.system.area(s) * light.element_sum()
-    }
-
     /// Solves the system, keeps the rows of a batch, and gathers by those that find no room.
     fn take_in(&mut self, on: On<'_>, made: Made, report: &mut Report) -> Result<()> {
         report.add_stages(made.stages);
         let mut loose = Vec::new();
         for row in made.rows {
             let s = row.source as usize;
-            report.add(&row, self.sources[s].strong, self.sources[s].times > 0);
+            report.add(
+                &row,
+                self.ledger.sources[s].strong,
+                self.ledger.sources[s].times > 0,
+            );
             let Factors::Kept(place) = row.factors else {
                 unreachable!("a team keeps its rows");
             };
-            let drawn = &mut self.sources[s];
+            let drawn = &mut self.ledger.sources[s];
             drawn.under_way = false;
             drawn.times += 1;
-            if !self.system.is_drawn(s) {
+            if !self.ledger.system.is_drawn(s) {
                 let coupling = CouplingRow::new(&row.coupling, row.scale);
-                self.system.draw(s, Some(coupling));
+                self.ledger.system.draw(s, Some(coupling));
             }
             match place.chunk < self.kept.chunk_count() {
-                true => self.sources[s].row = Some(place),
-                false => loose.extend(self.send(s, place, true)),
+                true => self.ledger.sources[s].row = Some(place),
+                false => loose.extend(self.ledger.send(s, place, true)),
             }
         }
         self.gather(on, &loose, report)
     }
 
-    /// What a source has to send through its row, which counts as sent from now on.
-    fn send(&mut self, s: usize, row: KeptRow, by_direction: bool) -> Option<LitRow> {
-        let (emitted, reflected) = self.owed(s);
-        let sent = reflected.as_vec3();
-        let drawn = &mut self.sources[s];
-        let turns = drawn.relief && by_direction;
-        if emitted == Vec3::ZERO && sent == Vec3::ZERO && !turns {
-            return None;
-        }
-        // As it was rounded, so that nothing is lost.
-        drawn.gathered += sent.as_dvec3();
-        drawn.emission_gathered |= self.system.emission_is_shot(s);
-        drawn.directed |= drawn.relief && drawn.times > 1;
-        Some(LitRow {
-            row,
-            source: s as u32,
-            emitted,
-            reflected: sent,
-        })
-    }
-
     /// Sends what all sources owe through the rows that are kept; of those with a relief, `by_direction`,
     /// also what changes its direction alone.
     fn gather_kept(&mut self, on: On<'_>, by_direction: bool, report: &mut Report) -> Result<()> {
-        let rows: Vec<LitRow> = (0..self.sources.len())
+        let rows: Vec<LitRow> = (0..self.ledger.sources.len())
             .filter_map(|s| {
-                let row = self.sources[s].row?;
-                self.send(s, row, by_direction)
+                let row = self.ledger.sources[s].row?;
+                self.ledger.send(s, row, by_direction)
             })
             .collect();
         self.gather(on, &rows, report)
@@ -430,56 +326,35 @@ impl Spine {
 
     fn solve(&mut self, most: f64, report: &mut Report) {
         let start = Instant::now();
-        self.system.solve(most);
+        self.ledger.system.solve(most);
         report.seconds.solve += start.elapsed().as_secs_f64();
     }
 
     /// Goes on from the light that the elements have.
     fn measure(&mut self, on: On<'_>) -> Result<()> {
         let reflected = self.gathering.measure(self.lit(on))?;
-        let sent: Vec<DVec3> = self.sources.iter().map(|drawn| drawn.gathered).collect();
-        self.system.measured(&reflected, &sent);
+        let sent: Vec<DVec3> = self
+            .ledger
+            .sources
+            .iter()
+            .map(|drawn| drawn.gathered)
+            .collect();
+        self.ledger.system.measured(&reflected, &sent);
         Ok(())
-    }
-
-    /// Power that is in no element's light yet, nor bounced: the residual of the system, and what is owed
-    /// to the elements by sources without rows, with its first bounce.
-    pub fn unshot(&self) -> f64 {
-        let loose = |s: &usize| self.system.is_drawn(*s) && self.sources[*s].row.is_none();
-        let owed: f64 = (0..self.sources.len())
-            .filter(loose)
-            .map(|s| {
-                let (emitted, reflected) = self.owed(s);
-                let light = emitted.as_dvec3() + reflected.abs();
-                2.0 * self.system.area(s) * light.element_sum()
-            })
-            .sum();
-        self.system.unshot().all + owed
-    }
-
-    /// Unshot power by colour.
-    pub fn unshot_by_colour(&self) -> DVec3 {
-        let left = |s: usize| {
-            let emitted = match self.system.emission_is_shot(s) {
-                true => DVec3::ZERO,
-                false => self.system.emitted(s),
-            };
-            let reflected = self.system.reflected(s) - self.system.shot(s);
-            (emitted + reflected) * self.system.area(s)
-        };
-        (0..self.sources.len()).map(left).sum()
-    }
-
-    /// Where each source's row is kept.
-    pub fn rows(&self) -> Vec<Option<KeptRow>> {
-        self.sources.iter().map(|drawn| drawn.row).collect()
     }
 
     /// See [`super::Solver::draw`].
     pub fn draw_alone(&mut self, on: On<'_>, sources: &[u32]) -> Result<DrawnBatch> {
-        let slots = self.size.slots;
+        let slots = self.slots;
         let kept = &self.kept;
-        let team = Self::team(&mut self.team, on, &self.devices, &self.system, kept, slots)?;
+        let team = Self::team(
+            &mut self.team,
+            on,
+            &self.devices,
+            &self.ledger.system,
+            kept,
+            slots,
+        )?;
         team.submit(Batch {
             sources: sources.to_vec(),
             strong: false,

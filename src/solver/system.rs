@@ -288,7 +288,11 @@ mod tests {
         shapes.room(DVec3::ZERO, DVec3::ONE, 6, 0);
         let mut elements = Elements::new(&shapes.scene);
         for e in 0..elements.len() {
-            let coloured = if mixed { e % 2 == 1 } else { e >= elements.len() / 2 };
+            let coloured = if mixed {
+                e % 2 == 1
+            } else {
+                e >= elements.len() / 2
+            };
             elements.reflectance[e] = match coloured {
                 true => glam::Vec3::new(white, 0.5, 0.1),
                 false => glam::Vec3::splat(white),
@@ -301,7 +305,9 @@ mod tests {
         let list = sources.list;
         let mut state = 1_u64;
         let mut random = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
             (state >> 40) as f64 / (1 << 24) as f64
         };
         let coupling = (list.iter())
@@ -369,7 +375,9 @@ mod tests {
         });
         let emitted = (room.sources.iter()).map(|s| f64::from(s.emitted[colour]));
         let emitted = DVector::from_iterator(n, emitted);
-        g.lu().solve(&emitted).expect("light is lost at each bounce")
+        g.lu()
+            .solve(&emitted)
+            .expect("light is lost at each bounce")
     }
 
     /// Also where next to nothing is lost at a bounce, and sweeps alone would take thousands.
@@ -396,7 +404,10 @@ mod tests {
                 errors.fold(0.0, f64::max)
             });
             let apart = apart.fold(0.0, f64::max);
-            println!("{white}, mixed {mixed}: {} sweeps, {apart:.1e}", system.sweeps);
+            println!(
+                "{white}, mixed {mixed}: {} sweeps, {apart:.1e}",
+                system.sweeps
+            );
             assert!(system.sweeps <= most_sweeps && apart <= tolerance);
         }
     }
@@ -412,7 +423,9 @@ mod tests {
         let known = system.rows().filter(Option::is_some).count();
         assert!(known > 0 && known < room.sources.len());
         system.shoot_unknown();
-        let measured: Vec<DVec3> = (0..room.sources.len()).map(|s| system.reflected(s)).collect();
+        let measured: Vec<DVec3> = (0..room.sources.len())
+            .map(|s| system.reflected(s))
+            .collect();
         let sent: Vec<DVec3> = (0..room.sources.len()).map(|s| system.shot(s)).collect();
         system.measured(&measured, &sent);
         assert!(system.reflected(0).distance(measured[0]) == 0.0);

@@ -1,0 +1,192 @@
+//! What each source has sent, and what it still has to send.
+
+use glam::{DVec3, Vec3};
+
+use super::gather::LitRow;
+use super::system::System;
+use crate::passes::types::KeptRow;
+
+/// The system of the sources, and how far the elements have its light.
+pub(super) struct Ledger {
+    pub system: System,
+    /// `[source]`
+    pub sources: Vec<Drawn>,
+    /// Unshot power at which the solution is done, internal units.
+    pub stop_power: f64,
+}
+
+/// Sources that are to be drawn, with the power that they have to send.
+pub(super) struct Candidates {
+    pub powers: Vec<(u32, f64)>,
+    /// Whether they are strong emitters.
+    pub strong: bool,
+}
+
+/// What has been done with a source.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Drawn {
+    /// It emits strongly.
+    pub strong: bool,
+    /// Its elements have a relief.
+    pub relief: bool,
+    pub under_way: bool,
+    /// Times that it was drawn.
+    pub times: u32,
+    /// Where its row is kept.
+    pub row: Option<KeptRow>,
+    pub emission_gathered: bool,
+    /// Reflected radiosity that the elements have received.
+    pub gathered: DVec3,
+    /// With a relief: what it sends has been corrected by direction.
+    pub directed: bool,
+}
+
+/// Of the unshot power at which the solution is done: what undrawn sources may have, and what need not
+/// be drawn again.
+const UNDRAWN: f64 = 0.9;
+const UNGATHERED: f64 = 0.04;
+
+/// About the share of a relief's light that leaves in other directions than if it left evenly.
+const UNEVEN: f64 = 0.1;
+
+impl Ledger {
+    /// Sources that are to be drawn first, with their unshot power: the strong emitters, and after them
+    /// all others, until all emission is drawn and little is left. And whether they are strong.
+    pub fn undrawn(&self) -> Option<Candidates> {
+        let mut strong = Vec::new();
+        let mut others = Vec::new();
+        let (mut emitted_left, mut power_left) = (0.0, 0.0);
+        for (s, drawn) in self.sources.iter().enumerate() {
+            if self.system.is_drawn(s) || drawn.under_way {
+                continue;
+            }
+            let (power, emitted) = self.system.unshot_power(s);
+            if power > 0.0 {
+                emitted_left += emitted;
+                power_left += power;
+                let list = if drawn.strong {
+                    &mut strong
+                } else {
+                    &mut others
+                };
+                list.push((s as u32, power));
+            }
+        }
+        if !strong.is_empty() {
+            return Some(Candidates {
+                powers: strong,
+                strong: true,
+            });
+        }
+        let done = emitted_left == 0.0 && power_left <= UNDRAWN * self.stop_power;
+        (!done).then_some(Candidates {
+            powers: others,
+            strong: false,
+        })
+    }
+
+    /// Sources without rows that owe the elements light, with its power, unless little is left.
+    pub fn owing(&self) -> Option<Candidates> {
+        let owes = |(s, drawn): (usize, &Drawn)| {
+            let loose = self.system.is_drawn(s) && drawn.row.is_none() && !drawn.under_way;
+            let power = self.owed_power(s);
+            (loose && power > 0.0).then_some((s as u32, power))
+        };
+        let mut owing: Vec<(u32, f64)> = self.sources.iter().enumerate().filter_map(owes).collect();
+        owing.sort_by(|a, b| b.1.total_cmp(&a.1));
+        // The last ones may keep what is little together.
+        let mut kept_back = 0.0;
+        while let Some(&(_, power)) = owing.last()
+            && kept_back + power <= UNGATHERED * self.stop_power
+        {
+            kept_back += power;
+            owing.pop();
+        }
+        let strong = owing.iter().any(|&(s, _)| self.sources[s as usize].strong);
+        owing.retain(|&(s, _)| self.sources[s as usize].strong == strong);
+        (!owing.is_empty()).then_some(Candidates {
+            powers: owing,
+            strong,
+        })
+    }
+
+    /// What a source has to send the elements: emitted and reflected radiosity.
+    fn owed(&self, s: usize) -> (Vec3, DVec3) {
+        let drawn = &self.sources[s];
+        let emitted = match self.system.emission_is_shot(s) && !drawn.emission_gathered {
+            true => self.system.emitted(s).as_vec3(),
+            false => Vec3::ZERO,
+        };
+        let shot = self.system.shot(s);
+        let reflected = shot - drawn.gathered;
+        // What rounding to f32 has left is nothing.
+        let rounding = f64::from(f32::EPSILON) * shot.abs();
+        let reflected = DVec3::select(reflected.abs().cmpgt(rounding), reflected, DVec3::ZERO);
+        (emitted, reflected)
+    }
+
+    fn owed_power(&self, s: usize) -> f64 {
+        let drawn = &self.sources[s];
+        let (emitted, reflected) = self.owed(s);
+        let turned = match drawn.relief && !drawn.directed {
+            true => UNEVEN * drawn.gathered.abs(),
+            false => DVec3::ZERO,
+        };
+        let light = emitted.as_dvec3() + reflected.abs() + turned;
+        self.system.area(s) * light.element_sum()
+    }
+
+    /// What a source has to send through its row, which counts as sent from now on.
+    pub fn send(&mut self, s: usize, row: KeptRow, by_direction: bool) -> Option<LitRow> {
+        let (emitted, reflected) = self.owed(s);
+        let sent = reflected.as_vec3();
+        let drawn = &mut self.sources[s];
+        let turns = drawn.relief && by_direction;
+        if emitted == Vec3::ZERO && sent == Vec3::ZERO && !turns {
+            return None;
+        }
+        // As it was rounded, so that nothing is lost.
+        drawn.gathered += sent.as_dvec3();
+        drawn.emission_gathered |= self.system.emission_is_shot(s);
+        drawn.directed |= drawn.relief && drawn.times > 1;
+        Some(LitRow {
+            row,
+            source: s as u32,
+            emitted,
+            reflected: sent,
+        })
+    }
+
+    /// Power that is in no element's light yet, nor bounced: the residual of the system, and what is owed
+    /// to the elements by sources without rows, with its first bounce.
+    pub fn unshot(&self) -> f64 {
+        let loose = |s: &usize| self.system.is_drawn(*s) && self.sources[*s].row.is_none();
+        let owed: f64 = (0..self.sources.len())
+            .filter(loose)
+            .map(|s| {
+                let (emitted, reflected) = self.owed(s);
+                let light = emitted.as_dvec3() + reflected.abs();
+                2.0 * self.system.area(s) * light.element_sum()
+            })
+            .sum();
+        self.system.unshot().all + owed
+    }
+
+    /// Unshot power by colour.
+    pub fn unshot_by_colour(&self) -> DVec3 {
+        let left = |s: usize| {
+            let emitted = match self.system.emission_is_shot(s) {
+                true => DVec3::ZERO,
+                false => self.system.emitted(s),
+            };
+            let reflected = self.system.reflected(s) - self.system.shot(s);
+            (emitted + reflected) * self.system.area(s)
+        };
+        (0..self.sources.len()).map(left).sum()
+    }
+
+    /// Where each source's row is kept.
+    pub fn rows(&self) -> Vec<Option<KeptRow>> {
+        self.sources.iter().map(|drawn| drawn.row).collect()
+    }
+}
