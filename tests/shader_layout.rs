@@ -1,5 +1,5 @@
-//! What Rust and GLSL share. Structs: the GLSL text's members against Rust's by name and offset, and
-//! the compiled SPIR-V (which keeps no names) against both by its offsets and array strides.
+//! What Rust and GLSL share. Structs: the GLSL text's members against Rust's by name and offset,
+//! and the compiled SPIR-V (which keeps no names) against both by its offsets and array strides.
 //! Bindings and push constants: what the build wrote from the GLSL text against the SPIR-V.
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,5 +1,5 @@
-//! The `receiver` estimator: the form factor from every element to every source of a batch. Elements
-//! that see a source are listed by how their form factor is computed, then it is. Shaders:
+//! The `receiver` estimator: the form factor from every element to every source of a batch.
+//! Elements that see a source are listed by how their form factor is computed, then it is. Shaders:
 //! `sort_receivers.comp`, `form_factors.comp`, and where a scene has relief
 //! `form_factors_relief.comp`; `_rays.comp` of each where shadow rays decide what is seen; twin:
 //! [`crate::reference::form_factors`].
@@ -38,8 +38,8 @@ pub enum SeenBy {
 #[derive(Debug, Clone, Copy)]
 pub struct Sorting {
     pub seen_by: SeenBy,
-    /// Whether blocks of elements that see nothing of a source are passed over as a whole. The lists
-    /// are the same.
+    /// Whether blocks of elements that see nothing of a source are passed over as a whole. The
+    /// lists are the same.
     pub culls: bool,
 }
 

@@ -1,4 +1,5 @@
-//! Radiosity that every source reflects. Shader: `measure.comp`; twin: [`crate::reference::measure`].
+//! Radiosity that every source reflects. Shader: `measure.comp`; twin:
+//! [`crate::reference::measure`].
 
 use std::sync::Arc;
 

@@ -27,9 +27,9 @@ pub struct Vertex {
     pub prism: u32,
 }
 
-/// Push constants of one draw: first those of [`super::shade::Parameters`]; `shading` and `view` are
-/// SHADING_… and VIEW_… of [`crate::constants`], `pixel` is the angle of a sample in radians, and
-/// `cells` are the columns and rows of the directions.
+/// Push constants of one draw: first those of [`super::shade::Parameters`]; `shading` and `view`
+/// are SHADING_… and VIEW_… of [`crate::constants`], `pixel` is the angle of a sample in radians,
+/// and `cells` are the columns and rows of the directions.
 pub use super::shaders::relief::Parameters;
 
 /// What a picture's relief is made of, `[prism]` and `[surface]`.
@@ -77,8 +77,8 @@ pub struct Relief {
 
 const CORNERS: u32 = 6;
 /// Triangles of a prism's hull, outward where a, b, c turn to the left seen from above: 0 to 2 are
-/// the low a, b, c and 3 to 5 the high ones. A side is cut from its lower corner's low to its higher
-/// corner's high end.
+/// the low a, b, c and 3 to 5 the high ones. A side is cut from its lower corner's low to its
+/// higher corner's high end.
 const HULL: [u32; 24] = [
     0, 2, 1, 3, 4, 5, // caps
     0, 1, 4, 0, 4, 3, // a to b

@@ -1,5 +1,5 @@
-//! Visibility of one tile of relief, computed once for a height map: horizons (which directions each
-//! facet sees) and exchange (where the rays land that the relief blocks). Shaders:
+//! Visibility of one tile of relief, computed once for a height map: horizons (which directions
+//! each facet sees) and exchange (where the rays land that the relief blocks). Shaders:
 //! `relief_horizon.comp`, `relief_exchange.comp`; twin: [`crate::reference::relief_visibility`].
 
 use std::sync::Arc;

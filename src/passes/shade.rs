@@ -30,8 +30,9 @@ pub struct Vertex {
 
 /// Push constants of one draw: `x`, `y` and `w` are rows of the projection, `near` is the distance
 /// of the near plane in internal units, `reflectance` is ρ or the factor of the texture, `emitted`
-/// is Le in W·m⁻²·sr⁻¹, and `metered` is 1 where an exposure meter looks and 0 elsewhere; it goes to
-/// alpha. Of the `light_count` points that light the draw straight, those of emitters come first.
+/// is Le in W·m⁻²·sr⁻¹, and `metered` is 1 where an exposure meter looks and 0 elsewhere; it goes
+/// to alpha. Of the `light_count` points that light the draw straight, those of emitters come
+/// first.
 pub use super::shaders::shade::Parameters;
 
 impl Parameters {
@@ -121,8 +122,8 @@ impl Shade {
     }
 
     /// Binds the texture of a material, the light points with what casts shadows, and what they
-    /// light, [`LitTriangle`]s by the order of the drawn triangles; none are needed where nothing is
-    /// drawn by light points.
+    /// light, [`LitTriangle`]s by the order of the drawn triangles; none are needed where nothing
+    /// is drawn by light points.
     ///
     /// # Errors
     /// A device without the memory.
@@ -216,8 +217,8 @@ impl Target {
         self.readback.read(0, self.width as usize * rows as usize)
     }
 
-    /// The same rows' depths, near plane over distance along the view, 0 where nothing is; none of a
-    /// shade without them.
+    /// The same rows' depths, near plane over distance along the view, 0 where nothing is; none of
+    /// a shade without them.
     pub fn depths(&self, rows: u32) -> Option<Vec<f32>> {
         let readback = self.depth_readback.as_ref()?;
         Some(readback.read(0, self.width as usize * rows as usize))

@@ -1,5 +1,5 @@
-//! What casts shadows, as a tree of boxes that shaders walk. Shaders: `shared/shadow_rays.glsl`, and
-//! `shadow_rays.comp` for tests; twin: [`crate::reference::shadow_rays`].
+//! What casts shadows, as a tree of boxes that shaders walk. Shaders: `shared/shadow_rays.glsl`,
+//! and `shadow_rays.comp` for tests; twin: [`crate::reference::shadow_rays`].
 
 use std::sync::Arc;
 use std::time::Duration;
