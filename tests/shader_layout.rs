@@ -95,7 +95,7 @@ fn spirv() -> BTreeSet<Vec<u32>> {
 /// What a module reads, by its SPIR-V.
 #[derive(Default, Debug)]
 struct Read {
-    /// By number; the compiler leaves out those that no instruction uses.
+    /// By number, without those that no instruction uses.
     bindings: BTreeMap<u32, Binding>,
     /// Offsets of the push constants, and the end of the last.
     push_constants: Option<(Vec<u32>, u32)>,
@@ -206,7 +206,7 @@ fn rust_and_glsl_agree() {
     check!(true, HeightTile: first width height top highest);
     check!(true, HeightRay: from tile to);
     check!(true, HeightHit: t cell local height gradient steps);
-    // These are loaded word by word: their order is told by the forms of load_triangle and met.
+    // These are loaded word by word, in the order that load_triangle and met expect.
     check!(false, Triangle: a area b height c unused_c normal unused);
     check!(false, ShadowOccluder: a component b closed c height normal unused);
     check!(true, CouplingTarget: first_element element_count first_word word_count inverse_area);
@@ -214,20 +214,14 @@ fn rust_and_glsl_agree() {
     check!(false, KeptState: chunk used rows);
 }
 
-/// Bindings that a shader declares and no instruction uses.
-const UNUSED: &[(&str, &[&str])] = &[];
-
 #[test]
 fn bindings_and_push_constants_are_those_of_the_spirv() {
     for compiled in shaders::ALL {
         let (name, interface) = (compiled.name, compiled.interface);
         let stages: Vec<Read> = compiled.stages.iter().map(|words| read(words)).collect();
         let in_spirv: BTreeMap<_, _> = stages.iter().flat_map(|s| s.bindings.clone()).collect();
-        let unused = UNUSED.iter().find(|(of, _)| *of == name);
-        let unused = unused.map_or(&[][..], |(_, bindings)| bindings);
         let generated: BTreeMap<_, _> = (0..)
             .zip(interface.bindings)
-            .filter(|(_, binding)| !unused.contains(&binding.name))
             .map(|(number, binding)| (number, binding.kind))
             .collect();
         assert_eq!(
