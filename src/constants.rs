@@ -1,5 +1,5 @@
-//! The numbers that Rust and GLSL share. `build.rs` also reads this file and passes each one to the
-//! shaders as a macro.
+//! The numbers that Rust and GLSL share. The build script also reads this file and passes each one
+//! to the shaders as a macro.
 
 macro_rules! shared {
     ($($(#[$doc:meta])* $name:ident = $value:expr;)*) => {

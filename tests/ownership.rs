@@ -7,8 +7,9 @@ use std::sync::{Arc, Mutex};
 
 use common::{assert_silent, device};
 use mesolux::vk::{
-    Attachment, Bind, Binding, Buffer, BufferUse, Commands, ComputePipeline, Device, Format,
-    Framebuffer, Image, ImageUse, RenderPass, Sampler, Stage, Timestamps, left,
+    Attachment, Bind, Binding, Buffer, BufferUse, Commands, ComputePipeline, ComputeShader, Device,
+    Format, Framebuffer, Image, ImageUse, Interface, RenderPass, Sampled, Sampler, ShaderBinding,
+    ShaderBindings, Stage, Timestamps, left,
 };
 
 /// A compute shader that doubles the first word of the storage buffer at binding 0.
@@ -83,6 +84,29 @@ fn buffer(device: &Arc<Device>, name: &str, bytes: u64, usage: BufferUse) -> Buf
 
 const BYTES: u64 = 1 << 12;
 
+/// What the shader of [`doubling`] binds.
+struct Doubling<'a> {
+    words: &'a Buffer,
+    texture: Sampled<'a>,
+}
+
+impl ShaderBindings for Doubling<'_> {
+    const BINDINGS: &'static [ShaderBinding] = &[
+        ShaderBinding {
+            name: "words",
+            kind: Binding::Storage,
+        },
+        ShaderBinding {
+            name: "texture",
+            kind: Binding::Sampled,
+        },
+    ];
+
+    fn binds(&self) -> Vec<Bind<'_>> {
+        vec![Bind::Storage(self.words), Bind::Sampled(self.texture)]
+    }
+}
+
 /// Commands that double a word `times` times; every handle but those to the commands and to the
 /// result is dropped.
 fn doubled(device: &Arc<Device>, times: u32) -> (Commands, Buffer) {
@@ -91,11 +115,19 @@ fn doubled(device: &Arc<Device>, times: u32) -> (Commands, Buffer) {
     let texture =
         Image::mipped(device, "texture", (4, 4), Format::R8G8B8A8_UNORM).expect("an image");
     let sampler = Sampler::new(device, "texture", true).expect("a sampler");
-    let kinds = [Binding::Storage, Binding::Sampled];
-    let pipeline = ComputePipeline::new(device, "doubling", &doubling(), &kinds, 0, &[], false)
-        .expect("a pipeline");
-    let binds = [Bind::Buffer(&words), Bind::Image(&texture, &sampler)];
-    let set = pipeline.bind("doubling", &binds).expect("a set");
+    let shader = ComputeShader {
+        spirv: &doubling(),
+        interface: Interface::of::<Doubling<'_>, ()>(),
+    };
+    let pipeline = ComputePipeline::new(device, "doubling", &shader).expect("a pipeline");
+    let bindings = Doubling {
+        words: &words,
+        texture: Sampled {
+            image: &texture,
+            sampler: &sampler,
+        },
+    };
+    let set = pipeline.bind("doubling", &bindings).expect("a set");
     let stamps = Timestamps::new(device, "doubling", 1).expect("timestamps");
     let texels = buffer(device, "texels", 4 * (16 + 4 + 1), BufferUse::Upload);
     let commands = Commands::record(device, "doubling", |cmd| {

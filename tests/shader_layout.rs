@@ -1,10 +1,12 @@
-//! The structs that Rust and GLSL share: the GLSL text's members against Rust's by name and offset, and the compiled
-//! SPIR-V (which keeps no names) against both by its offsets and array strides.
+//! What Rust and GLSL share. Structs: the GLSL text's members against Rust's by name and offset,
+//! and the compiled SPIR-V (which keeps no names) against both by its offsets and array strides.
+//! Bindings and push constants: what the build wrote from the GLSL text against the SPIR-V.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::mem::{offset_of, size_of};
 
 use mesolux::passes::{shaders, types};
+use mesolux::vk::Binding;
 
 /// Struct name → members with their offsets in scalar layout, in order, and the size.
 fn glsl() -> BTreeMap<String, Vec<(String, u32)>> {
@@ -36,34 +38,42 @@ fn glsl() -> BTreeMap<String, Vec<(String, u32)>> {
 }
 
 // Of the SPIR-V specification.
+const OP_TYPE_INT: u32 = 21;
+const OP_TYPE_FLOAT: u32 = 22;
+const OP_TYPE_VECTOR: u32 = 23;
+const OP_TYPE_IMAGE: u32 = 25;
+const OP_TYPE_SAMPLED_IMAGE: u32 = 27;
 const OP_TYPE_RUNTIME_ARRAY: u32 = 29;
+const OP_TYPE_STRUCT: u32 = 30;
+const OP_TYPE_POINTER: u32 = 32;
+const OP_VARIABLE: u32 = 59;
 const OP_DECORATE: u32 = 71;
 const OP_MEMBER_DECORATE: u32 = 72;
 const ARRAY_STRIDE: u32 = 6;
+const BINDING: u32 = 33;
 const OFFSET: u32 = 35;
+const PUSH_CONSTANT: u32 = 9;
+const DIM_BUFFER: u32 = 5;
+
+/// Operations and their operands.
+fn instructions(words: &[u32]) -> impl Iterator<Item = (u32, &[u32])> {
+    let mut rest = &words[5..];
+    std::iter::from_fn(move || {
+        let first = *rest.first()?;
+        let (instruction, after) = rest.split_at((first >> 16) as usize);
+        rest = after;
+        Some((first & 0xffff, &instruction[1..]))
+    })
+}
 
 /// Offsets of the members and the stride of every struct that a module holds an array of.
 fn spirv() -> BTreeSet<Vec<u32>> {
     let mut found = BTreeSet::new();
-    for words in [
-        shaders::CULL_COMP,
-        shaders::COUPLE_COMP,
-        shaders::MEASURE_COMP,
-        shaders::FORM_FACTORS_COMP,
-        shaders::GATHER_TO_RELIEF_COMP,
-        shaders::PIXELS_TO_RELIEF_COMP,
-        shaders::ITEM_BUFFER_VERT,
-        shaders::RELIEF_FRAG,
-        shaders::RELIEF_RAYS_COMP,
-        shaders::SHADE_FRAG,
-        shaders::SHADOW_RAYS_COMP,
-    ] {
+    for words in shaders::ALL.iter().flat_map(|compiled| compiled.stages) {
         let mut offsets: BTreeMap<u32, BTreeMap<u32, u32>> = BTreeMap::new();
         let mut strides = BTreeMap::new();
-        let mut rest = &words[5..];
-        while let Some(&first) = rest.first() {
-            let (operation, count) = (first & 0xffff, (first >> 16) as usize);
-            match (operation, &rest[1..count]) {
+        for (operation, operands) in instructions(words) {
+            match (operation, operands) {
                 (OP_MEMBER_DECORATE, [id, member, OFFSET, offset]) => {
                     offsets.entry(*id).or_default().insert(*member, *offset);
                 }
@@ -77,10 +87,81 @@ fn spirv() -> BTreeSet<Vec<u32>> {
                 }
                 _ => {}
             }
-            rest = &rest[count..];
         }
     }
     found
+}
+
+/// What a module reads, by its SPIR-V.
+#[derive(Default, Debug)]
+struct Read {
+    /// By number, without those that no instruction uses.
+    bindings: BTreeMap<u32, Binding>,
+    /// Offsets of the push constants, and the end of the last.
+    push_constants: Option<(Vec<u32>, u32)>,
+}
+
+/// Types of a module, by ID.
+#[derive(Default)]
+struct Types<'a> {
+    /// Operation and operands after the ID.
+    declared: BTreeMap<u32, (u32, &'a [u32])>,
+}
+
+impl Types<'_> {
+    fn kind(&self, id: u32) -> Binding {
+        match self.declared[&id] {
+            (OP_TYPE_STRUCT, _) => Binding::Storage,
+            (OP_TYPE_SAMPLED_IMAGE, [image]) => self.kind(*image),
+            (OP_TYPE_IMAGE, [_, DIM_BUFFER, ..]) => Binding::Texels,
+            (OP_TYPE_IMAGE, _) => Binding::Sampled,
+            (operation, _) => panic!("type {operation} of a binding"),
+        }
+    }
+
+    fn bytes(&self, id: u32) -> u32 {
+        match self.declared[&id] {
+            (OP_TYPE_INT | OP_TYPE_FLOAT, [bits, ..]) => bits / 8,
+            (OP_TYPE_VECTOR, [of, count]) => count * self.bytes(*of),
+            (operation, _) => panic!("type {operation} of a push constant"),
+        }
+    }
+}
+
+fn read(words: &[u32]) -> Read {
+    let mut types = Types::default();
+    let mut offsets: BTreeMap<u32, BTreeMap<u32, u32>> = BTreeMap::new();
+    let mut numbers = BTreeMap::new();
+    let mut read = Read::default();
+    for (operation, operands) in instructions(words) {
+        match (operation, operands) {
+            (OP_MEMBER_DECORATE, [id, member, OFFSET, offset]) => {
+                offsets.entry(*id).or_default().insert(*member, *offset);
+            }
+            (OP_DECORATE, [id, BINDING, number]) => {
+                numbers.insert(*id, *number);
+            }
+            (OP_TYPE_INT..=OP_TYPE_POINTER, [id, rest @ ..]) => {
+                types.declared.insert(*id, (operation, rest));
+            }
+            (OP_VARIABLE, [pointer, id, storage, ..]) => {
+                let (OP_TYPE_POINTER, [_, of]) = types.declared[pointer] else {
+                    panic!("a variable is of a pointer type");
+                };
+                if let Some(number) = numbers.get(id) {
+                    read.bindings.insert(*number, types.kind(*of));
+                }
+                if *storage == PUSH_CONSTANT {
+                    let offsets: Vec<u32> = offsets[of].values().copied().collect();
+                    let last = types.declared[of].1.last().expect("a member");
+                    let end = offsets.last().expect("an offset") + types.bytes(*last);
+                    read.push_constants = Some((offsets, end));
+                }
+            }
+            _ => {}
+        }
+    }
+    read
 }
 
 macro_rules! check {
@@ -125,10 +206,41 @@ fn rust_and_glsl_agree() {
     check!(true, HeightTile: first width height top highest);
     check!(true, HeightRay: from tile to);
     check!(true, HeightHit: t cell local height gradient steps);
-    // These are loaded word by word: their order is told by the forms of load_triangle and met.
+    // These are loaded word by word, in the order that load_triangle and met expect.
     check!(false, Triangle: a area b height c unused_c normal unused);
     check!(false, ShadowOccluder: a component b closed c height normal unused);
     check!(true, CouplingTarget: first_element element_count first_word word_count inverse_area);
     // KeptState stands alone in its buffer, not in an array.
     check!(false, KeptState: chunk used rows);
+}
+
+#[test]
+fn bindings_and_push_constants_are_those_of_the_spirv() {
+    for compiled in shaders::ALL {
+        let (name, interface) = (compiled.name, compiled.interface);
+        let stages: Vec<Read> = compiled.stages.iter().map(|words| read(words)).collect();
+        let in_spirv: BTreeMap<_, _> = stages.iter().flat_map(|s| s.bindings.clone()).collect();
+        let generated: BTreeMap<_, _> = (0..)
+            .zip(interface.bindings)
+            .map(|(number, binding)| (number, binding.kind))
+            .collect();
+        assert_eq!(
+            generated, in_spirv,
+            "bindings of {name}: Rust left, SPIR-V right"
+        );
+        let offsets: Vec<u32> = interface.parameters.iter().map(|p| p.offset).collect();
+        let mut longest = 0;
+        for (in_spirv, end) in stages.iter().filter_map(|s| s.push_constants.as_ref()) {
+            let known = &offsets[..in_spirv.len().min(offsets.len())];
+            assert_eq!(
+                known, in_spirv,
+                "push constants of {name}: Rust left, SPIR-V right"
+            );
+            longest = longest.max(*end);
+        }
+        assert_eq!(
+            interface.parameter_bytes as u32, longest,
+            "push constants of {name}"
+        );
+    }
 }

@@ -11,12 +11,11 @@ use serde::Serialize;
 use super::response::Block;
 use super::scattering::Scattering;
 use super::tiles::{Frame, Shading, Tile, tiles};
-use super::{Footprints, HeightField, Response, Visibility};
+use super::{Footprints, HeightField, MesoTexel, Response, TextureFacet, Visibility};
 use crate::constants::NONE;
 use crate::error::Result;
 use crate::math::directions::Directions;
 use crate::mesh::elements::Elements;
-use crate::passes::types::{MesoTexel, TextureFacet};
 use crate::scene::Scene;
 
 /// How relief takes part in the transport of light.

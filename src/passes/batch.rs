@@ -11,7 +11,8 @@ use crate::constants::{FACES, MESHLET_TRIANGLES, NONE, RECEIVE_KINDS};
 use crate::error::Result;
 use crate::math::hemicube::pixel_count;
 use crate::vk::{
-    Buffer, BufferUse, Device, Format, Framebuffer, Image, ImageUse, Limits, RenderPass, Sampler,
+    Buffer, BufferUse, Device, Format, Framebuffer, Image, ImageUse, Limits, RenderPass, Sampled,
+    Sampler,
 };
 
 /// The sources of a batch.
@@ -101,8 +102,8 @@ impl Batch {
 }
 
 impl Hemicubes {
-    /// How many slots a batch may have: what fits the device's largest buffer, its widest image and an eighth of its
-    /// memory, and no more than `wanted`.
+    /// How many slots a batch may have: what fits the device's largest buffer, its widest image and
+    /// an eighth of its memory, and no more than `wanted`.
     pub fn fitting_slots(
         device: &Device,
         scene: &SceneBuffers,
@@ -119,6 +120,14 @@ impl Hemicubes {
         match scene.occluder_count > self.room {
             true => scene.occluder_count.div_ceil(filled),
             false => 1,
+        }
+    }
+
+    /// The item buffers as shaders read them.
+    pub(super) fn sampled_items(&self) -> Sampled<'_> {
+        Sampled {
+            image: &self.items,
+            sampler: &self.sampler,
         }
     }
 
@@ -162,7 +171,8 @@ impl Hemicubes {
     }
 }
 
-/// As many slots as [`Hemicubes::fitting_slots`] may give, for so many elements and occluders; 1 at least.
+/// As many slots as [`Hemicubes::fitting_slots`] may give, for so many elements and occluders; 1 at
+/// least.
 fn most_slots(limits: &Limits, (elements, occluders): (u32, u32), face_size: u32) -> u32 {
     let region = u64::from(FACES) * u64::from(occluders);
     // Of receivers: fresh form factors are no more. Lists of triangles may be drawn in parts.
@@ -178,7 +188,8 @@ fn most_slots(limits: &Limits, (elements, occluders): (u32, u32), face_size: u32
 mod tests {
     use super::*;
 
-    /// A million elements, merged to a few occluders and not: lists of receivers fit a buffer of 128 MiB.
+    /// A million elements, merged to a few occluders and not: lists of receivers fit a buffer of
+    /// 128 MiB.
     #[test]
     fn no_list_outgrows_the_largest_buffer() {
         let limits = Limits {

@@ -3,17 +3,14 @@
 
 use std::sync::Arc;
 
-use bytemuck::{Pod, Zeroable};
-
 use super::batch::Batch;
 use super::buffers::{SceneBuffers, upload};
 use super::fresh_rows::FreshRows;
-use super::{groups, shaders};
+use super::groups;
+use super::shaders::{bin_pixels, pixel_rows};
 use crate::error::{Error, Result};
 use crate::math::hemicube::{fixed_point_tables, pixel_count};
-use crate::vk::{
-    Bind, Binding, Buffer, BufferUse, Commands, ComputePipeline, DescriptorSet, Device, Stage,
-};
+use crate::vk::{Buffer, BufferUse, Commands, ComputePipeline, DescriptorSet, Device, Stage};
 
 pub struct BinPixels {
     bin: ComputePipeline,
@@ -26,42 +23,18 @@ pub struct Bound {
     rows: DescriptorSet,
 }
 
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct Parameters {
-    element_count: u32,
-    /// Of `bin`: pixels a side of a face. Of `rows`: blocks of a row.
-    second: u32,
-}
-
 impl BinPixels {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
         if !device.candidate().int64_atomics {
             return Err(Error::Device(format!(
-                "device {} has no 64-bit integer atomics on buffers, which --estimator pixel needs; use --estimator receiver",
+                "device {} has no 64-bit integer atomics on buffers, which --estimator pixel \
+                 needs; use --estimator receiver",
                 device.name()
             )));
         }
-        let push = size_of::<Parameters>();
-        let mut bindings = [Binding::Storage; 6];
-        bindings[5] = Binding::Sampled;
         Ok(Self {
-            bin: ComputePipeline::new(
-                device,
-                "bin pixels",
-                shaders::BIN_PIXELS_COMP,
-                &bindings,
-                push,
-                &[],
-                false,
-            )?,
-            rows: ComputePipeline::storage(
-                device,
-                "pixel rows",
-                shaders::PIXEL_ROWS_COMP,
-                6,
-                push,
-            )?,
+            bin: ComputePipeline::new(device, "bin pixels", &bin_pixels::SHADER)?,
+            rows: ComputePipeline::new(device, "pixel rows", &pixel_rows::SHADER)?,
         })
     }
 
@@ -81,26 +54,24 @@ impl BinPixels {
             cmd.fill(&sums, 0);
             Ok(())
         })?;
-        let bin = self.bin.bind(
-            "bin pixels",
-            &[
-                Bind::Buffer(&batch.slots),
-                Bind::Buffer(&scene.sources),
-                Bind::Buffer(&deltas),
-                Bind::Buffer(&sums),
-                Bind::Buffer(&scene.planes),
-                Bind::Image(&hemicubes.items, &hemicubes.sampler),
-            ],
-        )?;
-        let to_rows = [
-            &batch.slots,
-            &scene.sources,
-            &sums,
-            &scene.areas,
-            &rows.plain,
-            &rows.occupied,
-        ];
-        let rows = self.rows.bind("pixel rows", &to_rows.map(Bind::Buffer))?;
+        let bin = bin_pixels::Bindings {
+            slots: &batch.slots,
+            sources: &scene.sources,
+            deltas: &deltas,
+            form_factors: &sums,
+            planes: &scene.planes,
+            items: hemicubes.sampled_items(),
+        };
+        let rows = pixel_rows::Bindings {
+            slots: &batch.slots,
+            sources: &scene.sources,
+            sums: &sums,
+            element_area: &scene.areas,
+            fresh: &rows.plain,
+            occupied: &rows.occupied,
+        };
+        let bin = self.bin.bind("bin pixels", &bin)?;
+        let rows = self.rows.bind("pixel rows", &rows)?;
         Ok(Bound { bin, rows })
     }
 
@@ -111,21 +82,23 @@ impl BinPixels {
         let element_count = rows.shape.plain_count;
         let hemicubes = batch.hemicubes();
         let pixels = pixel_count(hemicubes.face_size) as u32;
-        let parameters = |second| Parameters {
-            element_count,
-            second,
-        };
         cmd.dispatch(
             &self.bin,
             &bound.bin,
-            &parameters(hemicubes.face_size),
+            &bin_pixels::Parameters {
+                element_count,
+                face_size: hemicubes.face_size,
+            },
             [groups(pixels), batch.slot_count, 1],
         );
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         cmd.dispatch(
             &self.rows,
             &bound.rows,
-            &parameters(rows.shape.blocks()),
+            &pixel_rows::Parameters {
+                element_count,
+                block_count: rows.shape.blocks(),
+            },
             [groups(element_count), batch.slot_count, 1],
         );
     }

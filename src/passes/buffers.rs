@@ -1,4 +1,5 @@
-//! What the passes share on the device: the scene, the state of the solution, and the batch under way.
+//! What the passes share on the device: the scene, the state of the solution, and the batch under
+//! way.
 
 use std::sync::Arc;
 
@@ -12,7 +13,7 @@ use crate::mesh::charts::Connections;
 use crate::mesh::elements::Elements;
 use crate::mesh::meshlets;
 use crate::mesh::occluders::Occluders;
-use crate::mesh::sources::Sources;
+use crate::mesh::sources::{self, Sources};
 use crate::vk::{Buffer, BufferUse, Commands, Device, Stage};
 
 /// The scene in internal units: read by the passes, never written.
@@ -57,104 +58,116 @@ impl SceneBuffers {
         occluders: &Occluders,
     ) -> Result<Self> {
         let vertices: Vec<Vec3> = elements.vertices.iter().map(|v| v.as_vec3()).collect();
-        let planes: Vec<[f32; 4]> = (0..elements.len())
-            .map(|e| {
-                let n = elements.normal[e];
-                n.as_vec3()
-                    .extend(n.dot(elements.centroid[e]) as f32)
-                    .to_array()
-            })
-            .collect();
-        let balls: Vec<[f32; 4]> = (0..elements.len())
-            .map(|e| {
-                elements.centroid[e]
-                    .as_vec3()
-                    .extend(elements.radius(e) as f32)
-                    .to_array()
-            })
-            .collect();
-        let triangles: Vec<Triangle> = (0..elements.len())
-            .map(|e| {
-                let [a, b, c] = elements.triangle(e).map(|v| v.as_vec3());
-                Triangle {
-                    a,
-                    area: elements.area[e] as f32,
-                    b,
-                    height: planes[e][3],
-                    c,
-                    unused_c: 0.0,
-                    normal: elements.normal[e].as_vec3(),
-                    unused: 0.0,
-                }
-            })
-            .collect();
+        let planes = planes(elements);
+        let triangles = triangles(elements, &planes);
         let areas: Vec<f32> = elements.area.iter().map(|&a| a as f32).collect();
-        let mut contours = Vec::new();
-        let mut parts: Vec<[f32; 8]> = Vec::new();
-        let mut gpu_sources = Vec::with_capacity(sources.list.len());
-        for source in &sources.list {
-            let corners = contour_corners(source);
-            let outline = (contours.len() as u32, corners.len() as u32);
-            gpu_sources.push(Source::new(source, outline, parts.len() as u32));
-            contours.extend(corners);
-            parts.extend(source.parts.iter().map(|part| {
-                let [x, y, z] = part.centroid.as_vec3().to_array();
-                let [u, v, w] = part.vector_area.as_vec3().to_array();
-                [x, y, z, u, v, w, 0.0, 0.0]
-            }));
-        }
+        let Outlined {
+            list,
+            contours,
+            parts,
+        } = Outlined::new(&sources.list);
         let meshlets: Vec<Meshlet> =
             meshlets::build(elements, connections, occluders, &sources.chart)
                 .iter()
                 .map(Meshlet::from)
                 .collect();
+        let blocks = receiver_blocks(elements);
+        let components = components(elements, connections);
+        let reflectance = elements.even_reflectance();
+        let (geometry, storage, texels) =
+            (BufferUse::Geometry, BufferUse::Storage, BufferUse::Texels);
         Ok(Self {
             element_count: elements.len() as u32,
             occluder_count: occluders.len() as u32,
             source_count: sources.list.len() as u32,
             meshlet_count: meshlets.len() as u32,
             enclosed: connections.enclosed,
-            vertices: upload(device, "vertices", &vertices, BufferUse::Geometry)?,
-            corners: upload(device, "corners", &elements.corners, BufferUse::Geometry)?,
-            occluder_corners: upload(
-                device,
-                "occluder corners",
-                &occluders.corners,
-                BufferUse::Storage,
-            )?,
-            occluder_items: upload(
-                device,
-                "occluder items",
-                &occluders.items,
-                BufferUse::Storage,
-            )?,
-            triangles: upload(device, "triangles", &triangles, BufferUse::Texels)?,
-            parts: upload(device, "parts", &parts, BufferUse::Texels)?,
-            planes: upload(device, "planes", &planes, BufferUse::Texels)?,
-            balls: upload(device, "balls", &balls, BufferUse::Texels)?,
-            receiver_blocks: upload(
-                device,
-                "receiver blocks",
-                &receiver_blocks(elements),
-                BufferUse::Storage,
-            )?,
-            areas: upload(device, "areas", &areas, BufferUse::Storage)?,
-            reflectance: upload(
-                device,
-                "reflectance",
-                &elements.even_reflectance(),
-                BufferUse::Storage,
-            )?,
-            sources: upload(device, "sources", &gpu_sources, BufferUse::Texels)?,
-            contours: upload(device, "contours", &contours, BufferUse::Texels)?,
-            meshlets: upload(device, "meshlets", &meshlets, BufferUse::Storage)?,
-            components: upload(
-                device,
-                "components",
-                &components(elements, connections),
-                BufferUse::Storage,
-            )?,
+            vertices: upload(device, "vertices", &vertices, geometry)?,
+            corners: upload(device, "corners", &elements.corners, geometry)?,
+            occluder_corners: upload(device, "occluder corners", &occluders.corners, storage)?,
+            occluder_items: upload(device, "occluder items", &occluders.items, storage)?,
+            triangles: upload(device, "triangles", &triangles, texels)?,
+            parts: upload(device, "parts", &parts, texels)?,
+            planes: upload(device, "planes", &planes, texels)?,
+            balls: upload(device, "balls", &balls(elements), texels)?,
+            receiver_blocks: upload(device, "receiver blocks", &blocks, storage)?,
+            areas: upload(device, "areas", &areas, storage)?,
+            reflectance: upload(device, "reflectance", &reflectance, storage)?,
+            sources: upload(device, "sources", &list, texels)?,
+            contours: upload(device, "contours", &contours, texels)?,
+            meshlets: upload(device, "meshlets", &meshlets, storage)?,
+            components: upload(device, "components", &components, storage)?,
         })
+    }
+}
+
+/// Normal n and n · x, `[element]`.
+fn planes(elements: &Elements) -> Vec<[f32; 4]> {
+    (0..elements.len())
+        .map(|e| {
+            let n = elements.normal[e];
+            let height = n.dot(elements.centroid[e]) as f32;
+            n.as_vec3().extend(height).to_array()
+        })
+        .collect()
+}
+
+/// Centroid and radius, `[element]`.
+fn balls(elements: &Elements) -> Vec<[f32; 4]> {
+    (0..elements.len())
+        .map(|e| {
+            let centroid = elements.centroid[e].as_vec3();
+            centroid.extend(elements.radius(e) as f32).to_array()
+        })
+        .collect()
+}
+
+fn triangles(elements: &Elements, planes: &[[f32; 4]]) -> Vec<Triangle> {
+    (0..elements.len())
+        .map(|e| {
+            let [a, b, c] = elements.triangle(e).map(|v| v.as_vec3());
+            Triangle {
+                a,
+                area: elements.area[e] as f32,
+                b,
+                height: planes[e][3],
+                c,
+                unused_c: 0.0,
+                normal: elements.normal[e].as_vec3(),
+                unused: 0.0,
+            }
+        })
+        .collect()
+}
+
+/// Sources with what they refer to in the buffers of all.
+struct Outlined {
+    list: Vec<Source>,
+    contours: Vec<[f32; 4]>,
+    /// Centroid and sum of area times normal, eight words a part.
+    parts: Vec<[f32; 8]>,
+}
+
+impl Outlined {
+    fn new(sources: &[sources::Source]) -> Self {
+        let mut outlined = Self {
+            list: Vec::with_capacity(sources.len()),
+            contours: Vec::new(),
+            parts: Vec::new(),
+        };
+        for source in sources {
+            let corners = contour_corners(source);
+            let outline = (outlined.contours.len() as u32, corners.len() as u32);
+            let first_part = outlined.parts.len() as u32;
+            outlined.list.push(Source::new(source, outline, first_part));
+            outlined.contours.extend(corners);
+            outlined.parts.extend(source.parts.iter().map(|part| {
+                let [x, y, z] = part.centroid.as_vec3().to_array();
+                let [u, v, w] = part.vector_area.as_vec3().to_array();
+                [x, y, z, u, v, w, 0.0, 0.0]
+            }));
+        }
+        outlined
     }
 }
 
@@ -178,8 +191,8 @@ fn components(elements: &Elements, connections: &Connections) -> Vec<Component> 
     components
 }
 
-/// The light gathered so far, `[element]`, W·m⁻², RGB; direct and indirect irradiance with the rounding
-/// errors of their last sums.
+/// The light gathered so far, `[element]`, W·m⁻², RGB; direct and indirect irradiance with the
+/// rounding errors of their last sums.
 pub struct State {
     pub direct: Buffer,
     pub direct_error: Buffer,

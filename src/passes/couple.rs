@@ -6,10 +6,11 @@ use std::sync::Arc;
 use super::batch::Batch;
 use super::buffers::{SceneBuffers, upload};
 use super::fresh_rows::FreshRows;
+use super::groups;
+use super::shaders::couple::{Bindings, Parameters, SHADER};
 use super::types::CouplingTarget;
-use super::{groups, shaders};
 use crate::error::Result;
-use crate::vk::{Bind, Buffer, BufferUse, Commands, ComputePipeline, DescriptorSet, Device};
+use crate::vk::{Buffer, BufferUse, Commands, ComputePipeline, DescriptorSet, Device};
 
 pub struct Couple {
     pipeline: ComputePipeline,
@@ -27,9 +28,8 @@ pub struct Bound {
 
 impl Couple {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
-        let spirv = shaders::COUPLE_COMP;
         Ok(Self {
-            pipeline: ComputePipeline::storage(device, "couple", spirv, 8, 4 * 6)?,
+            pipeline: ComputePipeline::new(device, "couple", &SHADER)?,
         })
     }
 
@@ -47,17 +47,16 @@ impl Couple {
         let coupling = Buffer::new(device, "coupling", bytes, BufferUse::Storage)?;
         let set = self.pipeline.bind(
             "couple",
-            &[
-                &batch.slots,
-                &on_device,
-                &scene.reflectance,
-                &scene.areas,
-                &fresh.plain,
-                &fresh.meso,
-                &fresh.occupied,
-                &coupling,
-            ]
-            .map(Bind::Buffer),
+            &Bindings {
+                slots: &batch.slots,
+                targets: &on_device,
+                reflectance: &scene.reflectance,
+                element_area: &scene.areas,
+                fresh: &fresh.plain,
+                fresh_meso: &fresh.meso,
+                occupied: &fresh.occupied,
+                coupling: &coupling,
+            },
         )?;
         Ok(Bound {
             set,
@@ -69,14 +68,14 @@ impl Couple {
 
     pub fn record(&self, cmd: &Commands, bound: &Bound, batch: &Batch, fresh: &FreshRows) {
         let shape = fresh.shape;
-        let parameters = [
-            bound.target_count,
-            bound.word_count,
-            shape.plain_count,
-            shape.plain_blocks(),
-            shape.meso_count,
-            shape.blocks(),
-        ];
+        let parameters = Parameters {
+            target_count: bound.target_count,
+            word_count: bound.word_count,
+            plain_count: shape.plain_count,
+            plain_blocks: shape.plain_blocks(),
+            meso_count: shape.meso_count,
+            block_count: shape.blocks(),
+        };
         let size = [groups(bound.target_count), batch.slot_count, 1];
         cmd.dispatch(&self.pipeline, &bound.set, &parameters, size);
     }

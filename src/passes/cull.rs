@@ -1,15 +1,14 @@
-//! Lists the triangles that each hemicube face must draw. Shader: `cull.comp`; twin: [`crate::reference::cull`].
+//! Lists the triangles that each hemicube face must draw. Shader: `cull.comp`; twin:
+//! [`crate::reference::cull`].
 
 use std::sync::Arc;
 
-use bytemuck::{Pod, Zeroable};
-
 use super::batch::Batch;
 use super::buffers::SceneBuffers;
-use super::shaders;
+use super::shaders::cull::{Bindings, Parameters, SHADER};
 use crate::constants::FACES;
 use crate::error::Result;
-use crate::vk::{Bind, Binding, Commands, ComputePipeline, DescriptorSet, Device};
+use crate::vk::{Commands, ComputePipeline, DescriptorSet, Device};
 
 /// What is left out of the item buffer's draws. Every level gives the same item buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -27,15 +26,6 @@ pub struct Cull {
     pipeline: ComputePipeline,
 }
 
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct Parameters {
-    meshlet_count: u32,
-    room: u32,
-    face_size: u32,
-    part: u32,
-}
-
 impl Cull {
     pub fn new(device: &Arc<Device>, culling: Culling) -> Result<Self> {
         let constants = [
@@ -45,15 +35,7 @@ impl Cull {
             device.limits().subpixel_bits,
         ];
         Ok(Self {
-            pipeline: ComputePipeline::new(
-                device,
-                "cull",
-                shaders::CULL_COMP,
-                &[Binding::Storage; 14],
-                size_of::<Parameters>(),
-                &constants,
-                true,
-            )?,
+            pipeline: ComputePipeline::in_subgroups(device, "cull", &SHADER, &constants)?,
         })
     }
 
@@ -61,23 +43,22 @@ impl Cull {
         let hemicubes = batch.hemicubes();
         self.pipeline.bind(
             "cull",
-            &[
-                &batch.slots,
-                &scene.sources,
-                &scene.meshlets,
-                &scene.components,
-                &scene.occluder_corners,
-                &scene.vertices,
-                &scene.planes,
-                &hemicubes.drawn_corners,
-                &hemicubes.drawn_items,
-                &hemicubes.draws,
-                &hemicubes.views,
-                &hemicubes.counts,
-                &scene.occluder_items,
-                &hemicubes.resume,
-            ]
-            .map(Bind::Buffer),
+            &Bindings {
+                slots: &batch.slots,
+                sources: &scene.sources,
+                meshlets: &scene.meshlets,
+                components: &scene.components,
+                corners: &scene.occluder_corners,
+                vertices: &scene.vertices,
+                planes: &scene.planes,
+                drawn_corners: &hemicubes.drawn_corners,
+                drawn_items: &hemicubes.drawn_items,
+                draws: &hemicubes.draws,
+                views: &hemicubes.views,
+                counts: &hemicubes.counts,
+                items: &scene.occluder_items,
+                resume: &hemicubes.resume,
+            },
         )
     }
 

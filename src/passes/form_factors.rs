@@ -1,19 +1,23 @@
-//! The `receiver` estimator: the form factor from every element to every source of a batch. Elements that see a source are
-//! listed by how it is found, then found. Shaders: `sort_receivers.comp`, `form_factors.comp`, and where a scene has relief
-//! `form_factors_relief.comp`; `_rays.comp` of each where shadow rays are asked what is seen; twin: [`crate::reference::form_factors`].
+//! The `receiver` estimator: the form factor from every element to every source of a batch.
+//! Elements that see a source are listed by how their form factor is computed, then it is. Shaders:
+//! `sort_receivers.comp`, `form_factors.comp`, and where a scene has relief
+//! `form_factors_relief.comp`; `_rays.comp` of each where shadow rays decide what is seen; twin:
+//! [`crate::reference::form_factors`].
 
 use std::sync::Arc;
-
-use bytemuck::{Pod, Zeroable};
 
 use super::batch::{Batch, Sight};
 use super::buffers::SceneBuffers;
 use super::fresh_rows::{FreshRows, ReceiverLists};
+use super::groups;
+use super::shaders::{
+    form_factors, form_factors_rays, form_factors_relief, form_factors_relief_rays, sort_receivers,
+    sort_receivers_rays,
+};
 use super::types::ReceiverList;
-use super::{groups, shaders};
 use crate::constants::{RECEIVE_KINDS, SORT_ELEMENTS, SORT_SLOTS};
 use crate::error::Result;
-use crate::vk::{Bind, Binding, Buffer, Commands, ComputePipeline, DescriptorSet, Device, Stage};
+use crate::vk::{Buffer, Commands, ComputePipeline, ComputeShader, DescriptorSet, Device, Stage};
 
 pub struct FormFactors {
     sort: ComputePipeline,
@@ -23,7 +27,7 @@ pub struct FormFactors {
     meso: Vec<ComputePipeline>,
 }
 
-/// What is asked whether an element sees a source.
+/// What decides whether an element sees a source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SeenBy {
     ItemBuffer,
@@ -34,7 +38,8 @@ pub enum SeenBy {
 #[derive(Debug, Clone, Copy)]
 pub struct Sorting {
     pub seen_by: SeenBy,
-    /// Whether blocks of elements that see nothing of a source are passed over as a whole. The lists are the same.
+    /// Whether blocks of elements that see nothing of a source are passed over as a whole. The
+    /// lists are the same.
     pub culls: bool,
 }
 
@@ -50,108 +55,78 @@ struct Range {
     element_count: u32,
     first_block: u32,
     sort: DescriptorSet,
-    kinds: Vec<DescriptorSet>,
+    /// For the pipelines of all kinds.
+    form_factors: DescriptorSet,
 }
 
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct Parameters {
-    first_element: u32,
-    element_count: u32,
-    face_size: u32,
-    first_slot: u32,
-    end_slot: u32,
-    first_block: u32,
-    block_count: u32,
+/// What the sets of a range bind, beside what decides what is seen.
+struct Bound<'a> {
+    scene: &'a SceneBuffers,
+    batch: &'a Batch,
+    rows: &'a FreshRows,
+    lists: &'a ReceiverLists,
+    fresh: &'a Buffer,
+    /// The elements with a relief, of a range of those.
+    meso: Option<&'a Buffer>,
 }
 
-/// Place of the item buffer, or of the tree's nodes, among the bindings, and how many there are for sorting and in all.
-const ITEMS: usize = 6;
-/// Texels: sources, planes, balls; contours, triangles, parts.
-const SOURCES: usize = 1;
-const BALLS: usize = 3;
-const CONTOURS: usize = 7;
-const PARTS: usize = 9;
-const SORT: usize = 9;
-const PLAIN: usize = 12;
-
-/// A shader that lists or evaluates receivers.
-#[derive(Clone, Copy)]
-struct Shader<'a> {
-    name: &'a str,
-    spirv: &'a [u32],
-    /// How many it has, those of what is asked what is seen included.
-    bindings: usize,
-    seen_by: SeenBy,
-}
-
-fn pipeline(
-    device: &Arc<Device>,
-    shader: Shader<'_>,
-    constants: &[u32],
-) -> Result<ComputePipeline> {
-    let Shader { name, spirv, .. } = shader;
-    let mut kinds = vec![Binding::Storage; shader.bindings];
-    match shader.seen_by {
-        SeenBy::ItemBuffer => kinds[ITEMS] = Binding::Sampled,
-        // What the nodes hold comes last.
-        SeenBy::ShadowRays => {
-            kinds[ITEMS] = Binding::Texels;
-            kinds.push(Binding::Texels);
+/// The bindings of `shared/receivers.glsl`, and those that a shader has beside them.
+macro_rules! receivers {
+    ($shader:ident, $on:expr, $($own:tt)*) => {
+        $shader::Bindings {
+            slots: &$on.batch.slots,
+            sources: &$on.scene.sources,
+            planes: &$on.scene.planes,
+            balls: &$on.scene.balls,
+            lists: &$on.lists.counts,
+            listed: &$on.lists.listed,
+            $($own)*
         }
-    }
-    kinds[SOURCES..=BALLS].fill(Binding::Texels);
-    if shader.bindings >= PLAIN {
-        kinds[CONTOURS..=PARTS].fill(Binding::Texels);
-    }
-    ComputePipeline::new(
-        device,
-        name,
-        spirv,
-        &kinds,
-        size_of::<Parameters>(),
-        constants,
-        true,
-    )
+    };
+}
+
+/// The bindings of every variant of `shared/form_factors.glsl`, and those of one.
+macro_rules! found {
+    ($shader:ident, $on:expr, $($own:tt)*) => {
+        receivers!(
+            $shader,
+            $on,
+            contours: &$on.scene.contours,
+            triangles: &$on.scene.triangles,
+            parts: &$on.scene.parts,
+            occupied: &$on.rows.occupied,
+            fresh: $on.fresh,
+            $($own)*
+        )
+    };
 }
 
 impl FormFactors {
     pub fn new(device: &Arc<Device>, with_relief: bool, sorting: Sorting) -> Result<Self> {
-        let seen_by = sorting.seen_by;
-        let shader = |name, spirv, bindings| Shader {
-            name,
-            spirv,
-            bindings,
-            seen_by,
-        };
-        let kinds = |shader| -> Result<Vec<_>> {
-            (0..RECEIVE_KINDS)
-                .map(|kind| pipeline(device, shader, &[kind]))
-                .collect()
-        };
-        let [sort, plain, meso] = match seen_by {
+        let [sort, plain, meso] = match sorting.seen_by {
             SeenBy::ItemBuffer => [
-                shaders::SORT_RECEIVERS_COMP,
-                shaders::FORM_FACTORS_COMP,
-                shaders::FORM_FACTORS_RELIEF_COMP,
+                &sort_receivers::SHADER,
+                &form_factors::SHADER,
+                &form_factors_relief::SHADER,
             ],
             SeenBy::ShadowRays => [
-                shaders::SORT_RECEIVERS_RAYS_COMP,
-                shaders::FORM_FACTORS_RAYS_COMP,
-                shaders::FORM_FACTORS_RELIEF_RAYS_COMP,
+                &sort_receivers_rays::SHADER,
+                &form_factors_rays::SHADER,
+                &form_factors_relief_rays::SHADER,
             ],
         };
-        let sort_constants = [sorting.culls.into()];
-        let sort = shader("sort receivers", sort, SORT);
-        let plain = shader("form factors", plain, PLAIN);
-        let meso = shader("form factors to relief", meso, PLAIN + 1);
+        let kinds = |name, shader: &ComputeShader<'_>| {
+            (0..RECEIVE_KINDS)
+                .map(|kind| ComputePipeline::in_subgroups(device, name, shader, &[kind]))
+                .collect::<Result<Vec<_>>>()
+        };
+        let culls = [sorting.culls.into()];
         Ok(Self {
-            sort: pipeline(device, sort, &sort_constants)?,
-            plain: kinds(plain)?,
-            meso: if with_relief {
-                kinds(meso)?
-            } else {
-                Vec::new()
+            sort: ComputePipeline::in_subgroups(device, "sort receivers", sort, &culls)?,
+            plain: kinds("form factors", plain)?,
+            meso: match with_relief {
+                true => kinds("form factors to relief", meso)?,
+                false => Vec::new(),
             },
         })
     }
@@ -164,55 +139,66 @@ impl FormFactors {
         rows: &FreshRows,
         meso: Option<&Buffer>,
     ) -> Result<Sets> {
-        let (seen, last) = match &batch.sight {
-            Sight::Hemicubes(h) => (Bind::Image(&h.items, &h.sampler), None),
-            Sight::Rays(tree) => (
-                Bind::Texels(&tree.nodes),
-                Some(Bind::Texels(&tree.occluders)),
-            ),
+        let plain = Bound {
+            scene,
+            batch,
+            rows,
+            lists: &rows.plain_lists,
+            fresh: &rows.plain,
+            meso: None,
         };
-        let bind =
-            |pipelines: &[ComputePipeline], lists: &ReceiverLists, fresh, more: Option<&Buffer>| {
-                let mut binds = vec![Bind::Buffer(&batch.slots)];
-                let receivers = [&scene.sources, &scene.planes, &scene.balls];
-                binds.extend(receivers.map(Bind::Texels));
-                binds.extend([&lists.counts, &lists.listed].map(Bind::Buffer));
-                binds.push(seen);
-                let mut sort = binds.clone();
-                sort.extend([&rows.facing_away, &scene.receiver_blocks].map(Bind::Buffer));
-                sort.extend(last);
-                let sort = self.sort.bind("sort receivers", &sort)?;
-                let shapes = [&scene.contours, &scene.triangles, &scene.parts];
-                binds.extend(shapes.map(Bind::Texels));
-                binds.extend([&rows.occupied, fresh].map(Bind::Buffer));
-                binds.extend(more.map(Bind::Buffer));
-                binds.extend(last);
-                let kinds = pipelines.iter().map(|p| p.bind("form factors", &binds));
-                Ok::<_, crate::error::Error>((sort, kinds.collect::<Result<Vec<_>>>()?))
-            };
-        let (sort, kinds) = bind(&self.plain, &rows.plain_lists, &rows.plain, None)?;
         let plain = Range {
             first_element: 0,
             element_count: rows.shape.plain_count,
             first_block: 0,
-            sort,
-            kinds,
+            sort: self.bind_sort(&plain)?,
+            form_factors: bind_form_factors(&self.plain, &plain)?,
         };
-        let meso = meso.map(|elements| {
-            let (lists, fresh) = (&rows.meso_lists, &rows.meso);
-            let (sort, kinds) = bind(&self.meso, lists, fresh, Some(elements))?;
-            Ok::<_, crate::error::Error>(Range {
-                first_element: rows.shape.plain_count,
-                element_count: rows.shape.meso_count,
-                first_block: rows.shape.plain_blocks(),
-                sort,
-                kinds,
-            })
-        });
+        if meso.is_none() {
+            return Ok(Sets { plain, meso: None });
+        }
+        let meso = Bound {
+            scene,
+            batch,
+            rows,
+            lists: &rows.meso_lists,
+            fresh: &rows.meso,
+            meso,
+        };
+        let meso = Range {
+            first_element: rows.shape.plain_count,
+            element_count: rows.shape.meso_count,
+            first_block: rows.shape.plain_blocks(),
+            sort: self.bind_sort(&meso)?,
+            form_factors: bind_form_factors(&self.meso, &meso)?,
+        };
         Ok(Sets {
             plain,
-            meso: meso.transpose()?,
+            meso: Some(meso),
         })
+    }
+
+    fn bind_sort(&self, on: &Bound<'_>) -> Result<DescriptorSet> {
+        let (away_count, blocks) = (&on.rows.facing_away, &on.scene.receiver_blocks);
+        match &on.batch.sight {
+            Sight::Hemicubes(hemicubes) => {
+                let items = hemicubes.sampled_items();
+                let bindings = receivers!(sort_receivers, on, items, away_count, blocks);
+                self.sort.bind("sort receivers", &bindings)
+            }
+            Sight::Rays(tree) => {
+                let (shadow_nodes, shadow_occluders) = (&tree.nodes, &tree.occluders);
+                let bindings = receivers!(
+                    sort_receivers_rays,
+                    on,
+                    shadow_nodes,
+                    away_count,
+                    blocks,
+                    shadow_occluders
+                );
+                self.sort.bind("sort receivers", &bindings)
+            }
+        }
     }
 
     /// After a barrier between earlier readers of the rows and transfers.
@@ -233,7 +219,8 @@ impl FormFactors {
             Sight::Hemicubes(hemicubes) => (hemicubes.face_size, SORT_SLOTS),
             Sight::Rays(_) => (0, 1),
         };
-        let parameters = |range: &Range, slots: std::ops::Range<u32>| Parameters {
+        // All of these shaders have the same.
+        let parameters = |range: &Range, slots: std::ops::Range<u32>| sort_receivers::Parameters {
             first_element: range.first_element,
             element_count: range.element_count,
             face_size,
@@ -255,13 +242,47 @@ impl FormFactors {
         // Every element is in one list of a slot at most.
         for (range, pipelines, lists, _) in ranges() {
             for slot in 0..batch.slot_count {
-                for (kind, (pipeline, set)) in pipelines.iter().zip(&range.kinds).enumerate() {
+                for (kind, pipeline) in pipelines.iter().enumerate() {
+                    let set = &range.form_factors;
                     let push = parameters(range, slot..slot + 1);
                     let list = u64::from(slot * RECEIVE_KINDS) + kind as u64;
                     let at = size_of::<ReceiverList>() as u64 * list;
                     cmd.dispatch_indirect(pipeline, set, &push, &lists.counts, at);
                 }
             }
+        }
+    }
+}
+
+/// A set for the pipelines of all kinds.
+fn bind_form_factors(pipelines: &[ComputePipeline], on: &Bound<'_>) -> Result<DescriptorSet> {
+    let pipeline = pipelines.first().expect("a pipeline for each kind");
+    let name = "form factors";
+    match (&on.batch.sight, on.meso) {
+        (Sight::Hemicubes(hemicubes), None) => {
+            let items = hemicubes.sampled_items();
+            pipeline.bind(name, &found!(form_factors, on, items))
+        }
+        (Sight::Hemicubes(hemicubes), Some(meso_elements)) => {
+            let items = hemicubes.sampled_items();
+            let bindings = found!(form_factors_relief, on, items, meso_elements);
+            pipeline.bind(name, &bindings)
+        }
+        (Sight::Rays(tree), None) => {
+            let (shadow_nodes, shadow_occluders) = (&tree.nodes, &tree.occluders);
+            let bindings = found!(form_factors_rays, on, shadow_nodes, shadow_occluders);
+            pipeline.bind(name, &bindings)
+        }
+        (Sight::Rays(tree), Some(meso_elements)) => {
+            let (shadow_nodes, shadow_occluders) = (&tree.nodes, &tree.occluders);
+            let bindings = found!(
+                form_factors_relief_rays,
+                on,
+                shadow_nodes,
+                meso_elements,
+                shadow_occluders
+            );
+            pipeline.bind(name, &bindings)
         }
     }
 }

@@ -9,7 +9,8 @@ use crate::constants::RECEIVE_KINDS;
 use crate::error::Result;
 use crate::vk::{Buffer, BufferUse, Device};
 
-/// How the elements of a scene lie in rows: those without relief first, in blocks of GROUP elements.
+/// How the elements of a scene lie in rows: those without relief first, in blocks of GROUP
+/// elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RowShape {
     pub plain_count: u32,

@@ -5,17 +5,15 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use bytemuck::{Pod, Zeroable};
-
 use super::buffers::{SceneBuffers, State, write};
+use super::groups;
 use super::kept_rows::KeptRows;
 use super::relief_buffers::ReliefBuffers;
+use super::shaders::{gather, gather_from_relief, gather_to_relief};
 use super::types::{KeptRow, Slot};
-use super::{groups, shaders};
 use crate::error::Result;
 use crate::vk::{
-    Bind, Binding, Buffer, BufferUse, Commands, ComputePipeline, DescriptorSet, Device, Stage,
-    TEXEL_BYTES,
+    Buffer, BufferUse, Commands, ComputePipeline, DescriptorSet, Device, Stage, TEXEL_BYTES,
 };
 
 /// Rows and the light that their sources send; the rows of one chunk behind one another.
@@ -87,31 +85,16 @@ pub struct ChunkSlots {
     pub slots: Range<u32>,
 }
 
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct Parameters {
-    first_element: u32,
-    element_count: u32,
-    first_slot: u32,
-    end_slot: u32,
-    first_block: u32,
-    /// 0: emitted light, 1: reflected.
-    reflected: u32,
-    /// Of scenes with relief alone.
-    first_relief_source: u32,
-    relief_source_count: u32,
-    cells: [u32; 2],
+/// What the sets of a chunk bind for one part of the light.
+#[derive(Clone, Copy)]
+struct Bound<'a> {
+    list: &'a GatherList,
+    scene: &'a SceneBuffers,
+    /// The chunk.
+    words: &'a Buffer,
+    irradiance: &'a Buffer,
+    irradiance_error: &'a Buffer,
 }
-
-/// Bytes of [`Parameters`] in a scene without relief.
-const PLAIN_BYTES: usize = 24;
-/// How many bindings each shader has, and those that are texels.
-const PLAIN: usize = 4;
-const FROM_RELIEF: usize = PLAIN + 4;
-const LIT_ROWS: usize = 0;
-const WORDS: usize = 3;
-const SOURCES: usize = 6;
-const TO_RELIEF: usize = FROM_RELIEF + 4;
 
 /// Slots of a dispatch: a software device ends a shader's loops after 65,535 turns of all together.
 const MOST_SLOTS: u32 = 1024;
@@ -119,25 +102,16 @@ const MOST_SLOTS: u32 = 1024;
 impl Gather {
     pub fn new(device: &Arc<Device>, with_relief: bool) -> Result<Self> {
         let lanes = [device.limits().subgroup_size];
-        let make = |name, spirv, bindings: usize, bytes| {
-            let mut kinds = vec![Binding::Storage; bindings];
-            kinds[LIT_ROWS] = Binding::Texels;
-            kinds[WORDS] = Binding::Texels;
-            if bindings > PLAIN {
-                kinds[SOURCES] = Binding::Texels;
-            }
-            ComputePipeline::new(device, name, spirv, &kinds, bytes, &lanes, true)
-        };
-        if !with_relief {
-            let plain = make("gather", shaders::GATHER_COMP, PLAIN, PLAIN_BYTES)?;
-            return Ok(Self { plain, meso: None });
-        }
-        let bytes = size_of::<Parameters>();
-        let from = shaders::GATHER_FROM_RELIEF_COMP;
-        let to = shaders::GATHER_TO_RELIEF_COMP;
-        Ok(Self {
-            plain: make("gather from relief", from, FROM_RELIEF, bytes)?,
-            meso: Some(make("gather to relief", to, TO_RELIEF, bytes)?),
+        let make = |name, shader| ComputePipeline::in_subgroups(device, name, shader, &lanes);
+        Ok(match with_relief {
+            false => Self {
+                plain: make("gather", &gather::SHADER)?,
+                meso: None,
+            },
+            true => Self {
+                plain: make("gather from relief", &gather_from_relief::SHADER)?,
+                meso: Some(make("gather to relief", &gather_to_relief::SHADER)?),
+            },
         })
     }
 
@@ -149,39 +123,31 @@ impl Gather {
         list: &GatherList,
         relief: Option<&ReliefBuffers>,
     ) -> Result<Sets> {
-        let sets = |chunk: &Buffer| {
-            let light = |irradiance, error| {
-                let mut binds = vec![Bind::Texels(&list.lit)];
-                binds.extend([irradiance, error].map(Bind::Buffer));
-                binds.push(Bind::Texels(chunk));
-                if let Some(relief) = relief {
-                    binds.extend([&list.slots, &relief.exits].map(Bind::Buffer));
-                    binds.push(Bind::Texels(&scene.sources));
-                    binds.push(Bind::Buffer(&scene.balls));
-                }
-                binds
+        let sets = |words: &Buffer| {
+            let emitted = Bound {
+                list,
+                scene,
+                words,
+                irradiance: &state.direct,
+                irradiance_error: &state.direct_error,
             };
-            let plain = [
-                light(&state.direct, &state.direct_error),
-                light(&state.indirect, &state.indirect_error),
-            ];
+            let reflected = Bound {
+                irradiance: &state.indirect,
+                irradiance_error: &state.indirect_error,
+                ..emitted
+            };
             let meso = match (&self.meso, relief) {
-                (Some(pipeline), Some(relief)) => {
-                    let mut meso = plain.clone();
-                    let moments = [&relief.moments_direct, &relief.moments_indirect];
-                    for (binds, moments) in meso.iter_mut().zip(moments) {
-                        let receiving = [&relief.elements, &relief.albedos, moments];
-                        binds.extend(receiving.map(Bind::Buffer));
-                        binds.push(Bind::Buffer(&relief.reflected));
-                    }
-                    Some(both(pipeline, "gather to relief", &meso)?)
-                }
+                (Some(pipeline), Some(relief)) => Some([
+                    bind_meso(pipeline, &emitted, relief, &relief.moments_direct)?,
+                    bind_meso(pipeline, &reflected, relief, &relief.moments_indirect)?,
+                ]),
                 _ => None,
             };
-            Ok(ChunkSets {
-                plain: both(&self.plain, "gather", &plain)?,
-                meso,
-            })
+            let plain = [
+                bind_plain(&self.plain, &emitted, relief)?,
+                bind_plain(&self.plain, &reflected, relief)?,
+            ];
+            Ok(ChunkSets { plain, meso })
         };
         Ok(Sets(kept.chunks.iter().map(sets).collect::<Result<_>>()?))
     }
@@ -199,27 +165,22 @@ impl Gather {
         let slots = &of.slots;
         let set = &sets.0[of.chunk as usize].plain[part as usize];
         for first in slots.clone().step_by(MOST_SLOTS as usize) {
-            let parameters = Parameters {
+            let parameters = gather::Parameters {
                 first_element: 0,
                 element_count: shape.plain_count,
                 first_slot: first,
                 end_slot: slots.end.min(first + MOST_SLOTS),
                 first_block: 0,
                 reflected: (part == Part::Reflected).into(),
-                first_relief_source: 0,
-                relief_source_count: 0,
-                cells: [0, 0],
             };
-            let bytes = &bytemuck::bytes_of(&parameters)[..PLAIN_BYTES];
-            let push: [u8; PLAIN_BYTES] = bytes.try_into().expect("as many bytes");
             let size = [groups(shape.plain_count), 1, 1];
-            cmd.dispatch(&self.plain, set, &push, size);
+            cmd.dispatch(&self.plain, set, &parameters, size);
             cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         }
     }
 
-    /// As [`Self::record`] in a scene with relief, for [`ReliefBuffers::slots`] slots at most, of which
-    /// [`super::send_relief`] has found what they send by direction.
+    /// As [`Self::record`] in a scene with relief, for [`ReliefBuffers::slots`] slots at most, of
+    /// which [`super::send_relief`] has found what they send by direction.
     pub fn record_relief(
         &self,
         cmd: &Commands,
@@ -232,7 +193,8 @@ impl Gather {
         let shape = kept.shape;
         let slots = &of.slots;
         let sets = &sets.0[of.chunk as usize];
-        let plain = Parameters {
+        // Both shaders have the same.
+        let plain = gather_from_relief::Parameters {
             first_element: 0,
             element_count: shape.plain_count,
             first_slot: slots.start,
@@ -243,7 +205,7 @@ impl Gather {
             relief_source_count: relief.source_count,
             cells: relief.cells(),
         };
-        let meso = Parameters {
+        let meso = gather_from_relief::Parameters {
             first_element: shape.plain_count,
             element_count: shape.meso_count,
             first_block: shape.plain_blocks(),
@@ -262,14 +224,52 @@ impl Gather {
     }
 }
 
-/// For emitted and for reflected light.
-fn both(
+fn bind_plain(
     pipeline: &ComputePipeline,
-    name: &str,
-    binds: &[Vec<Bind<'_>>; 2],
-) -> Result<[DescriptorSet; 2]> {
-    Ok([
-        pipeline.bind(name, &binds[0])?,
-        pipeline.bind(name, &binds[1])?,
-    ])
+    on: &Bound<'_>,
+    relief: Option<&ReliefBuffers>,
+) -> Result<DescriptorSet> {
+    let Some(relief) = relief else {
+        let bindings = gather::Bindings {
+            lit_rows: &on.list.lit,
+            irradiance: on.irradiance,
+            irradiance_error: on.irradiance_error,
+            words: on.words,
+        };
+        return pipeline.bind("gather", &bindings);
+    };
+    let bindings = gather_from_relief::Bindings {
+        lit_rows: &on.list.lit,
+        irradiance: on.irradiance,
+        irradiance_error: on.irradiance_error,
+        words: on.words,
+        slots: &on.list.slots,
+        exits: &relief.exits,
+        sources: &on.scene.sources,
+        balls: &on.scene.balls,
+    };
+    pipeline.bind("gather from relief", &bindings)
+}
+
+fn bind_meso(
+    pipeline: &ComputePipeline,
+    on: &Bound<'_>,
+    relief: &ReliefBuffers,
+    moments: &Buffer,
+) -> Result<DescriptorSet> {
+    let bindings = gather_to_relief::Bindings {
+        lit_rows: &on.list.lit,
+        irradiance: on.irradiance,
+        irradiance_error: on.irradiance_error,
+        words: on.words,
+        slots: &on.list.slots,
+        exits: &relief.exits,
+        sources: &on.scene.sources,
+        balls: &on.scene.balls,
+        meso_elements: &relief.elements,
+        albedos: &relief.albedos,
+        moments,
+        meso_reflected: &relief.reflected,
+    };
+    pipeline.bind("gather to relief", &bindings)
 }

@@ -1,21 +1,21 @@
-//! Draws the hemicubes of a batch: five faces a source as element IDs. Shaders: `item_buffer.vert`, `.frag`; twin:
-//! [`crate::reference::item_buffer`].
+//! Draws the hemicubes of a batch: five faces a source as element IDs. Shaders: `item_buffer.vert`,
+//! `.frag`; twin: [`crate::reference::item_buffer`].
 
 use std::sync::Arc;
 
-use bytemuck::{Pod, Zeroable};
+use glam::Vec2;
 
 use super::batch::Batch;
 use super::buffers::SceneBuffers;
 use super::cull::Cull;
-use super::shaders;
+use super::shaders::item_buffer::{Bindings, Parameters, SHADER};
 use super::types::Draw;
 use crate::constants::{FACES, NONE};
 use crate::error::Result;
 use crate::math::hemicube::face_rectangle;
 use crate::vk::{
-    Attachment, Bind, Binding, Commands, DescriptorSet, Device, Format, GraphicsPipeline,
-    GraphicsState, RenderPass, Stage, VertexAttribute,
+    Attachment, Commands, DescriptorSet, Device, Format, GraphicsPipeline, GraphicsState,
+    RenderPass, Stage, VertexAttribute,
 };
 
 pub struct ItemBuffer {
@@ -31,15 +31,6 @@ pub struct Lists<'a> {
     pub set: &'a DescriptorSet,
 }
 
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct Parameters {
-    region: u32,
-    first_item: u32,
-    near: f32,
-    half_size: [f32; 2],
-}
-
 /// Distance of the near plane, internal units: nearer than any two surfaces that are not one.
 const NEAR: f32 = 1e-6;
 
@@ -52,10 +43,7 @@ impl ItemBuffer {
             &pass,
             &GraphicsState {
                 name: "item buffer",
-                vertex: shaders::ITEM_BUFFER_VERT,
-                fragment: shaders::ITEM_BUFFER_FRAG,
-                bindings: &[Binding::Storage; 2],
-                push_bytes: size_of::<Parameters>(),
+                shaders: &SHADER,
                 vertex_stride: 12,
                 attributes: &[VertexAttribute {
                     format: Format::R32G32B32_SFLOAT,
@@ -75,14 +63,15 @@ impl ItemBuffer {
         let hemicubes = batch.hemicubes();
         self.pipeline.bind(
             "item buffer",
-            &[
-                Bind::Buffer(&hemicubes.views),
-                Bind::Buffer(&hemicubes.drawn_items),
-            ],
+            &Bindings {
+                views: &hemicubes.views,
+                drawn_items: &hemicubes.drawn_items,
+            },
         )
     }
 
-    /// Culls and draws the hemicubes of a batch, in as many parts as their lists need. `listed` is recorded when the first are full.
+    /// Culls and draws the hemicubes of a batch, in as many parts as their lists need. `listed` is
+    /// recorded when the first are full.
     pub fn record(
         &self,
         cmd: &Commands,
@@ -131,7 +120,7 @@ impl ItemBuffer {
                         region,
                         first_item: region * hemicubes.room,
                         near: NEAR,
-                        half_size: [width as f32 / 2.0, height as f32 / 2.0],
+                        half_size: Vec2::new(width as f32, height as f32) / 2.0,
                     },
                 );
                 cmd.draw_indexed_indirect(

@@ -5,13 +5,11 @@ use std::sync::Arc;
 
 use super::fresh_rows::FreshRows;
 use super::kept_rows::KeptRows;
-use super::shaders;
+use super::shaders::{allocate, keep};
 use super::types::KeptRow;
 use crate::constants::KEEP_BLOCKS;
 use crate::error::Result;
-use crate::vk::{
-    Bind, Binding, Buffer, BufferUse, Commands, ComputePipeline, DescriptorSet, Device, Stage,
-};
+use crate::vk::{Buffer, BufferUse, Commands, ComputePipeline, DescriptorSet, Device, Stage};
 
 pub struct Keep {
     allocate: ComputePipeline,
@@ -29,18 +27,10 @@ pub struct Bound {
 
 impl Keep {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
-        let allocate = shaders::ALLOCATE_COMP;
+        let lanes = [device.limits().subgroup_size];
         Ok(Self {
-            allocate: ComputePipeline::storage(device, "allocate", allocate, 5, 4 * 6)?,
-            keep: ComputePipeline::new(
-                device,
-                "keep",
-                shaders::KEEP_COMP,
-                &[Binding::Storage; 5],
-                4 * 4,
-                &[device.limits().subgroup_size],
-                true,
-            )?,
+            allocate: ComputePipeline::new(device, "allocate", &allocate::SHADER)?,
+            keep: ComputePipeline::in_subgroups(device, "keep", &keep::SHADER, &lanes)?,
         })
     }
 
@@ -54,11 +44,23 @@ impl Keep {
     ) -> Result<Bound> {
         let bytes = u64::from(slot_count) * size_of::<KeptRow>() as u64;
         let rows = Buffer::new(device, "rows of a batch", bytes, BufferUse::Storage)?;
-        let allocate = [slots, &fresh.occupied, &rows, &kept.table, &kept.state];
-        let keep = [slots, &rows, &kept.table, &fresh.plain, &fresh.meso];
+        let allocate = allocate::Bindings {
+            slots,
+            occupied: &fresh.occupied,
+            rows: &rows,
+            chunks: &kept.table,
+            state: &kept.state,
+        };
+        let keep = keep::Bindings {
+            slots,
+            rows: &rows,
+            chunks: &kept.table,
+            fresh: &fresh.plain,
+            fresh_meso: &fresh.meso,
+        };
         Ok(Bound {
-            allocate: (self.allocate).bind("allocate", &allocate.map(Bind::Buffer))?,
-            keep: self.keep.bind("keep", &keep.map(Bind::Buffer))?,
+            allocate: self.allocate.bind("allocate", &allocate)?,
+            keep: self.keep.bind("keep", &keep)?,
             rows,
             slot_count,
         })
@@ -67,22 +69,22 @@ impl Keep {
     /// `scratch`: which of the [`super::kept_rows::SCRATCH`] chunks takes the rows without room.
     pub fn record(&self, cmd: &Commands, bound: &Bound, kept: &KeptRows, scratch: u32) {
         let shape = kept.shape;
-        let allocate = [
-            bound.slot_count,
-            shape.blocks(),
-            shape.meso_blocks(),
-            kept.chunk_count(),
-            kept.chunk_words,
-            kept.chunk_count() + scratch,
-        ];
+        let allocate = allocate::Parameters {
+            slot_count: bound.slot_count,
+            block_count: shape.blocks(),
+            meso_blocks: shape.meso_blocks(),
+            chunk_count: kept.chunk_count(),
+            chunk_words: kept.chunk_words,
+            scratch_chunk: kept.chunk_count() + scratch,
+        };
         cmd.dispatch(&self.allocate, &bound.allocate, &allocate, [1, 1, 1]);
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-        let keep = [
-            shape.plain_count,
-            shape.plain_blocks(),
-            shape.meso_count,
-            shape.blocks(),
-        ];
+        let keep = keep::Parameters {
+            plain_count: shape.plain_count,
+            plain_blocks: shape.plain_blocks(),
+            meso_count: shape.meso_count,
+            block_count: shape.blocks(),
+        };
         let size = [shape.blocks().div_ceil(KEEP_BLOCKS), bound.slot_count, 1];
         cmd.dispatch(&self.keep, &bound.keep, &keep, size);
     }

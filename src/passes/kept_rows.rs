@@ -47,8 +47,8 @@ pub struct RestoredSize {
 }
 
 impl KeptRows {
-    /// Room for the rows of all sources, in `size.memory` bytes at most. A device that has less keeps
-    /// fewer. Chunks that are to be restored are made whatever the memory.
+    /// Room for the rows of all sources, in `size.memory` bytes at most. A device that has less
+    /// keeps fewer. Chunks that are to be restored are made whatever the memory.
     ///
     /// # Errors
     /// A device without the memory for the rows of a batch, or for those that are to be restored.

@@ -1,11 +1,13 @@
-//! Radiosity that every source reflects. Shader: `measure.comp`; twin: [`crate::reference::measure`].
+//! Radiosity that every source reflects. Shader: `measure.comp`; twin:
+//! [`crate::reference::measure`].
 
 use std::sync::Arc;
 
 use super::buffers::{SceneBuffers, State};
-use super::{groups, shaders};
+use super::groups;
+use super::shaders::measure::{Bindings, Parameters, SHADER};
 use crate::error::Result;
-use crate::vk::{Bind, Commands, ComputePipeline, DescriptorSet, Device};
+use crate::vk::{Commands, ComputePipeline, DescriptorSet, Device};
 
 pub struct Measure {
     pipeline: ComputePipeline,
@@ -14,22 +16,21 @@ pub struct Measure {
 impl Measure {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
         Ok(Self {
-            pipeline: ComputePipeline::storage(device, "measure", shaders::MEASURE_COMP, 6, 4)?,
+            pipeline: ComputePipeline::new(device, "measure", &SHADER)?,
         })
     }
 
     pub fn bind(&self, scene: &SceneBuffers, state: &State) -> Result<DescriptorSet> {
         self.pipeline.bind(
             "measure",
-            &[
-                &scene.sources,
-                &scene.reflectance,
-                &scene.areas,
-                &state.direct,
-                &state.indirect,
-                &state.reflected,
-            ]
-            .map(Bind::Buffer),
+            &Bindings {
+                sources: &scene.sources,
+                reflectance: &scene.reflectance,
+                element_area: &scene.areas,
+                direct: &state.direct,
+                indirect: &state.indirect,
+                source_reflected: &state.reflected,
+            },
         )
     }
 
@@ -37,7 +38,7 @@ impl Measure {
         cmd.dispatch(
             &self.pipeline,
             set,
-            &source_count,
+            &Parameters { source_count },
             [groups(source_count), 1, 1],
         );
     }

@@ -1,13 +1,15 @@
-//! Radiosity that the sources with a relief reflect, after [`super::measure`]. Shader: `measure_relief.comp`; its twin is
-//! [`crate::reference::measure`] with the reflected light for reflectance times irradiance.
+//! Radiosity that the sources with a relief reflect, after [`super::measure`]. Shader:
+//! `measure_relief.comp`; its twin is [`crate::reference::measure`] with the reflected light in
+//! place of reflectance times irradiance.
 
 use std::sync::Arc;
 
 use super::buffers::{SceneBuffers, State};
+use super::groups;
 use super::relief_buffers::ReliefBuffers;
-use super::{groups, shaders};
+use super::shaders::measure_relief::{Bindings, Parameters, SHADER};
 use crate::error::Result;
-use crate::vk::{Bind, Commands, ComputePipeline, DescriptorSet, Device};
+use crate::vk::{Commands, ComputePipeline, DescriptorSet, Device};
 
 pub struct MeasureRelief {
     pipeline: ComputePipeline,
@@ -16,13 +18,7 @@ pub struct MeasureRelief {
 impl MeasureRelief {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
         Ok(Self {
-            pipeline: ComputePipeline::storage(
-                device,
-                "measure relief",
-                shaders::MEASURE_RELIEF_COMP,
-                4,
-                12,
-            )?,
+            pipeline: ComputePipeline::new(device, "measure relief", &SHADER)?,
         })
     }
 
@@ -34,22 +30,21 @@ impl MeasureRelief {
     ) -> Result<DescriptorSet> {
         self.pipeline.bind(
             "measure relief",
-            &[
-                &scene.sources,
-                &scene.areas,
-                &relief.reflected,
-                &state.reflected,
-            ]
-            .map(Bind::Buffer),
+            &Bindings {
+                sources: &scene.sources,
+                element_area: &scene.areas,
+                meso_reflected: &relief.reflected,
+                source_reflected: &state.reflected,
+            },
         )
     }
 
     pub fn record(&self, cmd: &Commands, set: &DescriptorSet, relief: &ReliefBuffers) {
-        let parameters = [
-            relief.first_source,
-            relief.source_count,
-            relief.first_element,
-        ];
+        let parameters = Parameters {
+            first_source: relief.first_source,
+            source_count: relief.source_count,
+            first_element: relief.first_element,
+        };
         cmd.dispatch(
             &self.pipeline,
             set,

@@ -1,5 +1,5 @@
-//! GPU passes: one a file, named as its shader and as its CPU twin in [`crate::reference`]. Passes know `vk` and mathematics,
-//! never each other; only the solver orders them.
+//! GPU passes: one a file, named as its shader and as its CPU twin in [`crate::reference`]. Passes
+//! know `vk` and mathematics, never each other; only the solver orders them.
 
 pub mod batch;
 pub mod bin_pixels;
@@ -29,8 +29,19 @@ pub mod types;
 
 use crate::constants::GROUP;
 
-/// Compiled shaders, one constant a file.
+/// The shaders, each in a module with its words, its bindings and its push constants by name,
+/// which the build writes from the GLSL.
 pub mod shaders {
+    use crate::vk::Interface;
+
+    /// One module, to be checked against the SPIR-V.
+    pub struct Compiled {
+        pub name: &'static str,
+        /// A compute shader, or a fragment and a vertex shader.
+        pub stages: &'static [&'static [u32]],
+        pub interface: Interface,
+    }
+
     include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 }
 

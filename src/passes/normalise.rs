@@ -1,14 +1,14 @@
-//! Scales form factors so that all that a source sends in an enclosed scene arrives. Shader: `normalise.comp`; twin:
-//! [`crate::reference::normalise`].
+//! Scales form factors so that all that a source sends in an enclosed scene arrives. Shader:
+//! `normalise.comp`; twin: [`crate::reference::normalise`].
 
 use std::sync::Arc;
 
 use super::batch::Batch;
 use super::buffers::SceneBuffers;
 use super::fresh_rows::FreshRows;
-use super::shaders;
+use super::shaders::normalise::{Bindings, Parameters, SHADER};
 use crate::error::Result;
-use crate::vk::{Bind, Commands, ComputePipeline, DescriptorSet, Device};
+use crate::vk::{Commands, ComputePipeline, DescriptorSet, Device};
 
 pub struct Normalise {
     pipeline: ComputePipeline,
@@ -17,7 +17,7 @@ pub struct Normalise {
 impl Normalise {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
         Ok(Self {
-            pipeline: ComputePipeline::storage(device, "normalise", shaders::NORMALISE_COMP, 5, 8)?,
+            pipeline: ComputePipeline::new(device, "normalise", &SHADER)?,
         })
     }
 
@@ -29,19 +29,22 @@ impl Normalise {
     ) -> Result<DescriptorSet> {
         self.pipeline.bind(
             "normalise",
-            &[
-                &batch.slots,
-                &scene.sources,
-                &scene.areas,
-                &rows.plain,
-                &rows.meso,
-            ]
-            .map(Bind::Buffer),
+            &Bindings {
+                slots: &batch.slots,
+                sources: &scene.sources,
+                element_area: &scene.areas,
+                fresh: &rows.plain,
+                fresh_meso: &rows.meso,
+            },
         )
     }
 
     pub fn record(&self, cmd: &Commands, set: &DescriptorSet, batch: &Batch, rows: &FreshRows) {
-        let counts = [rows.shape.plain_count, rows.shape.meso_count];
-        cmd.dispatch(&self.pipeline, set, &counts, [batch.slot_count, 1, 1]);
+        let parameters = Parameters {
+            plain_count: rows.shape.plain_count,
+            meso_count: rows.shape.meso_count,
+        };
+        let size = [batch.slot_count, 1, 1];
+        cmd.dispatch(&self.pipeline, set, &parameters, size);
     }
 }

@@ -1,5 +1,5 @@
-//! What hides places from strong emitters, as a tree of boxes that subgroups walk. Shader: `shared/shadow_packets.glsl`; twin:
-//! [`crate::reference::occluder_rays`].
+//! What hides places from strong emitters, as a tree of boxes that subgroups walk. Shader:
+//! `shared/shadow_packets.glsl`; twin: [`crate::reference::occluder_rays`].
 
 use std::sync::Arc;
 

@@ -1,19 +1,17 @@
-//! The `pixel` estimator in a scene with relief: what a source sends by direction arrives pixel by pixel, the paper's equations
-//! (2) to (4). Shaders: `pixels_from_relief.comp`, `pixels_to_relief.comp`; twin: [`crate::reference::pixels_relief`].
+//! The `pixel` estimator in a scene with relief: what a source sends by direction arrives pixel by
+//! pixel, the paper's equations (2) to (4). Shaders: `pixels_from_relief.comp`,
+//! `pixels_to_relief.comp`; twin: [`crate::reference::pixels_relief`].
 
 use std::sync::Arc;
 
-use bytemuck::{Pod, Zeroable};
-
 use super::batch::Batch;
 use super::buffers::{SceneBuffers, State, upload};
+use super::groups;
 use super::relief_buffers::ReliefBuffers;
-use super::{groups, shaders};
+use super::shaders::{pixels_from_relief, pixels_to_relief};
 use crate::error::Result;
 use crate::math::hemicube::pixel_form_factors;
-use crate::vk::{
-    Bind, Binding, BufferUse, Commands, ComputePipeline, DescriptorSet, Device, Stage,
-};
+use crate::vk::{BufferUse, Commands, ComputePipeline, DescriptorSet, Device, Stage};
 
 /// First the elements without relief, then those with one.
 pub struct PixelsRelief {
@@ -27,42 +25,16 @@ pub struct Bound {
     to: DescriptorSet,
 }
 
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct Parameters {
-    first_element: u32,
-    element_count: u32,
-    slot: u32,
-    face_size: u32,
-    first_source: u32,
-    source_count: u32,
-    cells: [u32; 2],
-    by_pixel: u32,
-    first_row: u32,
-    end_row: u32,
-}
-
-/// Pixels that one invocation may look at: half of the turns after which lavapipe ends a shader's loops without a word.
+/// Pixels that one invocation may look at: half of the turns after which lavapipe ends a shader's
+/// loops without a word.
 const MOST_PIXELS: u32 = 1 << 15;
-
-/// Place of the item buffer among the bindings; buffers of the relief follow it.
-const ITEMS: usize = 12;
 
 impl PixelsRelief {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
-        let make = |name, spirv, bindings| {
-            let mut kinds = vec![Binding::Storage; bindings];
-            kinds[ITEMS] = Binding::Sampled;
-            let push = size_of::<Parameters>();
-            ComputePipeline::new(device, name, spirv, &kinds, push, &[], false)
-        };
-        let (from, to) = (
-            shaders::PIXELS_FROM_RELIEF_COMP,
-            shaders::PIXELS_TO_RELIEF_COMP,
-        );
+        let (from, to) = (&pixels_from_relief::SHADER, &pixels_to_relief::SHADER);
         Ok(Self {
-            from: make("pixels from relief", from, ITEMS + 1)?,
-            to: make("pixels to relief", to, ITEMS + 10)?,
+            from: ComputePipeline::new(device, "pixels from relief", from)?,
+            to: ComputePipeline::new(device, "pixels to relief", to)?,
         })
     }
 
@@ -77,43 +49,53 @@ impl PixelsRelief {
         let hemicubes = batch.hemicubes();
         let table = pixel_form_factors(hemicubes.face_size);
         let deltas = upload(device, "pixel form factors", &table, BufferUse::Storage)?;
-        let mut binds: Vec<Bind<'_>> = [
-            &batch.slots,
-            &scene.sources,
-            &scene.corners,
-            &scene.vertices,
-            &scene.planes,
-            &scene.areas,
-            &deltas,
-            &state.direct,
-            &state.direct_error,
-            &state.indirect,
-            &state.indirect_error,
-            &relief.exits,
-        ]
-        .map(Bind::Buffer)
-        .to_vec();
-        binds.push(Bind::Image(&hemicubes.items, &hemicubes.sampler));
-        let from = self.from.bind("pixels from relief", &binds)?;
-        binds.extend(
-            [
-                &relief.elements,
-                &relief.albedos,
-                &relief.moments_direct,
-                &relief.moments_indirect,
-                &relief.reflected,
-                &relief.shares,
-                &relief.texels,
-                &relief.facets,
-                &relief.outgoing,
-            ]
-            .map(Bind::Buffer),
-        );
-        let to = self.to.bind("pixels to relief", &binds)?;
-        Ok(Bound { from, to })
+        let from = pixels_from_relief::Bindings {
+            slots: &batch.slots,
+            sources: &scene.sources,
+            corners: &scene.corners,
+            vertices: &scene.vertices,
+            planes: &scene.planes,
+            element_area: &scene.areas,
+            deltas: &deltas,
+            direct: &state.direct,
+            direct_error: &state.direct_error,
+            indirect: &state.indirect,
+            indirect_error: &state.indirect_error,
+            exits: &relief.exits,
+            items: hemicubes.sampled_items(),
+        };
+        let to = pixels_to_relief::Bindings {
+            slots: from.slots,
+            sources: from.sources,
+            corners: from.corners,
+            vertices: from.vertices,
+            planes: from.planes,
+            element_area: from.element_area,
+            deltas: from.deltas,
+            direct: from.direct,
+            direct_error: from.direct_error,
+            indirect: from.indirect,
+            indirect_error: from.indirect_error,
+            exits: from.exits,
+            items: from.items,
+            meso_elements: &relief.elements,
+            albedos: &relief.albedos,
+            moments_direct: &relief.moments_direct,
+            moments_indirect: &relief.moments_indirect,
+            meso_reflected: &relief.reflected,
+            shares: &relief.shares,
+            meso_texels: &relief.texels,
+            texture_facets: &relief.facets,
+            outgoing: &relief.outgoing,
+        };
+        Ok(Bound {
+            from: self.from.bind("pixels from relief", &from)?,
+            to: self.to.bind("pixels to relief", &to)?,
+        })
     }
 
-    /// Slot after slot, some rows at a time; elements without relief and those with one are different elements.
+    /// Slot after slot, some rows at a time; elements without relief and those with one are
+    /// different elements.
     pub fn record(&self, cmd: &Commands, bound: &Bound, relief: &ReliefBuffers, batch: &Batch) {
         let hemicubes = batch.hemicubes();
         let rows = 3 * hemicubes.face_size;
@@ -129,13 +111,14 @@ impl PixelsRelief {
                         relief.element_count,
                     ),
                 ] {
-                    let parameters = Parameters {
+                    // Both shaders have the same.
+                    let parameters = pixels_from_relief::Parameters {
                         first_element,
                         element_count,
                         slot,
                         face_size: hemicubes.face_size,
-                        first_source: relief.first_source,
-                        source_count: relief.source_count,
+                        first_relief_source: relief.first_source,
+                        relief_source_count: relief.source_count,
                         cells: relief.cells(),
                         by_pixel: u32::from(relief.by_pixel),
                         first_row,

@@ -1,4 +1,5 @@
-//! Bounds of neighbouring elements, by which `sort_receivers.comp` passes over those that see nothing of a source as a whole.
+//! Bounds of neighbouring elements, by which `sort_receivers.comp` passes over those that see
+//! nothing of a source as a whole.
 
 use std::ops::Range;
 

@@ -1,6 +1,6 @@
-//! Draws triangles with relief by following each pixel's ray through the prism over the triangle. Shaders: `relief.vert`,
-//! `relief.frag`, `shared/height_march.glsl`, whose twin is [`crate::reference::relief_rays`]; what is shaded is
-//! compared with [`crate::path_tracer`].
+//! Draws triangles with relief by following each pixel's ray through the prism over the triangle.
+//! Shaders: `relief.vert`, `relief.frag`, `shared/height_march.glsl`, whose twin is
+//! [`crate::reference::relief_rays`]; what is shaded is compared with [`crate::path_tracer`].
 
 use std::sync::Arc;
 
@@ -9,13 +9,13 @@ use glam::{Vec3, Vec4};
 
 use super::buffers::upload;
 use super::shade::Shade;
-use super::shaders;
+use super::shaders::relief::{Bindings, SHADER};
 use super::shadow_rays::LightBuffers;
 use super::types::{HeightTile, ParallelLight, Prism, ReliefSurface};
 use crate::error::Result;
 use crate::vk::{
-    Bind, Binding, Buffer, BufferUse, Commands, DescriptorSet, Device, Format, GraphicsPipeline,
-    GraphicsState, Image, Sampler, VertexAttribute,
+    Buffer, BufferUse, Commands, DescriptorSet, Device, Format, GraphicsPipeline, GraphicsState,
+    Image, Sampled, Sampler, VertexAttribute,
 };
 
 /// One corner of a prism.
@@ -27,20 +27,10 @@ pub struct Vertex {
     pub prism: u32,
 }
 
-/// Push constants of one draw.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub struct Parameters {
-    /// As in [`super::shade::Parameters`].
-    pub shade: super::shade::Parameters,
-    /// SHADING_… and VIEW_… of [`crate::constants`].
-    pub shading: u32,
-    pub view: u32,
-    /// Angle of a sample, radians.
-    pub pixel: f32,
-    /// Columns and rows of the directions.
-    pub cells: [u32; 2],
-}
+/// Push constants of one draw: first those of [`super::shade::Parameters`]; `shading` and `view`
+/// are SHADING_… and VIEW_… of [`crate::constants`], `pixel` is the angle of a sample in radians,
+/// and `cells` are the columns and rows of the directions.
+pub use super::shaders::relief::Parameters;
 
 /// What a picture's relief is made of, `[prism]` and `[surface]`.
 pub struct Parts<'a> {
@@ -50,7 +40,8 @@ pub struct Parts<'a> {
     pub pyramids: &'a [f32],
     /// `[surface][cell][corner][rank]`
     pub factors: &'a [Vec4],
-    /// β of the light that goes on inside the relief and of that which arrives by slots, `[light vertex][MOST_RANK]`.
+    /// β of the light that goes on inside the relief and of that which arrives by slots,
+    /// `[light vertex][MOST_RANK]`.
     pub coefficients: &'a [[Vec3; 2]],
     /// `[light vertex][direction]`
     pub exits: &'a [Vec3],
@@ -60,7 +51,14 @@ pub struct Parts<'a> {
 
 /// [`Parts`] on the device.
 pub struct Buffers {
-    parts: [Buffer; 8],
+    prisms: Buffer,
+    surfaces: Buffer,
+    tiles: Buffer,
+    pyramids: Buffer,
+    factors: Buffer,
+    coefficients: Buffer,
+    exits: Buffer,
+    parallel_lights: Buffer,
     vertices: Buffer,
     indices: Buffer,
 }
@@ -78,8 +76,9 @@ pub struct Relief {
 }
 
 const CORNERS: u32 = 6;
-/// Triangles of a prism's hull, outward where a, b, c turn to the left seen from above: 0 to 2 are the low a, b, c and 3
-/// to 5 the high ones. A side is cut from its lower corner's low to its higher corner's high end.
+/// Triangles of a prism's hull, outward where a, b, c turn to the left seen from above: 0 to 2 are
+/// the low a, b, c and 3 to 5 the high ones. A side is cut from its lower corner's low to its
+/// higher corner's high end.
 const HULL: [u32; 24] = [
     0, 2, 1, 3, 4, 5, // caps
     0, 1, 4, 0, 4, 3, // a to b
@@ -88,24 +87,20 @@ const HULL: [u32; 24] = [
 ];
 
 impl Relief {
-    /// Draws into the targets of `shade`; with `counts`, for VIEW_OVERDRAW alone, sums over all fragments, hidden or not.
+    /// Draws into the targets of `shade`; with `counts`, for VIEW_OVERDRAW alone, sums over all
+    /// fragments, hidden or not.
     pub fn new(device: &Arc<Device>, shade: &Shade, counts: bool) -> Result<Self> {
         let attribute = |format, offset: usize| VertexAttribute {
             format,
             offset: offset as u32,
         };
-        let mut bindings = [Binding::Storage; 12];
-        bindings[0] = Binding::Sampled;
         Ok(Self {
             pipeline: GraphicsPipeline::new(
                 device,
                 shade.pass(),
                 &GraphicsState {
                     name: "relief",
-                    vertex: shaders::RELIEF_VERT,
-                    fragment: shaders::RELIEF_FRAG,
-                    bindings: &bindings,
-                    push_bytes: size_of::<Parameters>(),
+                    shaders: &SHADER,
                     vertex_stride: size_of::<Vertex>() as u32,
                     attributes: &[
                         attribute(
@@ -127,24 +122,25 @@ impl Relief {
         buffers: &Buffers,
         lights: &LightBuffers,
     ) -> Result<DescriptorSet> {
-        let [a, b, c, d, e, f, g, clusters] = &buffers.parts;
-        let buffer = Bind::Buffer;
         self.pipeline.bind(
             "relief",
-            &[
-                Bind::Image(albedo, sampler),
-                buffer(a),
-                buffer(b),
-                buffer(c),
-                buffer(d),
-                buffer(e),
-                buffer(f),
-                buffer(g),
-                buffer(&lights.points),
-                buffer(&lights.nodes),
-                buffer(&lights.triangles),
-                buffer(clusters),
-            ],
+            &Bindings {
+                albedo: Sampled {
+                    image: albedo,
+                    sampler,
+                },
+                prisms: &buffers.prisms,
+                surfaces: &buffers.surfaces,
+                tiles: &buffers.tiles,
+                pyramid: &buffers.pyramids,
+                factors: &buffers.factors,
+                coefficients: &buffers.coefficients,
+                exits: &buffers.exits,
+                light_points: &lights.points,
+                shadow_nodes: &lights.nodes,
+                shadow_triangles: &lights.triangles,
+                parallel_lights: &buffers.parallel_lights,
+            },
         )
     }
 
@@ -166,7 +162,7 @@ impl Relief {
 }
 
 impl Buffers {
-    /// `mirrored` tells of each prism whether its a, b, c turn to the right seen from above.
+    /// `mirrored`: whether a, b, c of a prism turn to the right seen from above, `[prism]`.
     pub fn new(device: &Arc<Device>, parts: &Parts<'_>, mirrored: &[bool]) -> Result<Self> {
         let vertices: Vec<Vertex> = (0..)
             .zip(parts.prisms)
@@ -187,16 +183,14 @@ impl Buffers {
             .collect();
         let storage = BufferUse::Storage;
         Ok(Self {
-            parts: [
-                upload(device, "relief prisms", parts.prisms, storage)?,
-                upload(device, "relief surfaces", parts.surfaces, storage)?,
-                upload(device, "relief tiles", parts.tiles, storage)?,
-                upload(device, "relief pyramids", parts.pyramids, storage)?,
-                upload(device, "relief factors", parts.factors, storage)?,
-                upload(device, "relief coefficients", parts.coefficients, storage)?,
-                upload(device, "relief exits", parts.exits, storage)?,
-                upload(device, "relief clusters", parts.parallel_lights, storage)?,
-            ],
+            prisms: upload(device, "relief prisms", parts.prisms, storage)?,
+            surfaces: upload(device, "relief surfaces", parts.surfaces, storage)?,
+            tiles: upload(device, "relief tiles", parts.tiles, storage)?,
+            pyramids: upload(device, "relief pyramids", parts.pyramids, storage)?,
+            factors: upload(device, "relief factors", parts.factors, storage)?,
+            coefficients: upload(device, "relief coefficients", parts.coefficients, storage)?,
+            exits: upload(device, "relief exits", parts.exits, storage)?,
+            parallel_lights: upload(device, "relief clusters", parts.parallel_lights, storage)?,
             vertices: upload(device, "relief vertices", &vertices, BufferUse::Geometry)?,
             indices: upload(device, "relief indices", &indices, BufferUse::Geometry)?,
         })

@@ -5,14 +5,14 @@ use std::sync::Arc;
 use bytemuck::Zeroable;
 use glam::Vec3;
 
-use super::buffers::upload;
+use super::buffers::{filled, upload};
 use super::types::{MesoElement, Reflected};
 use crate::error::{Error, Result};
 use crate::math::directions::Directions;
 use crate::mesh::elements::Elements;
 use crate::mesh::sources::Sources;
 use crate::meso::{Relief, slot_shares};
-use crate::vk::{Buffer, BufferUse, Commands, Device};
+use crate::vk::{Buffer, BufferUse, Device};
 
 /// The elements with a relief, in their order.
 pub fn meso_elements(elements: &Elements, relief: &Relief) -> Vec<MesoElement> {
@@ -26,7 +26,8 @@ pub fn meso_elements(elements: &Elements, relief: &Relief) -> Vec<MesoElement> {
         .collect()
 }
 
-/// Elements and sources with a relief are the last of their kinds (point lights aside), so that ranges tell them.
+/// Elements and sources with a relief are the last of their kinds, point lights aside: each is a
+/// contiguous range.
 pub struct ReliefBuffers {
     pub directions: Directions,
     pub first_element: u32,
@@ -65,13 +66,14 @@ pub struct ReliefBuffers {
     pub outgoing: Buffer,
 }
 
-/// Memory for what the members of sources send, and the most sources of a dispatch: a software device
-/// ends a shader's loops after 65,535 turns of all together.
+/// Memory for what the members of sources send, and the most sources of a dispatch: a software
+/// device ends a shader's loops after 65,535 turns of all together.
 const SENDING_BYTES: u64 = 32 << 20;
 const MOST_SENDING: u64 = 256;
 
 impl ReliefBuffers {
-    /// `by_pixel_slots`: slots of a batch of the `pixel` estimator. `by_pixel`: whether each pixel reflects by its own normal and albedo, as `pixel` estimator and `paper` transport do.
+    /// `by_pixel_slots`: slots of a batch of the `pixel` estimator. `by_pixel`: whether each pixel
+    /// reflects by its own normal and albedo, as with the `pixel` estimator and `paper` transport.
     ///
     /// # Errors
     /// More directional state than a buffer of the device may hold.
@@ -87,60 +89,28 @@ impl ReliefBuffers {
         let first_element = elements.len() - relief.count();
         let meso = first_element..elements.len();
         let moment_bytes = 36 * k * meso.len() as u64;
-        let most = device.limits().max_storage_buffer_range;
-        if moment_bytes > most {
-            return Err(Error::Device(format!(
-                "device {}: {} elements with relief and {k} directions need a buffer of {} MiB, and {} MiB is the most: use fewer --directions or patches",
-                device.name(),
-                meso.len(),
-                moment_bytes >> 20,
-                most >> 20
-            )));
-        }
+        check_room(device, meso.len(), k, moment_bytes)?;
         let of_relief = sources.relief.clone();
-        let most_members = sources.list[of_relief.clone()]
-            .iter()
-            .map(|s| s.element_count)
-            .max()
-            .unwrap_or(1);
-        let batch_slots = match by_pixel_slots {
-            Some(slots) => slots,
-            None => {
-                let slot = 12 * k * u64::from(most_members);
-                (SENDING_BYTES / slot).clamp(1, MOST_SENDING) as u32
-            }
+        let members = sources.list[of_relief.clone()].iter();
+        let most_members = members.map(|s| s.element_count).max().unwrap_or(1);
+        let sending = || {
+            let slot = 12 * k * u64::from(most_members);
+            (SENDING_BYTES / slot).clamp(1, MOST_SENDING) as u32
         };
+        let batch_slots = by_pixel_slots.unwrap_or_else(sending);
         let gpu_elements = meso_elements(elements, relief);
         let (texels, facets) = match &relief.texels {
             Some(on) if by_pixel => (on.elements[meso.clone()].to_vec(), on.facets.clone()),
+            // No buffer is empty: a shader that does not read one binds it all the same.
             _ => (vec![Zeroable::zeroed()], vec![Zeroable::zeroed()]),
         };
-        let responses = || relief.responses.iter();
-        let matrices: Vec<Vec3> = responses()
-            .flat_map(|r| r.matrix.iter().flatten())
-            .copied()
-            .collect();
-        let albedos: Vec<Vec3> = responses()
-            .flat_map(|r| r.albedo.iter().flatten())
-            .copied()
-            .collect();
-        let emissions: Vec<Vec3> = responses()
-            .flat_map(|r| r.emission.iter().map(|h| *h / r.mean_emission))
-            .collect();
-        let shares: Vec<f32> = slot_shares(&relief.directions)
-            .iter()
-            .map(|&s| s as f32)
-            .collect();
-        let storage = |name, bytes| Buffer::new(device, name, bytes, BufferUse::Storage);
-        let zeroed = |name, bytes| -> Result<Buffer> {
-            let buffer = storage(name, bytes)?;
-            Commands::run(device, name, |cmd| {
-                cmd.fill(&buffer, 0);
-                Ok(())
-            })?;
-            Ok(buffer)
-        };
+        let responses = Responses::new(relief);
+        let shares = slot_shares(&relief.directions);
+        let shares: Vec<f32> = shares.iter().map(|&s| s as f32).collect();
+        let uses = BufferUse::Storage;
+        let zeroed = |name, bytes| filled(device, name, bytes, 0);
         let slots = u64::from(batch_slots);
+        let reflected_bytes = (size_of::<Reflected>() * meso.len()) as u64;
         Ok(Self {
             directions: relief.directions,
             first_element: first_element as u32,
@@ -149,25 +119,26 @@ impl ReliefBuffers {
             source_count: of_relief.len() as u32,
             most_members,
             slots: batch_slots,
-            elements: upload(device, "meso elements", &gpu_elements, BufferUse::Storage)?,
-            matrices: upload(device, "relief matrices", &matrices, BufferUse::Storage)?,
-            albedos: upload(device, "relief albedos", &albedos, BufferUse::Storage)?,
-            emissions: upload(device, "relief emissions", &emissions, BufferUse::Storage)?,
-            shares: upload(device, "direction shares", &shares, BufferUse::Storage)?,
+            elements: upload(device, "meso elements", &gpu_elements, uses)?,
+            matrices: upload(device, "relief matrices", &responses.matrices, uses)?,
+            albedos: upload(device, "relief albedos", &responses.albedos, uses)?,
+            emissions: upload(device, "relief emissions", &responses.emissions, uses)?,
+            shares: upload(device, "direction shares", &shares, uses)?,
             moments_direct: zeroed("moments direct", moment_bytes)?,
             moments_indirect: zeroed("moments indirect", moment_bytes)?,
-            reflected: zeroed(
-                "meso reflected",
-                (size_of::<Reflected>() * meso.len()) as u64,
-            )?,
+            reflected: zeroed("meso reflected", reflected_bytes)?,
             shot_exits: zeroed("shot exits", 12 * k * of_relief.len() as u64)?,
-            member_exits: storage("member exits", 12 * k * slots * u64::from(most_members))?,
-            exits: storage("exits", 24 * k * slots)?,
+            member_exits: Buffer::new(
+                device,
+                "member exits",
+                12 * k * slots * u64::from(most_members),
+                uses,
+            )?,
+            exits: Buffer::new(device, "exits", 24 * k * slots, uses)?,
             dark_slots: zeroed("dark slots", 4 * of_relief.len() as u64)?,
             by_pixel,
-            // No buffer is empty: a shader that does not read one binds it all the same.
-            texels: upload(device, "meso texels", &texels, BufferUse::Storage)?,
-            facets: upload(device, "texture facets", &facets, BufferUse::Storage)?,
+            texels: upload(device, "meso texels", &texels, uses)?,
+            facets: upload(device, "texture facets", &facets, uses)?,
             outgoing: zeroed(
                 "outgoing",
                 12 * if by_pixel { k * meso.len() as u64 } else { 1 },
@@ -178,5 +149,46 @@ impl ReliefBuffers {
     /// Columns and rows of the directions' square.
     pub fn cells(&self) -> [u32; 2] {
         [self.directions.columns, self.directions.rows]
+    }
+}
+
+/// Refuses moments that no buffer of the device holds.
+fn check_room(device: &Device, elements: usize, directions: u64, bytes: u64) -> Result<()> {
+    let most = device.limits().max_storage_buffer_range;
+    if bytes <= most {
+        return Ok(());
+    }
+    Err(Error::Device(format!(
+        "device {}: {elements} elements with relief and {directions} directions need a buffer of \
+         {} MiB, and {} MiB is the most: use fewer --directions or patches",
+        device.name(),
+        bytes >> 20,
+        most >> 20
+    )))
+}
+
+/// All responses, one after another; see [`ReliefBuffers`].
+struct Responses {
+    matrices: Vec<Vec3>,
+    albedos: Vec<Vec3>,
+    emissions: Vec<Vec3>,
+}
+
+impl Responses {
+    fn new(relief: &Relief) -> Self {
+        let responses = || relief.responses.iter();
+        Self {
+            matrices: responses()
+                .flat_map(|r| r.matrix.iter().flatten())
+                .copied()
+                .collect(),
+            albedos: responses()
+                .flat_map(|r| r.albedo.iter().flatten())
+                .copied()
+                .collect(),
+            emissions: responses()
+                .flat_map(|r| r.emission.iter().map(|h| *h / r.mean_emission))
+                .collect(),
+        }
     }
 }

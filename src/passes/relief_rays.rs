@@ -2,24 +2,16 @@
 
 use std::sync::Arc;
 
-use bytemuck::{Pod, Zeroable};
-
 use super::buffers::{download, upload};
+use super::groups;
+use super::shaders::relief_rays::{Bindings, Parameters, SHADER};
 use super::types::{HeightHit, HeightRay, HeightTile};
-use super::{groups, shaders};
 use crate::error::Result;
-use crate::vk::{Bind, Buffer, BufferUse, Commands, ComputePipeline, Device};
+use crate::vk::{Buffer, BufferUse, Commands, ComputePipeline, Device};
 
 pub struct ReliefRays {
     pipeline: ComputePipeline,
     device: Arc<Device>,
-}
-
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct Parameters {
-    first: u32,
-    count: u32,
 }
 
 /// Segments marched in a submission: far from any driver's time limit.
@@ -28,13 +20,7 @@ const SUBMISSION: u32 = 1 << 18;
 impl ReliefRays {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
         Ok(Self {
-            pipeline: ComputePipeline::storage(
-                device,
-                "relief rays",
-                shaders::RELIEF_RAYS_COMP,
-                4,
-                size_of::<Parameters>(),
-            )?,
+            pipeline: ComputePipeline::new(device, "relief rays", &SHADER)?,
             device: Arc::clone(device),
         })
     }
@@ -59,7 +45,12 @@ impl ReliefRays {
         let hits = Buffer::new(&self.device, "height hits", bytes, BufferUse::Storage)?;
         let set = self.pipeline.bind(
             "relief rays",
-            &[&tiles, &pyramids, &rays, &hits].map(Bind::Buffer),
+            &Bindings {
+                tiles: &tiles,
+                pyramid: &pyramids,
+                rays: &rays,
+                hits: &hits,
+            },
         )?;
         for first in (0..count).step_by(SUBMISSION as usize) {
             let parameters = Parameters {

@@ -1,14 +1,14 @@
-//! What the chosen sources with a relief send by direction: the paper's equation (3). Shader: `send_relief.comp`; twin:
-//! [`crate::reference::send_relief`].
+//! What the chosen sources with a relief send by direction: the paper's equation (3). Shader:
+//! `send_relief.comp`; twin: [`crate::reference::send_relief`].
 
 use std::ops::Range;
 use std::sync::Arc;
 
 use super::buffers::SceneBuffers;
 use super::relief_buffers::ReliefBuffers;
-use super::shaders;
+use super::shaders::send_relief::{Bindings, Parameters, SHADER};
 use crate::error::Result;
-use crate::vk::{Bind, Buffer, Commands, ComputePipeline, DescriptorSet, Device};
+use crate::vk::{Buffer, Commands, ComputePipeline, DescriptorSet, Device};
 
 pub struct SendRelief {
     pipeline: ComputePipeline,
@@ -17,13 +17,7 @@ pub struct SendRelief {
 impl SendRelief {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
         Ok(Self {
-            pipeline: ComputePipeline::storage(
-                device,
-                "send relief",
-                shaders::SEND_RELIEF_COMP,
-                15,
-                32,
-            )?,
+            pipeline: ComputePipeline::new(device, "send relief", &SHADER)?,
         })
     }
 
@@ -35,24 +29,23 @@ impl SendRelief {
     ) -> Result<DescriptorSet> {
         self.pipeline.bind(
             "send relief",
-            &[
+            &Bindings {
                 slots,
-                &scene.sources,
-                &scene.planes,
-                &scene.areas,
-                &relief.elements,
-                &relief.matrices,
-                &relief.emissions,
-                &relief.shares,
-                &relief.moments_direct,
-                &relief.moments_indirect,
-                &relief.shot_exits,
-                &relief.member_exits,
-                &relief.exits,
-                &relief.dark_slots,
-                &relief.outgoing,
-            ]
-            .map(Bind::Buffer),
+                sources: &scene.sources,
+                planes: &scene.planes,
+                element_area: &scene.areas,
+                meso_elements: &relief.elements,
+                matrices: &relief.matrices,
+                emissions: &relief.emissions,
+                shares: &relief.shares,
+                moments_direct: &relief.moments_direct,
+                moments_indirect: &relief.moments_indirect,
+                shot_exits: &relief.shot_exits,
+                member_exits: &relief.member_exits,
+                exits: &relief.exits,
+                dark_slots: &relief.dark_slots,
+                outgoing: &relief.outgoing,
+            },
         )
     }
 
@@ -64,17 +57,15 @@ impl SendRelief {
         relief: &ReliefBuffers,
         slots: Range<u32>,
     ) {
-        let [columns, rows] = relief.cells();
-        let parameters = [
-            relief.first_source,
-            relief.source_count,
-            relief.first_element,
-            relief.most_members,
-            columns,
-            rows,
-            u32::from(relief.by_pixel),
-            slots.start,
-        ];
+        let parameters = Parameters {
+            first_source: relief.first_source,
+            source_count: relief.source_count,
+            first_element: relief.first_element,
+            most_members: relief.most_members,
+            cells: relief.cells(),
+            by_pixel: relief.by_pixel.into(),
+            first_slot: slots.start,
+        };
         let size = [slots.end - slots.start, 1, 1];
         cmd.dispatch(&self.pipeline, set, &parameters, size);
     }

@@ -1,17 +1,18 @@
 //! Draws elements as radiance, L = ρ(u, v) · E / π + Le. Shaders: `shade.vert`, `shade.frag`; twin:
-//! [`crate::reference::shade`]. What comes straight from light points is compared with [`crate::path_tracer`].
+//! [`crate::reference::shade`]. What comes straight from light points is compared with
+//! [`crate::path_tracer`].
 
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 
-use super::shaders;
+use super::shaders::shade::{Bindings, SHADER};
 use super::shadow_rays::LightBuffers;
 use crate::error::Result;
 use crate::vk::{
-    Attachment, Bind, Binding, Buffer, BufferUse, Commands, DescriptorSet, Device, Format,
-    Framebuffer, GraphicsPipeline, GraphicsState, Image, ImageUse, RenderPass, Sampler, Stage,
+    Attachment, Buffer, BufferUse, Commands, DescriptorSet, Device, Format, Framebuffer,
+    GraphicsPipeline, GraphicsState, Image, ImageUse, RenderPass, Sampled, Sampler, Stage,
     VertexAttribute,
 };
 
@@ -27,25 +28,12 @@ pub struct Vertex {
     pub uv: Vec2,
 }
 
-/// Push constants of one draw: rows x, y and w of the projection, and the material.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub struct Parameters {
-    pub x: Vec3,
-    pub y: Vec3,
-    pub w: Vec3,
-    /// Distance of the near plane, internal units.
-    pub near: f32,
-    /// ρ, or what the texture is multiplied by.
-    pub reflectance: Vec3,
-    /// Le, W·m⁻²·sr⁻¹.
-    pub emitted: Vec3,
-    /// 1 where an exposure meter looks, 0 where it does not; goes to alpha.
-    pub metered: f32,
-    /// Of the light points that light it straight; those of emitters come first.
-    pub light_count: u32,
-    pub emitter_points: u32,
-}
+/// Push constants of one draw: `x`, `y` and `w` are rows of the projection, `near` is the distance
+/// of the near plane in internal units, `reflectance` is ρ or the factor of the texture, `emitted`
+/// is Le in W·m⁻²·sr⁻¹, and `metered` is 1 where an exposure meter looks and 0 elsewhere; it goes
+/// to alpha. Of the `light_count` points that light the draw straight, those of emitters come
+/// first.
+pub use super::shaders::shade::Parameters;
 
 impl Parameters {
     /// The same, lit straight by so many light points, of which so many are of emitters.
@@ -106,16 +94,7 @@ impl Shade {
             &pass,
             &GraphicsState {
                 name: "shade",
-                vertex: shaders::SHADE_VERT,
-                fragment: shaders::SHADE_FRAG,
-                bindings: &[
-                    Binding::Sampled,
-                    Binding::Storage,
-                    Binding::Storage,
-                    Binding::Storage,
-                    Binding::Storage,
-                ],
-                push_bytes: size_of::<Parameters>(),
+                shaders: &SHADER,
                 vertex_stride: size_of::<Vertex>() as u32,
                 attributes: &[
                     attribute(
@@ -142,8 +121,9 @@ impl Shade {
         &self.pass
     }
 
-    /// Binds the texture of a material, the light points with what casts shadows, and what they light, [`LitTriangle`]s by
-    /// the order of the drawn triangles; none are needed where nothing is drawn by light points.
+    /// Binds the texture of a material, the light points with what casts shadows, and what they
+    /// light, [`LitTriangle`]s by the order of the drawn triangles; none are needed where nothing
+    /// is drawn by light points.
     ///
     /// # Errors
     /// A device without the memory.
@@ -158,18 +138,21 @@ impl Shade {
     ) -> Result<DescriptorSet> {
         self.pipeline.bind(
             "shade",
-            &[
-                Bind::Image(albedo, sampler),
-                Bind::Buffer(&lights.points),
-                Bind::Buffer(&lights.nodes),
-                Bind::Buffer(&lights.triangles),
-                Bind::Buffer(lit),
-            ],
+            &Bindings {
+                albedo: Sampled {
+                    image: albedo,
+                    sampler,
+                },
+                light_points: &lights.points,
+                shadow_nodes: &lights.nodes,
+                shadow_triangles: &lights.triangles,
+                lit_triangles: lit,
+            },
         )
     }
 
-    /// Draws into the left top `size` of the target, lets `then` draw there too, and copies all of it to where the CPU reads
-    /// it.
+    /// Draws into the left top `size` of the target, lets `then` draw there too, and copies all of
+    /// it to where the CPU reads it.
     pub fn record<'a>(
         &self,
         cmd: &Commands,
@@ -228,13 +211,14 @@ impl Target {
         })
     }
 
-    /// The first `rows` rows of the whole target's width, `[row][column]`: RGB radiance, W·m⁻²·sr⁻¹, and the meter's
-    /// flag. The submission must be done.
+    /// The first `rows` rows of the whole target's width, `[row][column]`: RGB radiance,
+    /// W·m⁻²·sr⁻¹, and the meter's flag. The submission must be done.
     pub fn rows(&self, rows: u32) -> Vec<[f32; 4]> {
         self.readback.read(0, self.width as usize * rows as usize)
     }
 
-    /// The same rows' depths, near plane over distance along the view, 0 where nothing is; none of a shade without them.
+    /// The same rows' depths, near plane over distance along the view, 0 where nothing is; none of
+    /// a shade without them.
     pub fn depths(&self, rows: u32) -> Option<Vec<f32>> {
         let readback = self.depth_readback.as_ref()?;
         Some(readback.read(0, self.width as usize * rows as usize))

@@ -1,5 +1,5 @@
-//! What casts shadows, as a tree of boxes that shaders walk. Shaders: `shared/shadow_rays.glsl`, and `shadow_rays.comp` for
-//! tests; twin: [`crate::reference::shadow_rays`].
+//! What casts shadows, as a tree of boxes that shaders walk. Shaders: `shared/shadow_rays.glsl`,
+//! and `shadow_rays.comp` for tests; twin: [`crate::reference::shadow_rays`].
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -11,14 +11,15 @@ use obvhs::bvh2::builder::build_bvh2;
 use obvhs::{Boundable, BvhBuildParams};
 
 use super::buffers::{download, upload};
+use super::groups;
+use super::shaders::shadow_rays::{Bindings, Parameters, SHADER};
 use super::types::{LightPoint, ShadowNode, ShadowRay, ShadowTriangle};
-use super::{groups, shaders};
 use crate::constants::{KIND_SURFACE, LEAF_TRIANGLES};
 use crate::error::Result;
-use crate::vk::{Bind, Buffer, BufferUse, Commands, ComputePipeline, Device};
+use crate::vk::{Buffer, BufferUse, Commands, ComputePipeline, Device};
 
-/// Boxes are wider than their triangles by this share of the greatest coordinate, 2⁻²⁰: the walk's places on a ray of at
-/// most twice that length are right to 2⁻²¹ of it.
+/// Boxes are wider than their triangles by this share of the greatest coordinate, 2⁻²⁰: the walk's
+/// places on a ray of at most twice that length are right to 2⁻²¹ of it.
 const BOX_MARGIN: f32 = 1.0 / (1 << 20) as f32;
 
 /// A triangle that casts a shadow.
@@ -182,13 +183,7 @@ impl ShadowRays {
     /// A device that fails.
     pub fn new(device: &Arc<Device>) -> Result<Self> {
         Ok(Self {
-            pipeline: ComputePipeline::storage(
-                device,
-                "shadow rays",
-                shaders::SHADOW_RAYS_COMP,
-                4,
-                size_of::<u32>(),
-            )?,
+            pipeline: ComputePipeline::new(device, "shadow rays", &SHADER)?,
             device: Arc::clone(device),
         })
     }
@@ -205,10 +200,16 @@ impl ShadowRays {
         let hits = Buffer::new(&self.device, "shadow hits", bytes, BufferUse::Storage)?;
         let set = self.pipeline.bind(
             "shadow rays",
-            &[&scene.nodes, &scene.triangles, &rays, &hits].map(Bind::Buffer),
+            &Bindings {
+                shadow_nodes: &scene.nodes,
+                shadow_triangles: &scene.triangles,
+                rays: &rays,
+                hits: &hits,
+            },
         )?;
         Commands::run(&self.device, "shadow rays", |cmd| {
-            cmd.dispatch(&self.pipeline, &set, &count, [groups(count), 1, 1]);
+            let size = [groups(count), 1, 1];
+            cmd.dispatch(&self.pipeline, &set, &Parameters { count }, size);
             Ok(())
         })?;
         let hits: Vec<u32> = download(&self.device, &hits, count as usize)?;

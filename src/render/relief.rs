@@ -69,12 +69,21 @@ impl Relief {
         let draws = self.mesh.ranges.iter().zip(&self.sets);
         let draws = draws.map(|(range, set)| {
             let material = &seen.scene.materials[range.material as usize];
+            let shade = parameters(rows, Some(material), seen.lighting.part).lit_by(counts);
             passes::relief::Draw {
                 first_prism: range.first,
                 prism_count: range.count,
                 set,
                 parameters: passes::relief::Parameters {
-                    shade: parameters(rows, Some(material), seen.lighting.part).lit_by(counts),
+                    x: shade.x,
+                    y: shade.y,
+                    w: shade.w,
+                    near: shade.near,
+                    reflectance: shade.reflectance,
+                    emitted: shade.emitted,
+                    metered: shade.metered,
+                    light_count: shade.light_count,
+                    emitter_points: shade.emitter_points,
                     shading: self.shading,
                     view: seen.lighting.show.code(),
                     pixel: seen.projection.sample_angle(seen.samples),

@@ -8,10 +8,10 @@ use egui::{ClippedPrimitive, Color32, ColorImage, TextureId, TexturesDelta};
 use glam::Vec2;
 
 use crate::error::Result;
-use crate::passes::shaders;
+use crate::passes::shaders::panel::{Bindings, Parameters, SHADER};
 use crate::vk::{
-    Bind, Binding, Buffer, BufferUse, Commands, DescriptorSet, Device, Format, GraphicsPipeline,
-    GraphicsState, Image, ImageUse, RenderPass, Sampler, VertexAttribute,
+    Buffer, BufferUse, Commands, DescriptorSet, Device, Format, GraphicsPipeline, GraphicsState,
+    Image, ImageUse, RenderPass, Sampled, Sampler, VertexAttribute,
 };
 
 /// Draws panels, one frame at a time.
@@ -49,7 +49,7 @@ pub struct Prepared {
     /// The picture first.
     draws: Vec<Draw>,
     /// Size of the window in points.
-    size: [f32; 2],
+    size: Vec2,
 }
 
 /// Bytes of a new buffer for `bytes`: with a reserve, so that a growing panel does not need a new
@@ -69,10 +69,7 @@ impl PanelPass {
             pass,
             &GraphicsState {
                 name: "panel",
-                vertex: shaders::PANEL_VERT,
-                fragment: shaders::PANEL_FRAG,
-                bindings: &[Binding::Sampled],
-                push_bytes: size_of::<[f32; 2]>(),
+                shaders: &SHADER,
                 vertex_stride: size_of::<Vertex>() as u32,
                 attributes: &[
                     attribute(Format::R32G32_SFLOAT, std::mem::offset_of!(Vertex, pos)),
@@ -116,8 +113,7 @@ impl PanelPass {
         };
         let size = (pixels.size[0] as u32, pixels.size[1] as u32);
         let image = upload(&self.device, "panel texture", size, &pixels.pixels)?;
-        let bind = [Bind::Image(&image, &self.sampler)];
-        let set = self.pipeline.bind("panel texture", &bind)?;
+        let set = self.bind("panel texture", &image)?;
         self.textures.insert(id, Texture { set, pixels });
         Ok(())
     }
@@ -128,9 +124,8 @@ impl PanelPass {
     /// A device without the memory.
     pub fn set_picture(&mut self, image: &Image, share: Vec2) -> Result<()> {
         self.picture_share = share;
-        let bind = [Bind::Image(image, &self.sampler)];
         let texture = Texture {
-            set: self.pipeline.bind("detailed picture", &bind)?,
+            set: self.bind("detailed picture", image)?,
             pixels: ColorImage::default(),
         };
         self.textures.insert(PICTURE, texture);
@@ -147,10 +142,10 @@ impl PanelPass {
         (width, height): (u32, u32),
         scale: f32,
     ) -> Result<Prepared> {
-        let size = [width as f32 / scale, height as f32 / scale];
+        let size = Vec2::new(width as f32, height as f32) / scale;
         let share = self.picture_share;
         let corner = |x: f32, y: f32| Vertex {
-            pos: egui::pos2(x * size[0], y * size[1]),
+            pos: egui::pos2(x * size.x, y * size.y),
             uv: egui::pos2(x * share.x, y * share.y),
             color: Color32::WHITE,
         };
@@ -218,6 +213,14 @@ impl PanelPass {
         Ok(Prepared { draws, size })
     }
 
+    fn bind(&self, name: &str, image: &Image) -> Result<DescriptorSet> {
+        let image = Sampled {
+            image,
+            sampler: &self.sampler,
+        };
+        self.pipeline.bind(name, &Bindings { image })
+    }
+
     /// Draws the picture over everything drawn so far, within a render pass that has begun.
     pub fn record_picture(&self, cmd: &Commands, prepared: &Prepared) {
         self.draw(cmd, prepared, &prepared.draws[..1]);
@@ -236,7 +239,8 @@ impl PanelPass {
             };
             let [left, top, width, height] = draw.clip;
             cmd.bind_graphics(&self.pipeline, &texture.set, &self.vertices);
-            cmd.push_graphics(&self.pipeline, &prepared.size);
+            let size = prepared.size;
+            cmd.push_graphics(&self.pipeline, &Parameters { size });
             cmd.scissor(left, top, width, height);
             cmd.draw_indexed(draw.first_index, draw.index_count);
         }

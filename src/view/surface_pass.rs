@@ -3,41 +3,20 @@
 
 use std::sync::Arc;
 
-use bytemuck::{Pod, Zeroable};
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Vec2, Vec3};
 
 use super::camera::Rows;
 use super::detailer::Drawn;
 use super::laid_pictures::LaidPictures;
 use super::surface_mesh::{About, NOTHING, SurfaceMesh, Vertex};
 use crate::error::Result;
-use crate::passes::shaders;
+use crate::passes::shaders::{view_mesh, view_mesh_laid, view_mesh_overlaid};
 use crate::render::upload_texture;
 use crate::scene::Scene;
 use crate::vk::{
-    Bind, Binding, Buffer, BufferUse, Commands, DescriptorSet, Device, Format, GraphicsPipeline,
-    GraphicsState, Image, RenderPass, Sampler, VertexAttribute,
+    Buffer, BufferUse, Commands, DescriptorSet, Device, Format, GraphicsPipeline, GraphicsShaders,
+    GraphicsState, Image, RenderPass, Sampled, Sampler, VertexAttribute,
 };
-
-/// Push constants of one draw.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct Parameters {
-    x: Vec4,
-    y: Vec4,
-    w: Vec4,
-    eye: Vec3,
-    near: f32,
-    reflectance: Vec3,
-    exposure: f32,
-    emitted: Vec3,
-    ambient: Vec3,
-    parts: Vec2,
-    elements: f32,
-    sources: f32,
-    from_picture: u32,
-    chosen: u32,
-}
 
 /// How surfaces show detailed pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -73,6 +52,13 @@ impl Shown {
     }
 }
 
+/// What is bound of one texture.
+struct Sets {
+    plain: DescriptorSet,
+    /// With pictures, for two pipelines.
+    laid: DescriptorSet,
+}
+
 /// A scene ready to be drawn.
 pub struct SurfacePass {
     plain: GraphicsPipeline,
@@ -90,7 +76,7 @@ pub struct SurfacePass {
     texture_of: Vec<usize>,
     pictures: LaidPictures,
     /// `[texture]`.
-    sets: Vec<DescriptorSet>,
+    sets: Vec<Sets>,
     mesh: SurfaceMesh,
     /// `[drawn triangle][corner]`.
     all: Buffer,
@@ -112,7 +98,7 @@ impl SurfacePass {
     /// # Errors
     /// A scene that does not fit the device.
     pub fn new(device: &Arc<Device>, pass: &RenderPass, scene: &Scene) -> Result<Self> {
-        let pipeline = |name, vertex, fragment| pipeline(device, pass, name, vertex, fragment);
+        let pipeline = |name, shaders| pipeline(device, pass, name, shaders);
         let mesh = SurfaceMesh::new(device, scene)?;
         let corners = 3 * mesh.order.len();
         let light = |name| -> Result<Buffer> {
@@ -123,17 +109,9 @@ impl SurfacePass {
         let about = (size_of::<About>() * mesh.order.len()) as u64;
         let (textures, texture_of) = textures(device, scene)?;
         let mut surfaces = Self {
-            plain: pipeline("surfaces", shaders::VIEW_MESH_VERT, shaders::VIEW_MESH_FRAG)?,
-            laid: pipeline(
-                "surfaces under pictures",
-                shaders::VIEW_MESH_LAID_VERT,
-                shaders::VIEW_MESH_LAID_FRAG,
-            )?,
-            overlaid: pipeline(
-                "surfaces under overlays",
-                shaders::VIEW_MESH_OVERLAID_VERT,
-                shaders::VIEW_MESH_OVERLAID_FRAG,
-            )?,
+            plain: pipeline("surfaces", &view_mesh::SHADER)?,
+            laid: pipeline("surfaces under pictures", &view_mesh_laid::SHADER)?,
+            overlaid: pipeline("surfaces under overlays", &view_mesh_overlaid::SHADER)?,
             sampler: Sampler::new(device, "surfaces", true)?,
             held: Sampler::held(device, "detailed picture")?,
             nearest: Sampler::new(device, "distances", false)?,
@@ -158,23 +136,41 @@ impl SurfacePass {
 
     fn bind(&mut self) -> Result<()> {
         let [whole, coarse] = &self.pictures.kept;
-        let set = |image| {
-            self.plain.bind(
-                "surfaces",
-                &[
-                    Bind::Image(image, &self.sampler),
-                    Bind::Buffer(&self.all),
-                    Bind::Buffer(&self.direct),
-                    Bind::Buffer(&self.about),
-                    Bind::Image(&whole.image, &self.held),
-                    Bind::Image(&coarse.image, &self.held),
-                    Bind::Image(&whole.distances, &self.nearest),
-                    Bind::Image(&coarse.distances, &self.nearest),
-                    Bind::Buffer(&self.pictures.views),
-                ],
-            )
+        let held = |image| Sampled {
+            image,
+            sampler: &self.held,
         };
-        self.sets = self.textures.iter().map(set).collect::<Result<_>>()?;
+        let nearest = |image| Sampled {
+            image,
+            sampler: &self.nearest,
+        };
+        let sets = |image| {
+            let plain = view_mesh::Bindings {
+                albedo: Sampled {
+                    image,
+                    sampler: &self.sampler,
+                },
+                all_light: &self.all,
+                direct_light: &self.direct,
+                about: &self.about,
+            };
+            let laid = view_mesh_laid::Bindings {
+                albedo: plain.albedo,
+                all_light: plain.all_light,
+                direct_light: plain.direct_light,
+                about: plain.about,
+                whole: held(&whole.image),
+                coarse: held(&coarse.image),
+                whole_distances: nearest(&whole.distances),
+                coarse_distances: nearest(&coarse.distances),
+                views: &self.pictures.views,
+            };
+            Ok(Sets {
+                plain: self.plain.bind("surfaces", &plain)?,
+                laid: self.laid.bind("surfaces under pictures", &laid)?,
+            })
+        };
+        self.sets = self.textures.iter().map(sets).collect::<Result<_>>()?;
         Ok(())
     }
 
@@ -226,6 +222,7 @@ impl SurfacePass {
     /// Records the draws within a render pass that has begun.
     pub fn record(&self, cmd: &Commands, seen: &Rows, shown: &Shown) {
         cmd.bind_indices(&self.mesh.indices);
+        let plain = shown.picture == Laid::No && !shown.has_overlays();
         let pipeline = match shown.picture {
             _ if shown.has_overlays() => &self.overlaid,
             Laid::No => &self.plain,
@@ -235,12 +232,17 @@ impl SurfacePass {
         };
         for range in &self.mesh.ranges {
             let material = range.material as usize;
-            let set = &self.sets[self.texture_of[material]];
+            let sets = &self.sets[self.texture_of[material]];
+            let set = match plain {
+                true => &sets.plain,
+                false => &sets.laid,
+            };
             cmd.bind_graphics(pipeline, set, &self.mesh.vertices);
             let [all, direct, emission] = shown.parts;
             cmd.push_graphics(
                 pipeline,
-                &Parameters {
+                // The same in all three.
+                &view_mesh::Parameters {
                     x: seen.x,
                     y: seen.y,
                     w: seen.w,
@@ -270,34 +272,19 @@ fn pipeline(
     device: &Arc<Device>,
     pass: &RenderPass,
     name: &'static str,
-    vertex: &'static [u32],
-    fragment: &'static [u32],
+    shaders: &GraphicsShaders<'_>,
 ) -> Result<GraphicsPipeline> {
     let attribute = |format, offset: usize| VertexAttribute {
         format,
         offset: offset as u32,
     };
     let three = Format::R32G32B32_SFLOAT;
-    let bindings = [
-        Binding::Sampled,
-        Binding::Storage,
-        Binding::Storage,
-        Binding::Storage,
-        Binding::Sampled,
-        Binding::Sampled,
-        Binding::Sampled,
-        Binding::Sampled,
-        Binding::Storage,
-    ];
     GraphicsPipeline::new(
         device,
         pass,
         &GraphicsState {
             name,
-            vertex,
-            fragment,
-            bindings: &bindings,
-            push_bytes: size_of::<Parameters>(),
+            shaders,
             vertex_stride: size_of::<Vertex>() as u32,
             attributes: &[
                 attribute(three, std::mem::offset_of!(Vertex, position)),

@@ -21,8 +21,8 @@ pub enum BufferUse {
     Geometry,
     /// Device memory that shaders reach by its address: only the device's memory limits its size.
     Addressed,
-    /// Device memory that shaders write as storage and read as texels of four words. Software devices
-    /// read texels several times as fast as storage.
+    /// Device memory that shaders write as storage and read as texels of four words. Software
+    /// devices read texels several times as fast as storage.
     Texels,
     /// The same, written by its address.
     AddressedTexels,
@@ -243,7 +243,8 @@ impl BufferUse {
 
 impl Drop for BufferOwner {
     fn drop(&mut self) {
-        // SAFETY: sets and commands that use the buffer or its view hold its owner, so none is left.
+        // SAFETY: sets and commands that use the buffer or its view hold its owner, so none is
+        // left.
         unsafe {
             self.device.raw.destroy_buffer_view(self.view, None);
             self.device.raw.destroy_buffer(self.raw, None);

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::pipeline::{Module, PipelineOwner};
-use super::{Bind, Binding, DescriptorSet, Device};
+use super::{ComputeShader, DescriptorSet, Device, ShaderBindings};
 use crate::error::Result;
 
-/// A compute shader with its bindings, its push constants and the specialisation constants 0, 1, ….
-/// A clone is another handle to the same pipeline.
+/// A compute shader with its specialisation constants 0, 1, …. A clone is another handle to the
+/// same pipeline.
 ///
 /// Commands that record it keep it alive.
 #[derive(Clone)]
@@ -18,24 +18,36 @@ pub struct ComputePipeline {
 }
 
 impl ComputePipeline {
-    /// `spirv` is a whole compute module with the entry point `main`. With `subgroups`, the
-    /// workgroup (its size must be a multiple of the subgroup size) consists of full subgroups of
-    /// the device's own size.
+    /// # Errors
+    /// A device that fails.
+    pub fn new(device: &Arc<Device>, name: &str, shader: &ComputeShader<'_>) -> Result<Self> {
+        Self::create(device, name, shader, &[], false)
+    }
+
+    /// A pipeline whose workgroup (its size must be a multiple of the subgroup size) consists of
+    /// full subgroups of the device's own size.
     ///
     /// # Errors
     /// A device that fails.
-    pub fn new(
+    pub fn in_subgroups(
         device: &Arc<Device>,
         name: &str,
-        spirv: &[u32],
-        bindings: &[Binding],
-        push_bytes: usize,
+        shader: &ComputeShader<'_>,
+        constants: &[u32],
+    ) -> Result<Self> {
+        Self::create(device, name, shader, constants, true)
+    }
+
+    fn create(
+        device: &Arc<Device>,
+        name: &str,
+        shader: &ComputeShader<'_>,
         constants: &[u32],
         subgroups: bool,
     ) -> Result<Self> {
         let stages = vk::ShaderStageFlags::COMPUTE;
-        let mut owner = PipelineOwner::with_layouts(device, name, bindings, push_bytes, stages)?;
-        let module = Module::new(device, spirv)?;
+        let mut owner = PipelineOwner::with_layouts(device, name, shader.interface, stages)?;
+        let module = Module::new(device, shader.spirv)?;
         let entries: Vec<_> = (0..constants.len() as u32)
             .map(|id| {
                 vk::SpecializationMapEntry::default()
@@ -75,26 +87,11 @@ impl ComputePipeline {
         })
     }
 
-    /// A pipeline that binds only storage buffers and has no specialisation constants.
+    /// A descriptor set for this pipeline.
     ///
     /// # Errors
     /// A device that fails.
-    pub fn storage(
-        device: &Arc<Device>,
-        name: &str,
-        spirv: &[u32],
-        buffers: usize,
-        push_bytes: usize,
-    ) -> Result<Self> {
-        let bindings = vec![Binding::Storage; buffers];
-        Self::new(device, name, spirv, &bindings, push_bytes, &[], false)
-    }
-
-    /// A descriptor set for this pipeline, one bind for each binding.
-    ///
-    /// # Errors
-    /// A device that fails.
-    pub fn bind(&self, name: &str, binds: &[Bind<'_>]) -> Result<DescriptorSet> {
-        self.owner.descriptors.bind(name, binds)
+    pub fn bind(&self, name: &str, bindings: &impl ShaderBindings) -> Result<DescriptorSet> {
+        self.owner.descriptors.bind(name, bindings)
     }
 }

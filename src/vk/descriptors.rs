@@ -5,10 +5,10 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::held::Held;
-use super::{Buffer, Device, Image, Sampler};
+use super::{Buffer, Device, Image, Sampler, ShaderBinding, ShaderBindings};
 use crate::error::Result;
 
-/// The kind of one binding; its number is its place in the list.
+/// The kind of a binding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Binding {
     Storage,
@@ -18,19 +18,26 @@ pub enum Binding {
     Texels,
 }
 
-/// What is bound at one place.
+/// An image with its sampler.
+#[derive(Clone, Copy)]
+pub struct Sampled<'a> {
+    pub image: &'a Image,
+    pub sampler: &'a Sampler,
+}
+
+/// What is bound to a binding.
 #[derive(Clone, Copy)]
 pub enum Bind<'a> {
-    Buffer(&'a Buffer),
-    Image(&'a Image, &'a Sampler),
+    Storage(&'a Buffer),
+    Sampled(Sampled<'a>),
     /// A [`super::BufferUse::Texels`] or [`super::BufferUse::AddressedTexels`] buffer.
     Texels(&'a Buffer),
 }
 
 /// The bindings of a pipeline.
-pub struct DescriptorLayout {
+pub(super) struct DescriptorLayout {
     pub(super) raw: vk::DescriptorSetLayout,
-    kinds: Vec<Binding>,
+    pub(super) bindings: &'static [ShaderBinding],
     device: Arc<Device>,
 }
 
@@ -44,6 +51,7 @@ pub struct DescriptorSet {
 
 pub(super) struct DescriptorSetOwner {
     pub(super) raw: vk::DescriptorSet,
+    pub(super) bindings: &'static [ShaderBinding],
     pool: vk::DescriptorPool,
     bound: Held,
     device: Arc<Device>,
@@ -52,14 +60,17 @@ pub(super) struct DescriptorSetOwner {
 impl DescriptorLayout {
     /// # Errors
     /// A device that fails.
-    pub fn new(device: &Arc<Device>, name: &str, kinds: &[Binding]) -> Result<Self> {
-        let bindings: Vec<_> = kinds
-            .iter()
-            .enumerate()
-            .map(|(i, kind)| {
+    pub(super) fn new(
+        device: &Arc<Device>,
+        name: &str,
+        bindings: &'static [ShaderBinding],
+    ) -> Result<Self> {
+        let numbered: Vec<_> = (0..)
+            .zip(bindings)
+            .map(|(number, binding)| {
                 vk::DescriptorSetLayoutBinding::default()
-                    .binding(i as u32)
-                    .descriptor_type(kind.raw())
+                    .binding(number)
+                    .descriptor_type(binding.kind.raw())
                     .descriptor_count(1)
                     .stage_flags(
                         vk::ShaderStageFlags::COMPUTE
@@ -68,14 +79,14 @@ impl DescriptorLayout {
                     )
             })
             .collect();
-        let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
+        let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&numbered);
         // SAFETY: `info` outlives the call.
         let raw = unsafe { device.raw.create_descriptor_set_layout(&info, None) }
             .map_err(device.error("creating a descriptor layout"))?;
         device.set_name(raw, name);
         Ok(Self {
             raw,
-            kinds: kinds.to_vec(),
+            bindings,
             device: Arc::clone(device),
         })
     }
@@ -84,16 +95,19 @@ impl DescriptorLayout {
     ///
     /// # Errors
     /// A device that fails.
-    pub fn bind(&self, name: &str, binds: &[Bind<'_>]) -> Result<DescriptorSet> {
+    pub(super) fn bind<B: ShaderBindings>(
+        &self,
+        name: &str,
+        bindings: &B,
+    ) -> Result<DescriptorSet> {
         assert_eq!(
-            binds.len(),
-            self.kinds.len(),
-            "{name}: one bind for each binding"
+            self.bindings,
+            B::BINDINGS,
+            "{name}: the bindings of the pipeline"
         );
         let mut set = self.allocate(name)?;
-        for (i, (bind, kind)) in binds.iter().zip(&self.kinds).enumerate() {
-            assert_eq!(bind.kind(), *kind, "{name}: the kind of binding {i}");
-            set.write(i as u32, bind);
+        for (number, bind) in (0..).zip(&bindings.binds()) {
+            set.write(number, bind);
         }
         Ok(DescriptorSet {
             owner: Arc::new(set),
@@ -106,7 +120,7 @@ impl DescriptorLayout {
         let sizes: Vec<_> = [Binding::Storage, Binding::Sampled, Binding::Texels]
             .into_iter()
             .filter_map(|kind| {
-                let count = self.kinds.iter().filter(|k| **k == kind).count() as u32;
+                let count = self.bindings.iter().filter(|b| b.kind == kind).count() as u32;
                 (count > 0).then(|| {
                     vk::DescriptorPoolSize::default()
                         .ty(kind.raw())
@@ -122,6 +136,7 @@ impl DescriptorLayout {
             .map_err(device.error("creating a descriptor pool"))?;
         let mut set = DescriptorSetOwner {
             raw: vk::DescriptorSet::null(),
+            bindings: self.bindings,
             pool,
             bound: Held::default(),
             device: Arc::clone(device),
@@ -145,14 +160,14 @@ impl DescriptorSetOwner {
             .dst_binding(binding)
             .descriptor_type(bind.kind().raw());
         match bind {
-            Bind::Buffer(buffer) => {
+            Bind::Storage(buffer) => {
                 self.bound.hold(&buffer.owner);
                 let infos = [vk::DescriptorBufferInfo::default()
                     .buffer(buffer.owner.raw)
                     .range(vk::WHOLE_SIZE)];
                 self.update(write.buffer_info(&infos));
             }
-            Bind::Image(image, sampler) => {
+            Bind::Sampled(Sampled { image, sampler }) => {
                 self.bound.hold(&image.owner);
                 self.bound.hold(&sampler.owner);
                 let infos = [vk::DescriptorImageInfo::default()
@@ -178,8 +193,8 @@ impl DescriptorSetOwner {
 impl Bind<'_> {
     fn kind(&self) -> Binding {
         match self {
-            Self::Buffer(_) => Binding::Storage,
-            Self::Image(..) => Binding::Sampled,
+            Self::Storage(_) => Binding::Storage,
+            Self::Sampled(_) => Binding::Sampled,
             Self::Texels(_) => Binding::Texels,
         }
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::pipeline::{Module, PipelineOwner};
-use super::{Bind, Binding, DescriptorSet, Device, RenderPass};
+use super::{DescriptorSet, Device, GraphicsShaders, RenderPass, ShaderBindings};
 use crate::error::Result;
 
 /// One attribute of the one vertex buffer.
@@ -19,10 +19,7 @@ pub struct VertexAttribute {
 /// viewport set per draw.
 pub struct GraphicsState<'a> {
     pub name: &'a str,
-    pub vertex: &'a [u32],
-    pub fragment: &'a [u32],
-    pub bindings: &'a [Binding],
-    pub push_bytes: usize,
+    pub shaders: &'a GraphicsShaders<'a>,
     pub vertex_stride: u32,
     pub attributes: &'a [VertexAttribute],
     /// Colours of all fragments are summed and depth is ignored.
@@ -85,12 +82,11 @@ impl GraphicsPipeline {
         let mut owner = PipelineOwner::with_layouts(
             device,
             state.name,
-            state.bindings,
-            state.push_bytes,
+            state.shaders.interface,
             GRAPHICS_STAGES,
         )?;
-        let vertex = Module::new(device, state.vertex)?;
-        let fragment = Module::new(device, state.fragment)?;
+        let vertex = Module::new(device, state.shaders.vertex)?;
+        let fragment = Module::new(device, state.shaders.fragment)?;
         let stages = [
             stage(vk::ShaderStageFlags::VERTEX, &vertex),
             stage(vk::ShaderStageFlags::FRAGMENT, &fragment),
@@ -148,12 +144,12 @@ impl GraphicsPipeline {
         })
     }
 
-    /// A descriptor set for this pipeline, one bind for each binding.
+    /// A descriptor set for this pipeline.
     ///
     /// # Errors
     /// A device that fails.
-    pub fn bind(&self, name: &str, binds: &[Bind<'_>]) -> Result<DescriptorSet> {
-        self.owner.descriptors.bind(name, binds)
+    pub fn bind(&self, name: &str, bindings: &impl ShaderBindings) -> Result<DescriptorSet> {
+        self.owner.descriptors.bind(name, bindings)
     }
 }
 

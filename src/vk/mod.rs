@@ -20,6 +20,7 @@ mod instance;
 mod pipeline;
 mod render_pass;
 mod sampler;
+mod shader;
 #[cfg(feature = "window")]
 mod surface;
 #[cfg(feature = "window")]
@@ -32,13 +33,17 @@ pub use barrier::Stage;
 pub use buffer::{Buffer, BufferUse, TEXEL_BYTES};
 pub use commands::Commands;
 pub use compute::ComputePipeline;
-pub use descriptors::{Bind, Binding, DescriptorLayout, DescriptorSet};
+pub use descriptors::{Bind, Binding, DescriptorSet, Sampled};
 pub use device::{Device, Left, Limits, left};
 pub use graphics::{GraphicsPipeline, GraphicsState, VertexAttribute};
 pub use image::{Image, ImageUse};
 pub use instance::{Candidate, Instance, validation_log, validation_messages};
 pub use render_pass::{AfterPass, Attachment, Framebuffer, RenderPass};
 pub use sampler::Sampler;
+pub use shader::{
+    ComputeShader, GraphicsShaders, Interface, ShaderBinding, ShaderBindings, ShaderParameter,
+    ShaderParameters,
+};
 #[cfg(feature = "window")]
 pub use surface::Surface;
 #[cfg(feature = "window")]

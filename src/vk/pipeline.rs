@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::{Binding, DescriptorLayout, Device};
+use super::descriptors::{DescriptorLayout, DescriptorSetOwner};
+use super::{Device, Interface, ShaderParameters};
 use crate::error::Result;
 
 /// A pipeline with its layouts.
@@ -12,7 +13,7 @@ pub(super) struct PipelineOwner {
     /// Null until the pipeline itself is created.
     pub(super) raw: vk::Pipeline,
     pub(super) layout: vk::PipelineLayout,
-    pub(super) push_bytes: u32,
+    interface: Interface,
     pub(super) descriptors: DescriptorLayout,
     device: Arc<Device>,
 }
@@ -23,17 +24,16 @@ impl PipelineOwner {
     pub(super) fn with_layouts(
         device: &Arc<Device>,
         name: &str,
-        bindings: &[Binding],
-        push_bytes: usize,
+        interface: Interface,
         stages: vk::ShaderStageFlags,
     ) -> Result<Self> {
-        let descriptors = DescriptorLayout::new(device, name, bindings)?;
+        let descriptors = DescriptorLayout::new(device, name, interface.bindings)?;
         let sets = [descriptors.raw];
         let ranges = [vk::PushConstantRange::default()
             .stage_flags(stages)
-            .size(push_bytes as u32)];
+            .size(interface.parameter_bytes as u32)];
         let mut info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets);
-        if push_bytes > 0 {
+        if interface.parameter_bytes > 0 {
             info = info.push_constant_ranges(&ranges);
         }
         // SAFETY: `info` outlives the call.
@@ -43,21 +43,28 @@ impl PipelineOwner {
         Ok(Self {
             raw: vk::Pipeline::null(),
             layout,
-            push_bytes: push_bytes as u32,
+            interface,
             descriptors,
             device: Arc::clone(device),
         })
     }
 
-    /// The push constants as bytes, of exactly the pipeline's size.
-    pub(super) fn push_constants<'a, T: bytemuck::Pod>(&self, push: &'a T) -> &'a [u8] {
-        let bytes = bytemuck::bytes_of(push);
+    /// The push constants as bytes, after a check that they are those of the pipeline.
+    pub(super) fn push_constants<'a, P: ShaderParameters>(&self, push: &'a P) -> &'a [u8] {
         assert_eq!(
-            bytes.len(),
-            self.push_bytes as usize,
-            "push constants of the pipeline's size"
+            self.interface.parameters,
+            P::FIELDS,
+            "the push constants of the pipeline"
         );
-        bytes
+        bytemuck::bytes_of(push)
+    }
+
+    /// Checks that a set has the bindings of the pipeline.
+    pub(super) fn check_set(&self, set: &DescriptorSetOwner) {
+        assert_eq!(
+            self.interface.bindings, set.bindings,
+            "a set with the bindings of the pipeline"
+        );
     }
 }
 

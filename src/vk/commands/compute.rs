@@ -1,18 +1,17 @@
 //! Dispatches of compute shaders.
 
 use ash::vk;
-use bytemuck::Pod;
 
 use super::Commands;
-use crate::vk::{Buffer, ComputePipeline, DescriptorSet};
+use crate::vk::{Buffer, ComputePipeline, DescriptorSet, ShaderParameters};
 
 impl Commands {
     /// Dispatches `groups` workgroups; nothing is recorded where there are none.
-    pub fn dispatch<T: Pod>(
+    pub fn dispatch<P: ShaderParameters>(
         &self,
         pipeline: &ComputePipeline,
         set: &DescriptorSet,
-        push: &T,
+        push: &P,
         groups: [u32; 3],
     ) {
         if groups.contains(&0) {
@@ -28,11 +27,11 @@ impl Commands {
     }
 
     /// Dispatches as many workgroups as the device has written at byte `offset` of `counts`.
-    pub fn dispatch_indirect<T: Pod>(
+    pub fn dispatch_indirect<P: ShaderParameters>(
         &self,
         pipeline: &ComputePipeline,
         set: &DescriptorSet,
-        push: &T,
+        push: &P,
         counts: &Buffer,
         offset: u64,
     ) {
@@ -46,13 +45,19 @@ impl Commands {
         }
     }
 
-    fn bind_compute<T: Pod>(&self, pipeline: &ComputePipeline, set: &DescriptorSet, push: &T) {
+    fn bind_compute<P: ShaderParameters>(
+        &self,
+        pipeline: &ComputePipeline,
+        set: &DescriptorSet,
+        push: &P,
+    ) {
         let pipeline = &pipeline.owner;
         let bytes = pipeline.push_constants(push);
+        pipeline.check_set(&set.owner);
         self.hold(pipeline);
         self.hold(&set.owner);
         let raw = &self.device.raw;
-        // SAFETY: pipeline, set and constants match by construction of the pass.
+        // SAFETY: set and constants are those of the pipeline, as checked.
         unsafe {
             raw.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::COMPUTE, pipeline.raw);
             raw.cmd_bind_descriptor_sets(

@@ -1,11 +1,12 @@
 //! Render passes and draws.
 
 use ash::vk;
-use bytemuck::Pod;
 
 use super::Commands;
 use crate::vk::graphics::GRAPHICS_STAGES;
-use crate::vk::{Buffer, DescriptorSet, Framebuffer, GraphicsPipeline, RenderPass};
+use crate::vk::{
+    Buffer, DescriptorSet, Framebuffer, GraphicsPipeline, RenderPass, ShaderParameters,
+};
 
 impl Commands {
     /// Begins a render pass over the whole framebuffer: colour cleared to `clear` (one word a
@@ -49,11 +50,13 @@ impl Commands {
         vertices: &Buffer,
     ) {
         let pipeline = &pipeline.owner;
+        pipeline.check_set(&set.owner);
         self.hold(pipeline);
         self.hold(&set.owner);
         self.hold(&vertices.owner);
         let raw = &self.device.raw;
-        // SAFETY: pipeline, set and vertices match by construction of the pass.
+        // SAFETY: the set is one of the pipeline, as checked; vertices match by construction of
+        // the pass.
         unsafe {
             raw.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::GRAPHICS, pipeline.raw);
             raw.cmd_bind_descriptor_sets(
@@ -103,7 +106,7 @@ impl Commands {
         unsafe { self.device.raw.cmd_set_scissor(self.raw, 0, &scissors) };
     }
 
-    pub fn push_graphics<T: Pod>(&self, pipeline: &GraphicsPipeline, push: &T) {
+    pub fn push_graphics<P: ShaderParameters>(&self, pipeline: &GraphicsPipeline, push: &P) {
         let pipeline = &pipeline.owner;
         let bytes = pipeline.push_constants(push);
         // SAFETY: the constants fit the pipeline's range; only its layout is used, while recording.

@@ -1,0 +1,70 @@
+//! Turns GLSL into what the crate includes as `passes::shaders`: SPIR-V, and bindings and push
+//! constants as structs with the names of the GLSL.
+
+mod emit;
+mod glsl;
+mod interface;
+mod preprocess;
+mod spirv;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use interface::Program;
+
+#[path = "../src/constants.rs"]
+#[allow(dead_code)]
+mod constants;
+
+/// File name → text.
+type Files = BTreeMap<String, String>;
+
+fn main() {
+    for path in ["build", "src/constants.rs", "shaders"] {
+        println!("cargo::rerun-if-changed={path}");
+    }
+    println!("cargo::rerun-if-env-changed=MESOLUX_KEEP_SPIRV");
+    if let Err(message) = shaders() {
+        // One readable line a sentence, and no backtrace of the build script.
+        println!("cargo::error={}", message.replace('\n', " "));
+        std::process::exit(1);
+    }
+}
+
+fn shaders() -> Result<(), String> {
+    let sources = read_all("shaders", &["comp", "vert", "frag"])?;
+    let shared = read_all("shaders/shared", &["glsl"])?;
+    let mut programs: BTreeMap<String, Program> = BTreeMap::new();
+    for (file, source) in &sources {
+        let words = spirv::words(file, source, &shared)?;
+        let text = preprocess::preprocess(file, source, &shared)?;
+        let declared = glsl::declarations(&text).map_err(|e| format!("shaders/{file}: {e}"))?;
+        let stem = file.split('.').next().unwrap_or(file);
+        let program = programs.entry(stem.to_owned()).or_default();
+        program
+            .add(file, words, declared)
+            .map_err(|e| format!("shaders/{file}: {e}"))?;
+    }
+    let out = std::env::var("OUT_DIR").map_err(|e| e.to_string())?;
+    let module = emit::module(&programs)?;
+    fs::write(Path::new(&out).join("shaders.rs"), module).map_err(|e| e.to_string())
+}
+
+fn read_all(dir: &str, endings: &[&str]) -> Result<Files, String> {
+    let mut files = BTreeMap::new();
+    for entry in fs::read_dir(dir).map_err(|e| format!("{dir}: {e}"))? {
+        let path = entry.map_err(|e| e.to_string())?.path();
+        let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+        if endings.contains(&ending) {
+            let name = path
+                .file_name()
+                .and_then(|n| n.to_str())
+                .unwrap_or("")
+                .to_owned();
+            let text = fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+            files.insert(name, text);
+        }
+    }
+    Ok(files)
+}
