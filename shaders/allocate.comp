@@ -1,6 +1,6 @@
-// Finds room for the rows of a batch and writes their tables: for each block of GROUP elements where
-// its factors start, 0 for a block that sees nothing of the source. Rows that find no room go to a
-// chunk that the batch after the next overwrites. One workgroup; slots in order, so that which
+// Finds room for the rows of a batch and writes their tables: for each block of GROUP elements
+// where its factors start, 0 for a block that sees nothing of the source. Rows that find no room go
+// to a chunk that the batch after the next overwrites. One workgroup; slots in order, so that which
 // sources are kept is the same every run.
 #version 460
 #extension GL_GOOGLE_include_directive : require

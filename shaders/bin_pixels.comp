@@ -1,5 +1,5 @@
-// The paper's equation (1): every pixel adds its delta form factor to the item that it sees. One invocation a pixel;
-// integer sums, so that their order does not matter.
+// The paper's equation (1): every pixel adds its delta form factor to the item that it sees. One
+// invocation a pixel; integer sums, so that their order does not matter.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
@@ -10,7 +10,8 @@ layout(local_size_x = GROUP) in;
 
 layout(scalar, binding = 0) readonly buffer Slots { Slot slots[]; };
 layout(scalar, binding = 1) readonly buffer Sources { Source sources[]; };
-// Fixed point, FIXED_POINT_BITS: of a surface's form factor, then of a point's share of half the sphere; each [3 n][n].
+// Fixed point, FIXED_POINT_BITS: of a surface's form factor, then of a point's share of half the
+// sphere; each [3 n][n].
 layout(scalar, binding = 2) readonly buffer Deltas { uint64_t deltas[]; };
 layout(scalar, binding = 3) buffer FormFactors { uint64_t form_factors[]; };
 layout(scalar, binding = 4) readonly buffer Planes { vec4 planes[]; };

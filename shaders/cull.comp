@@ -1,7 +1,8 @@
-// Lists the occluders that each face of each chosen hemicube must draw: one subgroup a face, in their order, so that
-// the list is the same every run. A meshlet falls as a whole where the face's frustum or the shooter's horizon leaves it
-// out or where it shows its back; a triangle falls also where it covers no pixel's centre. Where a list has no room for all,
-// the next part goes on where it ended, once what it holds is drawn.
+// Lists the occluders that each face of each chosen hemicube must draw: one subgroup a face, in
+// their order, so that the list is the same every run. A meshlet falls as a whole where the face's
+// frustum or the shooter's horizon leaves it out or where it shows its back; a triangle falls also
+// where it covers no pixel's centre. Where a list has no room for all, the next part goes on where
+// it ended, once what it holds is drawn.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_basic : require
@@ -45,7 +46,8 @@ const float EYE_EPSILON = 1e-6;
 const float FEW = 4.0;
 const float SQRT_2 = 1.41421357;
 layout(constant_id = 3) const uint SUBPIXEL_BITS = 4;
-// How far the rasteriser's rounding may move a corner, in pixels, with some room for that of the projection.
+// How far the rasteriser's rounding may move a corner, in pixels, with some room for that of the
+// projection.
 float snap() {
     return 1.0 / float(1u << SUBPIXEL_BITS) + 1.0 / 1024.0;
 }
@@ -63,8 +65,8 @@ View face_view(Source s, uint face) {
 }
 
 bool faces_away(Source s, uint component) {
-    // Seen from outside, a closed part's back faces lie behind its front faces. A source on the part itself stands on
-    // its front; elsewhere, outside its box is outside.
+    // Seen from outside, a closed part's back faces lie behind its front faces. A source on the
+    // part itself stands on its front; elsewhere, outside its box is outside.
     Component c = components[component];
     if (c.closed == 0) {
         return false;
@@ -78,7 +80,8 @@ bool meshlet_seen(Source s, View v, Meshlet m, bool away) {
     float x = dot(d, v.x);
     float y = dot(d, v.y);
     float w = dot(d, v.w);
-    // The planes w ± x and w ± y are √2 long at most but for sides' y = 2 n − w, where w − y = 2 (w − n) and w + y = 2 n.
+    // The planes w ± x and w ± y are √2 long at most but for sides' y = 2 n − w, where w − y = 2 (w
+    // − n) and w + y = 2 n.
     float margin = 2.0 * SQRT_2 * m.radius;
     bool inside = dot(d, s.normal) > -m.radius && w - abs(x) > -SQRT_2 * m.radius && w - abs(y) > -margin;
     return inside && !(away && dot(d, m.axis) >= m.cutoff * length(d) + m.radius);
@@ -185,9 +188,9 @@ void main() {
                     if (draw) {
                         corner = uvec3(corners[3 * occluder], corners[3 * occluder + 1], corners[3 * occluder + 2]);
                         item = items[occluder];
-                        // What lies in one plane with the eye, on the part that it stands on, is seen edge-on, if at all:
-                        // rounding must not draw it. Nor does an eye on a closed part see that part's backs, which its
-                        // group does not stand behind.
+                        // What lies in one plane with the eye, on the part that it stands on, is
+                        // seen edge-on, if at all: rounding must not draw it. Nor does an eye on a
+                        // closed part see that part's backs, which its group does not stand behind.
                         vec4 plane = vec4(0.0);
                         if (same || (CULL_TRIANGLES == 1 && m_away)) {
                             plane = planes[item];

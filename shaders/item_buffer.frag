@@ -1,4 +1,5 @@
-// The ID of the element seen. No inputs but the primitive's number: some drivers misplace it beside others.
+// The ID of the element seen. No inputs but the primitive's number: some drivers misplace it beside
+// others.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/types.glsl"

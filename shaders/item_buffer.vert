@@ -1,4 +1,5 @@
-// One face of a hemicube: reversed infinite depth, so that near wins and the far end of the scene never clips.
+// One face of a hemicube: reversed infinite depth, so that near wins and the far end of the scene
+// never clips.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/types.glsl"
@@ -14,8 +15,8 @@ layout(push_constant, scalar) uniform Parameters {
     vec2 half_size;      // of the face, pixels
 };
 
-// Steps of a pixel that corners are moved to. What the rasteriser rounds them to then does not depend on where in the image the
-// slot lies, and a source's item buffer is the same in every slot.
+// Steps of a pixel that corners are moved to. What the rasteriser rounds them to then does not
+// depend on where in the image the slot lies, and a source's item buffer is the same in every slot.
 const float STEPS = 256.0;
 
 void main() {

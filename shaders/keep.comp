@@ -1,6 +1,6 @@
 // Writes the form factors of a batch to the rows that allocate.comp found for them. One subgroup
-// looks after KEEP_BLOCKS blocks of GROUP elements of one slot, most of which may see nothing of the
-// source.
+// looks after KEEP_BLOCKS blocks of GROUP elements of one slot, most of which may see nothing of
+// the source.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_basic : require
@@ -65,7 +65,8 @@ void main() {
     uint next = KEEP_BLOCKS * gl_WorkGroupID.x;
     uint end = min(next + KEEP_BLOCKS, block_count);
     while (next < end) {
-        // On to the next blocks of which any sees the source, in a loop of its own: a software device works through what a branch leaves out.
+        // On to the next blocks of which any sees the source, in a loop of its own: a software
+        // device works through what a branch leaves out.
         uint looked_at;
         uint first;
         uvec4 occupied;

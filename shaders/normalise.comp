@@ -1,5 +1,6 @@
-// In an enclosed scene all that a source sends arrives. Its form factors were found one by one, from samples: this scales each fresh
-// slot's so that together they take the whole source. One workgroup a slot. src/reference/normalise.rs is the same in f64.
+// In an enclosed scene all that a source sends arrives. Its form factors were found one by one,
+// from samples: this scales each fresh slot's so that together they take the whole source. One
+// workgroup a slot. src/reference/normalise.rs is the same in f64.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/types.glsl"

@@ -1,4 +1,5 @@
-// A panel's triangle. Colours are multiplied and laid over one another as sRGB codes, as egui expects.
+// A panel's triangle. Colours are multiplied and laid over one another as sRGB codes, as egui
+// expects.
 #version 460
 
 layout(location = 0) in vec2 corner_uv;

@@ -1,6 +1,7 @@
-// Relief mapping: the ray through the pixel is followed through the prism over a triangle, cut into three tetrahedra in
-// each of which texture coordinates and height are linear, to where it first passes below the height map. Radiance there
-// is ρ E / π + Le with E = Σ_r a_r β_r, the factors of the relief and the light of the vertices (src/meso/factors.rs).
+// Relief mapping: the ray through the pixel is followed through the prism over a triangle, cut into
+// three tetrahedra in each of which texture coordinates and height are linear, to where it first
+// passes below the height map. Radiance there is ρ E / π + Le with E = Σ_r a_r β_r, the factors of
+// the relief and the light of the vertices (src/meso/factors.rs).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -23,9 +24,11 @@ layout(scalar, binding = 2) readonly buffer Surfaces { ReliefSurface surfaces[];
 // [surface]
 layout(scalar, binding = 3) readonly buffer Tiles { HeightTile tiles[]; };
 layout(scalar, binding = 4) readonly buffer Pyramids { float pyramid[]; };
-// Irradiance for a unit of β, [surface][cell][corner][rank]: rgb by light from elsewhere in the relief, w from outside.
+// Irradiance for a unit of β, [surface][cell][corner][rank]: rgb by light from elsewhere in the
+// relief, w from outside.
 layout(scalar, binding = 5) readonly buffer Factors { vec4 factors[]; };
-// β of the light, [light vertex][MOST_RANK]: of that which goes on inside the relief, and of that which arrives.
+// β of the light, [light vertex][MOST_RANK]: of that which goes on inside the relief, and of that
+// which arrives.
 layout(scalar, binding = 6) readonly buffer Coefficients { Coefficient coefficients[]; };
 // Sent light by direction of the vertex's frame, as radiosity πL, [light vertex][direction].
 layout(scalar, binding = 7) readonly buffer Exits { vec3 exits[]; };
@@ -61,14 +64,15 @@ uint march_steps = 0;
 const float PI = 3.14159265358979;
 // Rays to lights begin so much of the relief's range above it.
 const float LIFT = 1e-4;
-// Shares of the relief's range by which a way to a light may leave the parabola that it is above a bent surface: taken for
-// straight, and by its chords, of which there are so many.
+// Shares of the relief's range by which a way to a light may leave the parabola that it is above a
+// bent surface: taken for straight, and by its chords, of which there are so many.
 const float STRAIGHT = 0.01;
 const float CHORD_OFF = 0.02;
 const float MOST_CHORDS = 4.0;
 // Shares of its size that a tetrahedron is padded by.
 const float PADDING = 2e-5;
-// Share of a prism's height that counts as its bottom; MARGIN of src/render/relief_mesh.rs lies below the relief.
+// Share of a prism's height that counts as its bottom; MARGIN of src/render/relief_mesh.rs lies
+// below the relief.
 const float BOTTOM = 5e-4;
 
 // A place on the relief.
@@ -82,8 +86,8 @@ struct Place {
     bool under;          // seen from below
 };
 
-// The part of the ray in a tetrahedron: places on the ray, texture coordinates with height and the shares of the triangle's
-// corners at both ends.
+// The part of the ray in a tetrahedron: places on the ray, texture coordinates with height and the
+// shares of the triangle's corners at both ends.
 struct Part {
     float enter;
     float leave;
@@ -123,7 +127,8 @@ Part cut(Tetrahedron t, vec3 from, vec3 along) {
     // Each share is positive behind its zero or before it. The ray begins at the eye, at s = -1.
     bvec4 grows = greaterThan(rate, vec4(0.0));
     bvec4 falls = lessThan(rate, vec4(0.0));
-    // A little wider than it is, so that a ray along a side that two of them share lies in one for certain.
+    // A little wider than it is, so that a ray along a side that two of them share lies in one for
+    // certain.
     vec4 padded = at + PADDING;
     vec4 zero = -padded / mix(vec4(1.0), rate, notEqual(rate, vec4(0.0)));
     vec4 behind = mix(vec4(-1.0), zero, grows);
@@ -164,8 +169,8 @@ bool meet_part(Part part, Prism p, ReliefSurface surface, bool plane, out Place 
         if (!march(tiles[p.surface], from, to, hit)) {
             return false;
         }
-        // A ray that comes in through the bottom shows the underside; one that comes in below the surface through a side,
-        // at a seam of heights, shows the step.
+        // A ray that comes in through the bottom shows the underside; one that comes in below the
+        // surface through a side, at a seam of heights, shows the step.
         place.under = hit.t == 0.0 && from.z < surface.lowest + BOTTOM * (surface.top - surface.lowest);
         t = hit.t;
         place.gradient = hit.gradient;
@@ -195,7 +200,8 @@ bool meet(Prism p, ReliefSurface surface, vec3 along, bool plane, out Place plac
     Part parts_middle = cut(middle, corner_position, along);
     Part parts_high = cut(high, corner_position, along);
 
-    // Nearest first: the middle one lies between the others, so that the ray meets the low or the high one first.
+    // Nearest first: the middle one lies between the others, so that the ray meets the low or the
+    // high one first.
     bool from_high = parts_high.enter < parts_low.enter && parts_high.leave > parts_high.enter
                    || parts_low.leave <= parts_low.enter;
     bool in_middle_first = parts_middle.leave > parts_middle.enter
@@ -255,12 +261,13 @@ Base base_of(Prism p, ReliefSurface surface, Place place) {
     return base;
 }
 
-// Whether the relief itself stands on the way from a place to a light. `leaves` is where the way leaves the relief's shell
-// if nothing does, internal units.
+// Whether the relief itself stands on the way from a place to a light. `leaves` is where the way
+// leaves the relief's shell if nothing does, internal units.
 //
-// Over its own triangle the way is straight above the height map. Past it, the surface turns away from the way as the
-// smooth normals of the triangle tell, by triangles like this one, so that the way's height above it is a parabola: bumps
-// beyond a triangle's horizon still rise into the light, and the next triangle's do not shadow what they cannot.
+// Over its own triangle the way is straight above the height map. Past it, the surface turns away
+// from the way as the smooth normals of the triangle tell, by triangles like this one, so that the
+// way's height above it is a parabola: bumps beyond a triangle's horizon still rise into the light,
+// and the next triangle's do not shadow what they cannot.
 bool shadowed_by_relief(Prism p, ReliefSurface surface, Place place, Base base, vec3 towards, out float leaves) {
     // Slopes over the triangle, not over the tetrahedron of the place, at whose borders they jump.
     float out_of = dot(base.normal, towards) / dot(base.normal, base.axis);
@@ -272,7 +279,8 @@ bool shadowed_by_relief(Prism p, ReliefSurface surface, Place place, Base base, 
     float short_of = surface.top - from.z;
     HeightHit hit;
 
-    // Find where the way leaves the triangle, how long it is over it, and how the surface bends along it.
+    // Find where the way leaves the triangle, how long it is over it, and how the surface bends
+    // along it.
     vec3 ends = place.share / max(abs(rates), vec3(1e-12));
     vec3 after = mix(vec3(NEVER), ends, lessThan(rates, vec3(0.0)));
     vec3 before = mix(vec3(NEVER), ends, greaterThan(rates, vec3(0.0)));
@@ -316,8 +324,8 @@ bool shadowed_by_relief(Prism p, ReliefSurface surface, Place place, Base base, 
     return false;
 }
 
-// Light straight from emitters and point lights on the surface at a place, by its own normal, shadowed by the relief and by
-// the rest of the scene.
+// Light straight from emitters and point lights on the surface at a place, by its own normal,
+// shadowed by the relief and by the rest of the scene.
 vec3 sharp(Prism p, ReliefSurface surface, Place place, vec3 at) {
     uint samples = light_samples();
     if (samples == 0) {

@@ -1,5 +1,6 @@
-// Where the rays land that a facet of a relief sends out, cosine-weighted about its normal: the facet that each hits, NONE
-// for the sky. One invocation a facet and ray. src/reference/relief_visibility.rs is the same in f64.
+// Where the rays land that a facet of a relief sends out, cosine-weighted about its normal: the
+// facet that each hits, NONE for the sky. One invocation a facet and ray.
+// src/reference/relief_visibility.rs is the same in f64.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -29,7 +30,8 @@ void main() {
     uint ray = item % (RAY_STRATA * RAY_STRATA);
     Facet facet = facet_of(self);
 
-    // A cell of the unit square with an offset of the facet's own, taken to the disk and up to the hemisphere (Malley).
+    // A cell of the unit square with an offset of the facet's own, taken to the disk and up to the
+    // hemisphere (Malley).
     vec2 square = (vec2(ray % RAY_STRATA, ray / RAY_STRATA) + vec2(random(self, 0), random(self, 1))) / float(RAY_STRATA);
     float radius = sqrt(square.x);
     float angle = 6.28318531 * square.y;

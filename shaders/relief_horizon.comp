@@ -1,5 +1,6 @@
-// The horizon of every facet of a relief: in each azimuth, the tangent of the elevation below which the relief itself
-// blocks the sky. One invocation a facet and azimuth. src/reference/relief_visibility.rs is the same in f64.
+// The horizon of every facet of a relief: in each azimuth, the tangent of the elevation below which
+// the relief itself blocks the sky. One invocation a facet and azimuth.
+// src/reference/relief_visibility.rs is the same in f64.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

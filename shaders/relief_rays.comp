@@ -1,5 +1,5 @@
-// Segments over height maps, for tests and timings of shared/height_march.glsl. One invocation a segment.
-// src/reference/relief_rays.rs is the same in f64, without the pyramid.
+// Segments over height maps, for tests and timings of shared/height_march.glsl. One invocation a
+// segment. src/reference/relief_rays.rs is the same in f64, without the pyramid.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

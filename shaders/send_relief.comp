@@ -1,6 +1,7 @@
-// The light that the chosen sources with a relief send, by direction in the hemicube's frame (the paper's equation (3), and
-// ΔB_iq of equation (2)): each member's response to its moments, turned into the common frame, less what was sent before.
-// One workgroup a slot, one invocation a direction. Response::send in src/meso/response.rs is the first of the three steps.
+// The light that the chosen sources with a relief send, by direction in the hemicube's frame (the
+// paper's equation (3), and ΔB_iq of equation (2)): each member's response to its moments, turned
+// into the common frame, less what was sent before. One workgroup a slot, one invocation a
+// direction. Response::send in src/meso/response.rs is the first of the three steps.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
@@ -66,7 +67,8 @@ vec3 sum_over_directions(uint j, vec3 value) {
     return sum;
 }
 
-// Brings a distribution to the power that it must have: scaled, or where it is not of one sign, shifted.
+// Brings a distribution to the power that it must have: scaled, or where it is not of one sign,
+// shifted.
 vec3 with_power(vec3 value, vec3 power, vec3 wanted) {
     bvec3 scales = greaterThan(power, 0.5 * wanted);
     return mix(value + wanted - power, value * (wanted / mix(vec3(1.0), power, scales)), scales);
@@ -85,8 +87,8 @@ void main() {
     uint first_member = slot * most_members;
     bool mine = j < count;
 
-    // Respond: every member's light in its own frame. Moments are the same for all directions out: each lane loads those of one
-    // direction in, for all to share.
+    // Respond: every member's light in its own frame. Moments are the same for all directions out:
+    // each lane loads those of one direction in, for all to share.
     uint dark = 0;
     for (uint i = 0; i < s.element_count; i++) {
         uint m = s.first_element + i - first_element;
@@ -153,8 +155,8 @@ void main() {
         emitted *= scale * shot.emitted;
     }
 
-    // Keep the energy: all that the source has been given to send carries its power, whatever the order it came in. What it
-    // sends now is that less what it has sent.
+    // Keep the energy: all that the source has been given to send carries its power, whatever the
+    // order it came in. What it sends now is that less what it has sent.
     uint kept = (shot.source - first_source) * count + j;
     vec3 before = mine ? shot_exits[kept] : vec3(0.0);
     float share = mine ? shares[j] : 0.0;

@@ -1,5 +1,5 @@
-// Radiance of a diffuse surface, L = ρ(u, v) · E / π + Le; alpha says whether an exposure meter looks at it. E is that of the
-// corners and, with light points, what comes straight from them.
+// Radiance of a diffuse surface, L = ρ(u, v) · E / π + Le; alpha says whether an exposure meter
+// looks at it. E is that of the corners and, with light points, what comes straight from them.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -48,7 +48,8 @@ vec3 straight() {
     vec3 share = corner_share;
     vec3 at = corner_position;
     vec3 normal = normalize(share.x * t.normal_a + share.y * t.normal_b + share.z * t.normal_c);
-    // Ways start on the smooth surface (Hanika 2021), or the facets of a round body would show where light grazes.
+    // Ways start on the smooth surface (Hanika 2021), or the facets of a round body would show
+    // where light grazes.
     vec3 from = at + t.above * t.plane + lift(at, t.a, t.normal_a, share.x) + lift(at, t.b, t.normal_b, share.y)
               + lift(at, t.c, t.normal_c, share.z);
     vec3 sum = vec3(0.0);

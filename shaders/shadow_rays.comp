@@ -1,5 +1,5 @@
-// Ways through the tree of what casts shadows, for tests and timings of shared/shadow_rays.glsl. One invocation a way.
-// src/reference/shadow_rays.rs is the same in f64, without the tree.
+// Ways through the tree of what casts shadows, for tests and timings of shared/shadow_rays.glsl.
+// One invocation a way. src/reference/shadow_rays.rs is the same in f64, without the tree.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,4 +1,5 @@
-// As view_mesh.vert, with where pictures drawn before show the corner: by the fragment that would be many loads.
+// As view_mesh.vert, with where pictures drawn before show the corner: by the fragment that would
+// be many loads.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,4 +1,5 @@
-// As view_mesh_laid.frag; over it, outlines of elements, colours of sources, and the element that is marked.
+// As view_mesh_laid.frag; over it, outlines of elements, colours of sources, and the element that
+// is marked.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -23,8 +23,8 @@
 //! | drawing by relief mapping | [`render`], `shaders/relief.frag` |
 //! | hemicubes | [`math::hemicube`], [`passes::item_buffer`] |
 //!
-//! Cargo features: `cli` (the program and its benchmarks) and `window` (`view`) are on by default, and
-//! nothing else needs them; `formats`, part of `cli`, brings scene.toml, JPEG and OpenEXR.
+//! Cargo features: `cli` (the program and its benchmarks) and `window` (`view`) are on by default,
+//! and nothing else needs them; `formats`, part of `cli`, brings scene.toml, JPEG and OpenEXR.
 //!
 //! [`bake::bake`] is the main road; [`solver::Solver`] gives each step.
 #![deny(unsafe_code)]

@@ -9,7 +9,8 @@ use std::f32::consts::PI;
 
 const PERMITTED: f64 = 3e-3;
 
-/// Cuts a sphere into halves of the same area: no triangle of the test's spheres has its centroid in the plane.
+/// Cuts a sphere into halves of the same area: no triangle of the test's spheres has its centroid
+/// in the plane.
 const AXIS: DVec3 = DVec3::new(0.31, 0.87, 0.23);
 
 /// Ke for an emitted radiosity of 1.
@@ -21,7 +22,8 @@ fn near(name: &str, value: f64, exact: f64, permitted: f64) {
     assert!(error.abs() <= permitted, "{name}: {value} for {exact}");
 }
 
-/// Inside of a sphere, upper half ρ = 0.5 and emitting 1, lower half ρ = 0.8: irradiance is the same everywhere.
+/// Inside of a sphere, upper half ρ = 0.5 and emitting 1, lower half ρ = 0.8: irradiance is the
+/// same everywhere.
 #[test]
 fn halves_of_a_sphere() {
     let mut build = Build::new();
@@ -104,14 +106,16 @@ fn cube() {
     }
 }
 
-/// CIE 171:2006, case 5.3: a square metre of 1000 cd/m² in the ceiling of a black room, lux at ten points.
+/// CIE 171:2006, case 5.3: a square metre of 1000 cd/m² in the ceiling of a black room, lux at ten
+/// points.
 #[test]
 fn cie_171_case_5_3() {
     let mut build = Build::new();
     let black = build.material(0.0, 0.0);
     let light = build.material(0.0, 1000.0);
     build.room(DVec3::ZERO, DVec3::new(4.0, 4.0, 3.0), 8, black);
-    // A hand's breadth of nothing: the emitter is in the plane of the ceiling, whose own triangles there are left out.
+    // A hand's breadth of nothing: the emitter is in the plane of the ceiling, whose own triangles
+    // there are left out.
     let in_emitter = |v: DVec3| v.z == 3.0 && v.x > 1.49 && v.x < 2.51 && v.y > 1.49 && v.y < 2.51;
     let scene = &build.scene;
     let keep: Vec<_> = scene
@@ -185,7 +189,8 @@ fn cie_171_case_5_3() {
     }
 }
 
-/// A point light over a plane: I cos θ / d² to both sides of the light, and nothing behind a screen.
+/// A point light over a plane: I cos θ / d² to both sides of the light, and nothing behind a
+/// screen.
 #[test]
 fn point_light() {
     let mut build = Build::new();
@@ -205,7 +210,8 @@ fn point_light() {
         (16, 16),
         black,
     );
-    // The screen shades the part of the floor with x > 0.5 and |z| < 0.5, of which x > 0.6, |z| < 0.4 is well inside.
+    // The screen shades the part of the floor with x > 0.5 and |z| < 0.5, of which x > 0.6, |z| <
+    // 0.4 is well inside.
     let screen = DVec3::new(0.25, -0.5, -0.25);
     build.quad(screen, DVec3::Z * 0.5, DVec3::X * 0.25, (1, 1), black);
     build.point_light(DVec3::ZERO, 3.0);

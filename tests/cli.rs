@@ -1,4 +1,5 @@
-//! The program as a person meets it: good runs, and every kind of bad input with one clear line and exit code 2.
+//! The program as a person meets it: good runs, and every kind of bad input with one clear line and
+//! exit code 2.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -383,7 +384,8 @@ fn draws_the_reference() {
     assert!(!folder.path().join("q.png").exists());
 }
 
-/// The three parts of the light stand side by side; a camera may be described; compare tells that a picture is itself.
+/// The three parts of the light stand side by side; a camera may be described; compare tells that a
+/// picture is itself.
 #[test]
 fn draws_parts_of_the_light_and_compares() {
     let folder = tempfile::tempdir().expect("a folder for the test");

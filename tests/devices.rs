@@ -18,7 +18,8 @@ fn devices(count: usize) -> Vec<Arc<Device>> {
     (0..count).map(|_| device()).collect()
 }
 
-/// A room, or a floor below the open sky, with a lamp, a ball and a point light; floor and ball may have a relief.
+/// A room, or a floor below the open sky, with a lamp, a ball and a point light; floor and ball may
+/// have a relief.
 fn scene(relief: bool, closed: bool) -> Scene {
     let mut build = Build::new();
     let material = build.material(0.7, 0.0);

@@ -11,9 +11,10 @@ use mesolux::solver::{Estimator, Report, Settings, Solver, StopReason};
 
 /// Pixels a side of the ordinary hemicubes.
 const FACE: u32 = 32;
-/// The error of the finer faces over that of the ordinary ones, at most. Whether an element is in shadow is wrong along the shadows'
-/// edges, over a width that shrinks as the pixels do: four times finer ones leave a quarter of the squares. They leave some
-/// hundred wrong elements, a number that scatters by a tenth; three such steps are allowed. √(1.3 / 4)
+/// The error of the finer faces over that of the ordinary ones, at most. Whether an element is in
+/// shadow is wrong along the shadows' edges, over a width that shrinks as the pixels do: four times
+/// finer ones leave a quarter of the squares. They leave some hundred wrong elements, a number that
+/// scatters by a tenth; three such steps are allowed. √(1.3 / 4)
 const SHARPER: f64 = 0.57;
 
 fn settings(emitter_hemicube: Option<u32>) -> Settings {
@@ -46,7 +47,8 @@ fn plates() -> (Build, Range<usize>) {
 const PLATES: [f64; 3] = [-0.27, 0.01, 0.26];
 const HALF: f64 = 0.06;
 
-/// Root mean square of the error of the floor's light, against I cos θ / d² where no plate stands in between.
+/// Root mean square of the error of the floor's light, against I cos θ / d² where no plate stands
+/// in between.
 fn floor_error(build: &Build, floor: &Range<usize>, solved: &Solved) -> f64 {
     let squares = floor.clone().map(|e| {
         let corners = build.scene.corners(&build.scene.triangles[e]);
@@ -128,8 +130,9 @@ fn middle(build: &Build, element: usize) -> DVec3 {
     corners.into_iter().sum::<DVec3>() / 3.0
 }
 
-/// A plate a thousandth of an element above a floor shadows it, and not itself; nor does the floor shadow what stands on it. Neither winding
-/// nor what lies behind the eye or beyond the place matters.
+/// A plate a thousandth of an element above a floor shadows it, and not itself; nor does the floor
+/// shadow what stands on it. Neither winding nor what lies behind the eye or beyond the place
+/// matters.
 #[test]
 fn rays_tell_sheets_a_thin_gap_apart() {
     let mut build = Build::new();
@@ -174,7 +177,8 @@ fn room() -> Build {
     build
 }
 
-/// The limit of shots holds in either loop; a bake that is stopped within the first and goes on is the same to the bit.
+/// The limit of shots holds in either loop; a bake that is stopped within the first and goes on is
+/// the same to the bit.
 #[test]
 fn stops_and_goes_on_in_either_loop() {
     let build = room();
@@ -224,7 +228,8 @@ fn stops_and_goes_on_in_either_loop() {
     assert_silent();
 }
 
-/// Where everything glows, nothing is strong: there is no second loop, and the result is that of the option switched off.
+/// Where everything glows, nothing is strong: there is no second loop, and the result is that of
+/// the option switched off.
 #[test]
 fn weak_emitters_are_drawn_as_all_others() {
     let mut build = Build::new();
@@ -251,7 +256,8 @@ fn weak_emitters_are_drawn_as_all_others() {
     assert_silent();
 }
 
-/// A scene whose only hemicubes are those of its lamp is as if all were drawn as finely, whatever the size of the others.
+/// A scene whose only hemicubes are those of its lamp is as if all were drawn as finely, whatever
+/// the size of the others.
 #[test]
 fn form_factors_are_those_of_the_finer_size() {
     let (build, _) = plates();

@@ -4,11 +4,12 @@ use mesolux::render::{Flip, Picture, ldr};
 
 const WIDTH: u32 = 48;
 const HEIGHT: u32 = 40;
-/// Sums of some hundred f32 products of values about 1, each rounded to 2⁻²⁴, raised to powers of 0.5 and 0.7, which enlarge
-/// what is near 0; the authors' program rounds likewise.
+/// Sums of some hundred f32 products of values about 1, each rounded to 2⁻²⁴, raised to powers of
+/// 0.5 and 0.7, which enlarge what is near 0; the authors' program rounds likewise.
 const ROUNDING: f32 = 2e-5;
 
-/// Exposures of scaled pictures differ by 2⁻²¹, and with them their colours; the root enlarges that of features to 7e-4.
+/// Exposures of scaled pictures differ by 2⁻²¹, and with them their colours; the root enlarges that
+/// of features to 7e-4.
 const SCALED: f32 = 1e-3;
 
 fn alike(value: [f32; 3]) -> Vec<[f32; 3]> {
@@ -60,8 +61,8 @@ fn mean(error: &[f32]) -> f32 {
     (error.iter().map(|&e| f64::from(e)).sum::<f64>() / error.len() as f64) as f32
 }
 
-/// The mean and pixels that the C++ of the authors gives for the same codes (the crate nv-flip 0.1.2, at 67.020645
-/// pixels to a degree).
+/// The mean and pixels that the C++ of the authors gives for the same codes (the crate nv-flip
+/// 0.1.2, at 67.020645 pixels to a degree).
 const MEAN: f32 = 0.211_709_42;
 
 #[test]
@@ -84,16 +85,18 @@ fn agrees_with_the_authors_program() {
     }
 }
 
-/// Black and white have the HyAB distance 100, d = 100^0.7 = 25.119; the largest, green and blue, is 203.30^0.7 = 41.27 by
-/// their L*a*b* (87.73, −86.18, 83.18) and (32.30, 79.19, −107.86) after Hunt. The knee is at 0.4 · 41.27 = 16.51, and
-/// 0.95 + 0.05 (25.119 − 16.51) / (41.27 − 16.51) = 0.96739. Pictures without edges differ by their colours alone.
+/// Black and white have the HyAB distance 100, d = 100^0.7 = 25.119; the largest, green and blue,
+/// is 203.30^0.7 = 41.27 by their L*a*b* (87.73, −86.18, 83.18) and (32.30, 79.19, −107.86) after
+/// Hunt. The knee is at 0.4 · 41.27 = 16.51, and 0.95 + 0.05 (25.119 − 16.51) / (41.27 − 16.51) =
+/// 0.96739. Pictures without edges differ by their colours alone.
 #[test]
 fn even_pictures_have_closed_forms() {
     let found = ldr(&alike([1.0; 3]), &alike([0.0; 3]), WIDTH);
     assert!(found.iter().all(|e| (e - 0.967_39).abs() < ROUNDING));
     let found = ldr(&alike([0.0, 1.0, 0.0]), &alike([0.0, 0.0, 1.0]), WIDTH);
     assert!(found.iter().all(|e| (e - 1.0).abs() < ROUNDING));
-    // L* of a grey of 18.4187 % is 50, of which 100 is the double: below the knee 0.95 (50^0.7) / 16.51.
+    // L* of a grey of 18.4187 % is 50, of which 100 is the double: below the knee 0.95 (50^0.7) /
+    // 16.51.
     let grey = [0.184_186_52; 3];
     let found = ldr(&alike(grey), &alike([0.0; 3]), WIDTH);
     let expected = 0.95 * 50_f32.powf(0.7) / (0.4 * 203.30_f32.powf(0.7));
@@ -112,11 +115,12 @@ fn equal_pictures_do_not_differ_and_order_does_not_count() {
     assert_eq!(same.mean(), 0.0);
 }
 
-/// The tone curve x (0.9036 x + 0.018) / (x (0.8748 x + 0.354) + 0.14), which is shown as 0.85 at this x.
+/// The tone curve x (0.9036 x + 0.018) / (x (0.8748 x + 0.354) + 0.14), which is shown as 0.85 at
+/// this x.
 const BRIGHT: f64 = 2.118_872_3;
 
-/// Exposures bring the reference's brightest and its median to 0.85; what is scaled as a whole differs as before; a change in
-/// the dark is seen at the long exposure.
+/// Exposures bring the reference's brightest and its median to 0.85; what is scaled as a whole
+/// differs as before; a change in the dark is seen at the long exposure.
 #[test]
 fn exposures_follow_the_reference() {
     let x = BRIGHT;

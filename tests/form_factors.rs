@@ -6,7 +6,8 @@ use common::Build;
 use glam::DVec3;
 use mesolux::solver::{Estimator, Settings};
 
-/// Mean form factor from a receiver range to an emitter of radiosity 1, by one emission and no reflection.
+/// Mean form factor from a receiver range to an emitter of radiosity 1, by one emission and no
+/// reflection.
 fn form_factor(build: &Build, receivers: std::ops::Range<usize>, estimator: Estimator) -> f64 {
     let settings = Settings {
         estimator,

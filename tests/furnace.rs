@@ -1,5 +1,6 @@
-//! The generalised furnace: in a closed scene where every surface emits 1 − ρ, the radiosity is 1 everywhere, whatever
-//! the shapes and reflectances. It tests form factors, visibility, the solver's sums and its stop rule at once.
+//! The generalised furnace: in a closed scene where every surface emits 1 − ρ, the radiosity is 1
+//! everywhere, whatever the shapes and reflectances. It tests form factors, visibility, the
+//! solver's sums and its stop rule at once.
 
 mod common;
 

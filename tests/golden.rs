@@ -1,7 +1,9 @@
-//! A few pictures as they were when someone last looked at them, kept in `tests/golden`. They tell that something changed, not
-//! what is right: that is what the path tracer is asked for, in `relief_render` and `bench pictures`.
+//! A few pictures as they were when someone last looked at them, kept in `tests/golden`. They tell
+//! that something changed, not what is right: that is what the path tracer is asked for, in
+//! `relief_render` and `bench pictures`.
 //!
-//! `MESOLUX_WRITE_GOLDEN=1 cargo test --test golden` writes them anew; look at them, and say in the commit what changed them.
+//! `MESOLUX_WRITE_GOLDEN=1 cargo test --test golden` writes them anew; look at them, and say in the
+//! commit what changed them.
 
 mod common;
 
@@ -19,19 +21,21 @@ use mesolux::solver::Settings;
 const SIZE: (u32, u32) = (96, 72);
 const WRITE: &str = "MESOLUX_WRITE_GOLDEN";
 
-/// Of the full range, in which a picture is kept. The same driver gives the same codes. Another one rounds otherwise, by 1e-5
-/// after a bake: this is not seen but where a sample of a pixel's 16 is decided by it, at edges of things and of shadows. There
-/// a pixel may change by the sixteenth of what the two sides differ by.
+/// Of the full range, in which a picture is kept. The same driver gives the same codes. Another one
+/// rounds otherwise, by 1e-5 after a bake: this is not seen but where a sample of a pixel's 16 is
+/// decided by it, at edges of things and of shadows. There a pixel may change by the sixteenth of
+/// what the two sides differ by.
 const EDGE: f64 = 1.0 / 16.0;
-/// Share of the pixels that may differ by more than that: a pixel where several edges meet, now and then.
+/// Share of the pixels that may differ by more than that: a pixel where several edges meet, now and
+/// then.
 const MOST_BEYOND: f64 = 2e-3;
 /// Mean difference: one sample in every twentieth pixel, by a third of the range, 1/(16 · 20 · 3).
 const MOST_MEAN: f64 = 1e-3;
 
 type Kept = ImageBuffer<Rgb<u16>, Vec<u16>>;
 
-/// Radiance L as x/(1 + x) of x = L · 2^`exposure`, in 16 bits: every radiance has a code, none is cut off. With
-/// an x about 1, a light that is 1 % off changes the mean by 0.25 %.
+/// Radiance L as x/(1 + x) of x = L · 2^`exposure`, in 16 bits: every radiance has a code, none is
+/// cut off. With an x about 1, a light that is 1 % off changes the mean by 0.25 %.
 fn kept(picture: &Picture, exposure: f32) -> Kept {
     let code = |l: f32| {
         let x = l * exposure.exp2();

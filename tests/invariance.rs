@@ -1,4 +1,5 @@
-//! The same scene solved again, or by other threads, has the same bytes. Other invariances are in `stress.rs`.
+//! The same scene solved again, or by other threads, has the same bytes. Other invariances are in
+//! `stress.rs`.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

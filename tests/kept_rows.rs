@@ -9,8 +9,9 @@ use mesolux::math::directions::Directions;
 use mesolux::meso::{Options, Transport};
 use mesolux::solver::{Light, Report, Settings, Visibility};
 
-/// Unshot light that each solution leaves, as a share of all. It lands on elements as large as any other, and half of it and
-/// the rounding of sums in another order are what two solutions differ by.
+/// Unshot light that each solution leaves, as a share of all. It lands on elements as large as any
+/// other, and half of it and the rounding of sums in another order are what two solutions differ
+/// by.
 const RESIDUAL: f64 = 5e-7;
 /// Largest difference of two solutions, of the mean.
 const TOLERANCE: f32 = 1e-6;
@@ -52,7 +53,8 @@ fn settings() -> Settings {
 fn solve(relief: bool, visibility_memory: Option<u64>) -> (Light, Report) {
     let settings = Settings {
         visibility_memory,
-        // What a lamp reflects is drawn as what others do where its finer form factors are not kept.
+        // What a lamp reflects is drawn as what others do where its finer form factors are not
+        // kept.
         emitter_hemicube: Some(settings().hemicube),
         ..settings()
     };
@@ -92,7 +94,8 @@ fn light_does_not_depend_on_memory() {
                 let moments = |light: &mesolux::solver::ReliefLight| -> Vec<Vec3> {
                     light.moments.iter().flatten().copied().collect()
                 };
-                // Plain sums in f32, in another order: the strongest slot's rounding, half a step of random sign a shot.
+                // Plain sums in f32, in another order: the strongest slot's rounding, half a step
+                // of random sign a shot.
                 let rounding = 0.5 * f32::EPSILON * (twice.shots as f32).sqrt();
                 let (a, b) = (moments(a), moments(b));
                 let largest = a.iter().map(|v| v.abs().max_element()).fold(0.0, f32::max);
@@ -222,7 +225,8 @@ fn relights(emitter_hemicube: Option<u32>) {
     let light = solver.light().expect("the light comes back");
     assert!(largest_difference(&light.irradiance, &dark.irradiance) > 0.1);
 
-    // The new emitters are weak enough to be cut into the same groups. A bake anew would draw those among them more finely.
+    // The new emitters are weak enough to be cut into the same groups. A bake anew would draw those
+    // among them more finely.
     if !finer {
         let anew = solve(&relit, None).light().expect("the light comes back");
         let sum = |light: &Light| light.irradiance.iter().map(|e| e.as_dvec3()).sum::<DVec3>();
@@ -316,7 +320,8 @@ fn kept_form_factors_of_something_else_are_refused() {
     assert_silent();
 }
 
-/// What sources with a relief have sent evenly is sent by direction in the end, but for no more power than may be unshot.
+/// What sources with a relief have sent evenly is sent by direction in the end, but for no more
+/// power than may be unshot.
 #[test]
 fn sources_with_relief_send_by_direction_in_the_end() {
     // As coarse as bakes are: at a fine residual every source sends again in any case.

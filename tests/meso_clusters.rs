@@ -62,8 +62,9 @@ fn light_of(clusters: &[Cluster]) -> [DVec3; 3] {
     })
 }
 
-/// The lengths of moments that clusters of a corner may have joined differ from what they carry by the cosine of twice the
-/// threshold at most: a mean direction lies within the cone about the strongest, and so do all members.
+/// The lengths of moments that clusters of a corner may have joined differ from what they carry by
+/// the cosine of twice the threshold at most: a mean direction lies within the cone about the
+/// strongest, and so do all members.
 #[test]
 fn clusters_carry_the_energy_of_the_vertices() {
     let least = 2.0 * NEAR_PARALLEL_COS.powi(2) - 1.0;

@@ -10,7 +10,8 @@ use mesolux::passes::relief_visibility::ReliefVisibility;
 
 const SIDE: u32 = 8;
 
-/// Gentle slopes that differ along u and v and lie in no symmetry of the cell; black, so that nothing bounces.
+/// Gentle slopes that differ along u and v and lie in no symmetry of the cell; black, so that
+/// nothing bounces.
 fn field() -> HeightField {
     let heights: Vec<f32> = (0..SIDE * SIDE)
         .map(|k| {
@@ -28,7 +29,8 @@ fn field() -> HeightField {
     }
 }
 
-/// Light from the middle of each slot well above the slopes: E = n · ω at the corners of each cell, seen from within it.
+/// Light from the middle of each slot well above the slopes: E = n · ω at the corners of each cell,
+/// seen from within it.
 #[test]
 fn corners_take_light_by_their_own_slope() {
     let field = field();

@@ -13,8 +13,8 @@ fn world(frame: [Vec3; 3], v: Vec3) -> Vec3 {
     frame[0] * v.x + frame[1] * v.y + frame[2] * v.z
 }
 
-/// Parallel light of two colours' strengths: whatever the frames, every vertex has it as the same vector, in one or two
-/// slots, and the frames are orthonormal and one for all who share them.
+/// Parallel light of two colours' strengths: whatever the frames, every vertex has it as the same
+/// vector, in one or two slots, and the frames are orthonormal and one for all who share them.
 #[test]
 fn parallel_light_is_the_same_vector_in_every_frame() {
     let scene = sheet(8, 0.6);
@@ -56,7 +56,8 @@ fn parallel_light_is_the_same_vector_in_every_frame() {
     }
 }
 
-/// Where all frames are one, every slot keeps what it has: the mean over the elements by their angles.
+/// Where all frames are one, every slot keeps what it has: the mean over the elements by their
+/// angles.
 #[test]
 fn slots_of_a_plane_stay_apart() {
     let scene = sheet(2, 0.0);

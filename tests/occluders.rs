@@ -76,7 +76,8 @@ impl Merged {
         self.no_gaps();
     }
 
-    /// No corner lies within an edge of another triangle, unless elements themselves meet like that.
+    /// No corner lies within an edge of another triangle, unless elements themselves meet like
+    /// that.
     fn no_gaps(&self) {
         let gaps = |corners: &[[u32; 3]]| {
             let vertices: BTreeSet<u32> = corners.iter().flatten().copied().collect();
@@ -267,7 +268,8 @@ fn difference(a: &Solved, b: &Solved) -> f64 {
     (squares / area).sqrt() / (sum / area)
 }
 
-/// How many pixels may show another plane: a long edge that the near plane cuts is rounded elsewhere than a short one.
+/// How many pixels may show another plane: a long edge that the near plane cuts is rounded
+/// elsewhere than a short one.
 const FLIPPED: f64 = 1e-6;
 /// Largest rms of the difference over the mean.
 const DIFFERENCE: f64 = 1e-6;

@@ -13,9 +13,10 @@ use mesolux::path_tracer::{PathTracer, VirtualLights};
 
 /// A lamp over a dark floor, and a point light beside it.
 ///
-/// Each of 4,096 lights counts as a disc of the 64 of area over 4,096: 0.016 / π d² is 1.3e-3 of the light at a distance of 2; beside
-/// the point light 77 % of the paths begin on the lamp, and it is 1.6e-3. What so many points of Halton's sequence leave of the
-/// lamp's integral is less, since all of them are of nearly the same weight.
+/// Each of 4,096 lights counts as a disc of the 64 of area over 4,096: 0.016 / π d² is 1.3e-3 of
+/// the light at a distance of 2; beside the point light 77 % of the paths begin on the lamp, and it
+/// is 1.6e-3. What so many points of Halton's sequence leave of the lamp's integral is less, since
+/// all of them are of nearly the same weight.
 const LAMP_TOLERANCE: f64 = 2.5e-3;
 
 #[test]
@@ -51,8 +52,9 @@ fn virtual_lights_of_a_lamp_and_a_point() {
     }
 }
 
-/// 8,192 paths leave 16,384 lights. At the middle of a side of a unit cube their weights cosθ cosθ' / d² spread by about their
-/// mean: 0.8 % were they independent, of which three standard errors are allowed.
+/// 8,192 paths leave 16,384 lights. At the middle of a side of a unit cube their weights cosθ cosθ'
+/// / d² spread by about their mean: 0.8 % were they independent, of which three standard errors are
+/// allowed.
 const FURNACE_TOLERANCE: f64 = 0.024;
 
 /// A room whose sides reflect and emit one half: E = π everywhere.

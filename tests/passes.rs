@@ -165,8 +165,8 @@ fn drawn_without_culling(solver: &Solver, source: &Source) -> usize {
         .count()
 }
 
-/// Whether lists hold all triangles of a face or are filled again and again, and whether blocks of receivers are passed over as a whole or one by
-/// one: the same light, and the same counts.
+/// Whether lists hold all triangles of a face or are filled again and again, and whether blocks of
+/// receivers are passed over as a whole or one by one: the same light, and the same counts.
 #[test]
 fn light_does_not_depend_on_lists_nor_on_blocks() {
     let build = enclosed();
@@ -397,8 +397,9 @@ fn estimators_equal_their_twins() {
         }
         let scale = expected.iter().copied().fold(0.0, f64::max);
         assert!(scale > 0.0);
-        // Pixels on the edge of two triangles may go to either, which moves a pixel's worth of light between neighbours:
-        // nearly all elements must agree to rounding (far sources: 0.07 %), the sum of all to less.
+        // Pixels on the edge of two triangles may go to either, which moves a pixel's worth of
+        // light between neighbours: nearly all elements must agree to rounding (far sources: 0.07
+        // %), the sum of all to less.
         let agree = |e: usize| {
             (f64::from(light.irradiance_direct[e].x) - expected[e]).abs()
                 <= 1.5e-3 * expected[e] + 1e-5 * scale

@@ -113,9 +113,10 @@ fn elements_of_a_tile_or_more_have_its_response() {
     assert_silent();
 }
 
-/// The parts of a tile, by area, are the tile. Exactly so where no height shifts a facet aside; else up to the rows being
-/// made to sum to 1, which allots a footprint a little more or less of the facets at its rim: a facet is taken to lie at its
-/// centre, half a texel from its corners at most, in footprints four texels wide.
+/// The parts of a tile, by area, are the tile. Exactly so where no height shifts a facet aside;
+/// else up to the rows being made to sum to 1, which allots a footprint a little more or less of
+/// the facets at its rim: a facet is taken to lie at its centre, half a texel from its corners at
+/// most, in footprints four texels wide.
 #[test]
 fn footprints_sum_to_their_tile() {
     let directions = Directions::new(16).expect("a number of the paper");
@@ -138,7 +139,8 @@ fn footprints_sum_to_their_tile() {
         assert!(apart <= most_apart);
         // The parts of bumps are not alike, or the test would see nothing.
         assert!(height < 1.0 || spread > 0.5);
-        // Under a sky of radiosity 1 facets that emit 1 − ρ send 1, and so does every part into every slot.
+        // Under a sky of radiosity 1 facets that emit 1 − ρ send 1, and so does every part into
+        // every slot.
         for part in of.parts.iter().chain([&of.whole]) {
             for slot in 0..directions.count() {
                 let uniform: Vec<[Vec3; 3]> = uniform_sky(&directions);
@@ -158,8 +160,8 @@ fn footprints_sum_to_their_tile() {
 
 /// Rounding of sums over 1,152 facets and 16 slots in f32, and bounces left out below 1e-6.
 const FURNACE: f32 = 1e-4;
-/// Rims of triangles two texels wide are sampled twice a texel: densities of the cells there are off by some percent, up or
-/// down by chance.
+/// Rims of triangles two texels wide are sampled twice a texel: densities of the cells there are
+/// off by some percent, up or down by chance.
 const RIMS: f32 = 3e-3;
 
 /// Moments of a sky of radiosity 1.
@@ -175,7 +177,8 @@ fn uniform_sky(directions: &Directions) -> Vec<[Vec3; 3]> {
         .collect()
 }
 
-/// Triangles that show the same texels share a footprint, in whatever repeat they lie; too many are joined by place.
+/// Triangles that show the same texels share a footprint, in whatever repeat they lie; too many are
+/// joined by place.
 #[test]
 fn footprints_are_shared_and_bounded() {
     let directions = Directions::new(16).expect("a number of the paper");

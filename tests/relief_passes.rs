@@ -16,7 +16,8 @@ use mesolux::solver::{Estimator, Settings, Solver};
 const BATCH: u32 = 6;
 const FACE: u32 = 32;
 
-/// A room with an area light and a point light; four of its sides and a ball have a coloured relief, and the ball glows.
+/// A room with an area light and a point light; four of its sides and a ball have a coloured
+/// relief, and the ball glows.
 fn scene() -> Build {
     let mut build = Build::new();
     let floor = build.material(0.8, 0.0);
@@ -141,7 +142,8 @@ fn sources_send_as_their_twin() {
                     slot.reflected.as_dvec3(),
                 );
                 let row = |part: usize| &sent.exits[(2 * i + part) * directions..][..directions];
-                // Sums of some 64 · 3 products in f32 and their differences from what was sent before.
+                // Sums of some 64 · 3 products in f32 and their differences from what was sent
+                // before.
                 let scale = twin
                     .kept
                     .iter()
@@ -260,8 +262,8 @@ fn apart<'a>(
 fn pixels_bring_light_as_their_twin() {
     // Differences of sums before and after the batch, each of thousands of pixels in f32.
     const ROUNDING: f64 = 1e-4;
-    // A pixel whose ray lies on the border of two slots or texels may fall to either side, and moves what one pixel in
-    // hundreds brings.
+    // A pixel whose ray lies on the border of two slots or texels may fall to either side, and
+    // moves what one pixel in hundreds brings.
     const BORDER: f64 = 0.02;
     for (transport, k) in [(Transport::Physical, 32), (Transport::Paper, 16)] {
         let (mut by_direction, mut even) = (0, 0);

@@ -1,4 +1,5 @@
-//! The pixel estimator on surfaces with relief against closed forms and against the other estimator.
+//! The pixel estimator on surfaces with relief against closed forms and against the other
+//! estimator.
 
 mod common;
 
@@ -39,8 +40,9 @@ fn compare(found: &[Vec3], expected: &[Vec3]) -> (f64, f64) {
     ((squares / n).sqrt() / (sum / n), bias / sum)
 }
 
-/// A plate under a point light: I cos θ / r² arrives, and each element sends what it sends by the other estimator, with the
-/// same light in the same slots. With `paper` the pixels' normals and albedos stand for those of the footprint.
+/// A plate under a point light: I cos θ / r² arrives, and each element sends what it sends by the
+/// other estimator, with the same light in the same slots. With `paper` the pixels' normals and
+/// albedos stand for those of the footprint.
 #[test]
 fn a_plate_under_a_point_light() {
     let mut build = Build::new();
@@ -51,8 +53,9 @@ fn a_plate_under_a_point_light() {
     build.uv(all.clone(), DVec3::X, DVec3::Y);
     let lamp = DVec3::new(0.45, 0.4, 0.9);
     build.point_light(lamp, 1.0);
-    // An element of 1/32 at a distance of 0.9 is seen by some 157 pixels of 128² a face, of which some 54 lie on its rim and
-    // may be in or out: 54^½ / 2 of 157 are 2.3 %, and twice that where a seam of two faces crosses the plate.
+    // An element of 1/32 at a distance of 0.9 is seen by some 157 pixels of 128² a face, of which
+    // some 54 lie on its rim and may be in or out: 54^½ / 2 of 157 are 2.3 %, and twice that where
+    // a seam of two faces crosses the plate.
     const PIXELS: f64 = 0.05;
     for transport in [Transport::Physical, Transport::Paper] {
         let [receiver, pixel] = [Estimator::Receiver, Estimator::Pixel]

@@ -1,5 +1,6 @@
-//! A plate with a relief under parallel light: what it sends by direction against its displaced mesh, path traced by an
-//! independent method (triangles, a bounding volume hierarchy, Monte Carlo).
+//! A plate with a relief under parallel light: what it sends by direction against its displaced
+//! mesh, path traced by an independent method (triangles, a bounding volume hierarchy, Monte
+//! Carlo).
 
 mod common;
 
@@ -24,15 +25,17 @@ const TEXELS: u32 = 32;
 /// Tiles of the plate on each side of the middle one.
 const AROUND: i32 = 3;
 const RHO: f32 = 0.7;
-/// For each light and slot: leaves a noise of 1.3 % of the mean in each, which the rms over all holds too.
+/// For each light and slot: leaves a noise of 1.3 % of the mean in each, which the rms over all
+/// holds too.
 const PATHS: usize = 1000;
 /// For each light, element and slot.
 const PART_PATHS: usize = 80;
 /// What was promised of the program.
 const MOST_RMS: f64 = 0.03;
 const MOST_BIAS: f64 = 0.01;
-/// Of the light sent by single elements, the reference's noise taken off: what is promised of the whole plate, and a third
-/// more since a part does not average over the rims of shadows, which a slot blurs.
+/// Of the light sent by single elements, the reference's noise taken off: what is promised of the
+/// whole plate, and a third more since a part does not average over the rims of shadows, which a
+/// slot blurs.
 const MOST_PART_RMS: f64 = 0.04;
 /// Error with footprints over error without.
 const MOST_OF_TILE: f64 = 0.2;
@@ -115,8 +118,8 @@ impl Mesh {
             })
     }
 
-    /// πL towards `to` through a place of the plane z = 0, for parallel light from `light` that gives an irradiance of 1 on
-    /// the plate; one path.
+    /// πL towards `to` through a place of the plane z = 0, for parallel light from `light` that
+    /// gives an irradiance of 1 on the plate; one path.
     fn path(&self, through: Vec3A, to: Vec3A, light: Vec3A, random: &mut Random) -> f64 {
         let start = through + to * (self.top / to.z);
         let (mut from, mut direction) = (start, -to);
@@ -160,8 +163,8 @@ fn lights() -> Vec<DVec3> {
         .collect()
 }
 
-/// What each element of a baked plate of `side` repeats, cut into `cells`² squares, sends into each slot for an irradiance of
-/// 1, with its corners, `[element][slot]`.
+/// What each element of a baked plate of `side` repeats, cut into `cells`² squares, sends into each
+/// slot for an irradiance of 1, with its corners, `[element][slot]`.
 fn baked(
     directions: Directions,
     light: DVec3,
@@ -213,7 +216,8 @@ fn mean_of_elements(plate: &[([DVec3; 3], Vec<f64>)]) -> Vec<f64> {
         .collect()
 }
 
-/// The same by paths on the displaced mesh from places of the plane z = 0, with the standard error of each.
+/// The same by paths on the displaced mesh from places of the plane z = 0, with the standard error
+/// of each.
 fn traced(
     mesh: &Mesh,
     directions: Directions,
@@ -221,7 +225,8 @@ fn traced(
     paths: usize,
     place: impl Fn(&mut Random) -> Vec3A + Sync,
 ) -> Vec<(f64, f64)> {
-    // A slot's light is looked up bilinearly: what lies about its middle counts by that weight and its cosine.
+    // A slot's light is looked up bilinearly: what lies about its middle counts by that weight and
+    // its cosine.
     let mut looks = vec![Vec::new(); directions.count()];
     for cell in FineCell::all() {
         for (slot, weight) in directions.bilinear(cell.direction) {
@@ -302,7 +307,8 @@ fn plate_sends_what_its_displaced_mesh_sends() {
     }
 }
 
-/// One bump map over a plate of 72 elements: what each sends, by its own footprint and by the mean of the tile.
+/// One bump map over a plate of 72 elements: what each sends, by its own footprint and by the mean
+/// of the tile.
 #[test]
 fn elements_of_a_plate_send_what_their_part_of_the_mesh_sends() {
     let mesh = Mesh::new();

@@ -1,4 +1,5 @@
-//! What a relief does to light: its visibility on the device against the CPU twin, effective albedos against closed forms.
+//! What a relief does to light: its visibility on the device against the CPU twin, effective
+//! albedos against closed forms.
 
 mod common;
 
@@ -75,13 +76,15 @@ fn visibility_is_its_twins() {
     assert_silent();
 }
 
-/// A spherical cap below a plane: albedo of its opening is ρF / (1 − ρ(1 − F)), F = opening / cap, at every angle.
+/// A spherical cap below a plane: albedo of its opening is ρF / (1 − ρ(1 − F)), F = opening / cap,
+/// at every angle.
 #[test]
 fn spherical_dimples() {
     let device = device();
     const RADIUS: f64 = 0.46;
     for share in [0.5_f64, 0.75] {
-        // F = 1 − h / 2R and a² = 2Rh − h² for a cap of depth h and opening radius a of a sphere of radius R.
+        // F = 1 − h / 2R and a² = 2Rh − h² for a cap of depth h and opening radius a of a sphere of
+        // radius R.
         let depth = 2.0 * (1.0 - share);
         let sphere = RADIUS / (2.0 * depth - depth * depth).sqrt();
         let field = field(128, |x, y| {

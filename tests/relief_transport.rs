@@ -29,7 +29,8 @@ fn bumps(x: f64, y: f64) -> f64 {
     0.02 * wave(x) * wave(2.0 * y) + 0.01 * wave(3.0 * x + y)
 }
 
-/// A closed room with a sphere in it; floor, one wall and the sphere have a relief. Everywhere E = 1 − ρ.
+/// A closed room with a sphere in it; floor, one wall and the sphere have a relief. Everywhere E =
+/// 1 − ρ.
 fn furnace() -> Build {
     let mut build = Build::new();
     let mut material = |rho: f32| build.material(rho, (1.0 - rho) / std::f32::consts::PI);
@@ -107,8 +108,8 @@ fn furnace_with_relief() {
     assert!(mean < 0.998);
 }
 
-/// A room lit from above, with a relief on a block in its middle: irradiance of the plain walls, floor and ceiling against
-/// the same scene with the relief as geometry.
+/// A room lit from above, with a relief on a block in its middle: irradiance of the plain walls,
+/// floor and ceiling against the same scene with the relief as geometry.
 #[test]
 fn walls_about_a_relief_are_lit_as_by_its_geometry() {
     let mut build = Build::new();
@@ -189,7 +190,8 @@ fn walls_about_a_relief_are_lit_as_by_its_geometry() {
     assert!(bias.abs() <= 0.01 && rms <= 0.03);
 }
 
-/// A flat height map is no relief; a scene without relief is solved to the same bytes whatever the transport.
+/// A flat height map is no relief; a scene without relief is solved to the same bytes whatever the
+/// transport.
 #[test]
 fn flat_maps_and_scenes_without_relief_are_plain() {
     let mut build = Build::new();
@@ -200,7 +202,8 @@ fn flat_maps_and_scenes_without_relief_are_plain() {
         t.material = lamp;
     }
     let quick = |transport| Settings {
-        // What is left unshot may lie anywhere, for equal sources are shot in an order that rounding decides.
+        // What is left unshot may lie anywhere, for equal sources are shot in an order that
+        // rounding decides.
         residual: 1e-6,
         ..settings(transport, 64)
     };
@@ -229,7 +232,8 @@ fn flat_maps_and_scenes_without_relief_are_plain() {
         "nearly flat relief on {} elements: largest difference of radiosity {worst:.1e}",
         relief.elements.len()
     );
-    // Form factors are rounded to 16 bits, to 1/2048 of themselves, and those to relief as vectors, not as numbers.
+    // Form factors are rounded to 16 bits, to 1/2048 of themselves, and those to relief as vectors,
+    // not as numbers.
     assert!(worst < 1.0 / 2048.0);
 }
 

@@ -64,9 +64,10 @@ fn view(camera: &Camera) -> View<'_> {
     }
 }
 
-/// A ray leaves one prism of each plate, or two where it passes from one to the next: through seams of 7 units' length for
-/// a unit of area (lines every half unit along both sides, and diagonals), into whose breadth the prism's height is
-/// foreshortened by half the field of view's diagonal at most.
+/// A ray leaves one prism of each plate, or two where it passes from one to the next: through seams
+/// of 7 units' length for a unit of area (lines every half unit along both sides, and diagonals),
+/// into whose breadth the prism's height is foreshortened by half the field of view's diagonal at
+/// most.
 #[test]
 fn overdraw_counts_all_layers() {
     let most_twice = 2.0 * 7.0 * 1.1 * HEIGHT * (20.0_f64.to_radians().tan() * 2.0_f64.sqrt());
@@ -98,7 +99,8 @@ fn overdraw_counts_all_layers() {
 fn slots_have_one_colour_a_triangle() {
     // f32 in the mean of 16 samples.
     const ROUNDING: f32 = 1e-5;
-    // Pixels that a seam crosses: lines every half unit, and diagonals, over 0.73 units in 40 pixels.
+    // Pixels that a seam crosses: lines every half unit, and diagonals, over 0.73 units in 40
+    // pixels.
     const MIXED: usize = 1600 / 5;
     let scene = plates();
     let solution = baked(&scene);

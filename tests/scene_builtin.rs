@@ -117,7 +117,8 @@ fn solids(scene: &Scene) -> Vec<Vec<&Triangle>> {
     pieces(scene.triangles.iter().filter(|t| !in_room(t)))
 }
 
-/// Around every vertex the triangles form one closed fan, each edge used once in each direction; volume positive.
+/// Around every vertex the triangles form one closed fan, each edge used once in each direction;
+/// volume positive.
 fn closed(scene: &Scene, solid: &[&Triangle], what: &str) {
     let mut rims: HashMap<u32, HashMap<u32, u32>> = HashMap::new();
     let mut volume = 0.0;
@@ -279,7 +280,8 @@ fn coordinates_and_materials_are_sane() {
         );
         let relief = scene.materials.iter().find(|m| m.has_relief()).unwrap();
         let map = relief.map_height.as_deref().unwrap();
-        // The length of one repeat, by lengths in space and in texels (edges lie aslant: a few percent less).
+        // The length of one repeat, by lengths in space and in texels (edges lie aslant: a few
+        // percent less).
         let tile = edges / texels * f64::from(map.width);
         let slope = f64::from(relief.height_scale) / tile * unit_slope(map);
         println!(

@@ -1,4 +1,5 @@
-//! The built-in Cornell box: exactly as many elements as asked for, no T-junction, no gap, fronts inward.
+//! The built-in Cornell box: exactly as many elements as asked for, no T-junction, no gap, fronts
+//! inward.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -19,7 +20,8 @@ fn triangles_of<'a>(scene: &'a Scene, names: &'a [&str]) -> impl Iterator<Item =
 
 const ROOM: [&str; 4] = ["white", "red", "green", "light"];
 
-/// The meshes that tests may use but the project does not hold; said aloud where they are not there.
+/// The meshes that tests may use but the project does not hold; said aloud where they are not
+/// there.
 fn horse() -> Option<PathBuf> {
     let shared = match std::env::var_os("MESOLUX_SHARED") {
         Some(shared) => PathBuf::from(shared),
@@ -116,8 +118,8 @@ fn stands_in_the_room(scene: &Scene) {
     assert!(high.y > 1.5 && high.y < 4.5, "{high}");
 }
 
-/// Each edge of the room belongs to two triangles in opposite directions, or to one at the opening; no vertex lies
-/// within an edge.
+/// Each edge of the room belongs to two triangles in opposite directions, or to one at the opening;
+/// no vertex lies within an edge.
 fn conforming(scene: &Scene) {
     let mut edges: HashMap<[u32; 2], usize> = HashMap::new();
     for [a, b, c] in triangles_of(scene, &ROOM).map(|t| t.vertices) {

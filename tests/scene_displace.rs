@@ -47,7 +47,8 @@ fn triangle(vertices: [u32; 3], uv: [[f32; 2]; 3], material: u32) -> Triangle {
     }
 }
 
-/// The square from (0,0) to (2,2) in z = 0 under one tile; with `beside` a plain one of the same size at its right.
+/// The square from (0,0) to (2,2) in z = 0 under one tile; with `beside` a plain one of the same
+/// size at its right.
 fn sheet(material: Material, beside: bool) -> Scene {
     let mut scene = Scene {
         name: "sheet".into(),
@@ -106,7 +107,8 @@ fn edges(triangles: impl Iterator<Item = Triangle>) -> HashMap<[u32; 2], usize> 
 
 #[test]
 fn a_wave_on_a_plane_has_exact_heights_at_the_vertices() {
-    // Legs of 8 texels are halved three times, the diagonal of 11.3 four times: 16 rows of 8 squares, halved.
+    // Legs of 8 texels are halved three times, the diagonal of 11.3 four times: 16 rows of 8
+    // squares, halved.
     for (scale, beside) in [(0.3_f32, false), (-0.125, false)] {
         let heights = waves(8);
         let flat = sheet(relief(heights.clone(), scale), beside);
@@ -243,7 +245,8 @@ fn at_a_seam_the_mean_of_the_heights_counts() {
 
 #[test]
 fn it_moves_along_the_smooth_normal() {
-    // A roof of two planes that meet at the ridge x = 0 at right angles: there the normal is straight up.
+    // A roof of two planes that meet at the ridge x = 0 at right angles: there the normal is
+    // straight up.
     let mut roof = sheet(relief(map(4, |u, _| (TAU * u).cos()), 1.0), false);
     let x = 0.5_f64.sqrt();
     roof.vertices = [

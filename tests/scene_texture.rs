@@ -157,8 +157,8 @@ fn the_mean_of_a_gradient_is_its_value_at_the_centroid() {
     ] {
         let centroid = (uv[0][0] + uv[1][0] + uv[2][0]) / 3.0;
         let mean = t.mean_over_triangle(&uv);
-        // Exact where the strata resolve the texels; jittered strata err by less than the step of one, 0.8/64, over
-        // the root of their number, 64: 2e-4.
+        // Exact where the strata resolve the texels; jittered strata err by less than the step of
+        // one, 0.8/64, over the root of their number, 64: 2e-4.
         assert!(
             close(mean, [centroid, 0.25, 1.0 - centroid], 4e-4),
             "{mean:?} {centroid}"
@@ -168,11 +168,12 @@ fn the_mean_of_a_gradient_is_its_value_at_the_centroid() {
 
 #[test]
 fn the_mean_weighs_by_area() {
-    // Left half black, right half white: the triangle (0,0) (1,0) (1,1) has three quarters of its area on the right.
+    // Left half black, right half white: the triangle (0,0) (1,0) (1,1) has three quarters of its
+    // area on the right.
     let t = texture(256, 4, |x, _| if x < 128 { 0.0 } else { 1.0 });
     let mean = t.mean_over_triangle(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]);
-    // Standard error of 64² jittered strata of which one in 64 straddles the edge: under 1e-3; the filter's half texel
-    // at the repeat adds 1/512.
+    // Standard error of 64² jittered strata of which one in 64 straddles the edge: under 1e-3; the
+    // filter's half texel at the repeat adds 1/512.
     assert!((mean[0] - 0.75).abs() < 4e-3, "{mean:?}");
     // A checkerboard far finer than the strata must not fall into step with them.
     let t = texture(512, 512, |x, y| ((x + y) % 2) as f32);

@@ -1,4 +1,5 @@
-//! Series of pictures and the cache of bakes: what is kept between pictures and between runs changes none of them.
+//! Series of pictures and the cache of bakes: what is kept between pictures and between runs
+//! changes none of them.
 
 mod common;
 
@@ -77,7 +78,8 @@ fn a_path_passes_all_cameras_without_a_kink() {
         assert!(found.position.distance(expected.position) < ROUNDING * 10.0);
         assert!((found.fov_y - expected.fov_y).abs() < 1e-12);
     }
-    // Speeds on both sides of a camera differ by what a step of acceleration adds, at most 0.01² of twice the places' spread.
+    // Speeds on both sides of a camera differ by what a step of acceleration adds, at most 0.01² of
+    // twice the places' spread.
     for at in [100, 200] {
         let speed = |i: usize| path[i + 1].position - path[i].position;
         assert!(speed(at).distance(speed(at - 1)) < 2e-3);
@@ -242,7 +244,8 @@ fn series_are_numbered_and_do_not_flicker() {
         let found = read(&format!("turn-000{}.png", i + 1));
         assert!(found == read("expected.png"), "picture {}", i + 1);
     }
-    // By the path tracer too; an .obj names one camera, which makes no path; parts of the series belong to it.
+    // By the path tracer too; an .obj names one camera, which makes no path; parts of the series
+    // belong to it.
     let traced = [
         "render",
         "room.obj",

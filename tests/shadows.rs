@@ -1,5 +1,5 @@
-//! Direct light on relief and on plain triangles in the shadow of other parts of the scene, against the path tracer on the
-//! displaced mesh.
+//! Direct light on relief and on plain triangles in the shadow of other parts of the scene, against
+//! the path tracer on the displaced mesh.
 
 mod common;
 
@@ -69,7 +69,8 @@ fn baked(scene: &Scene) -> Solution {
     bake(&device(), scene, &settings, |_| true).expect("the device solves the scene")
 }
 
-/// A room whose floor has triangles of half its width, with a relief or none, a small lamp and a block on the floor.
+/// A room whose floor has triangles of half its width, with a relief or none, a small lamp and a
+/// block on the floor.
 fn room(relief: bool, lamp_side: f64) -> Scene {
     let mut build = Build::new();
     let white = build.material(0.3, 0.0);
@@ -143,9 +144,10 @@ fn compare(
     }
 }
 
-/// Root of the mean square over the mean. A pixel of a penumbra sees a share p of a lamp by 64 points, within
-/// √(p(1 − p)/64) ≤ 6 % of the whole if they were thrown at random; a tenth of the pixels are such: 2 %. With the paths' own 1 %
-/// and a half as much again for what the 64 points leave of the relief's shadows.
+/// Root of the mean square over the mean. A pixel of a penumbra sees a share p of a lamp by 64
+/// points, within √(p(1 − p)/64) ≤ 6 % of the whole if they were thrown at random; a tenth of the
+/// pixels are such: 2 %. With the paths' own 1 % and a half as much again for what the 64 points
+/// leave of the relief's shadows.
 const MOST_RMS: f64 = 0.035;
 /// What was promised of the program's pictures of relief.
 const MOST_BIAS: f64 = 0.01;
@@ -196,8 +198,9 @@ fn ball(cells: u32) -> Scene {
     build.0.scene
 }
 
-/// A fifteenth of the pixels are lit. Among them penumbrae are everywhere: 6 % of the lit pixels' mean, as above, is √15 times
-/// as much of the picture's, 0.23; the triangles' parabolas may add half as much again.
+/// A fifteenth of the pixels are lit. Among them penumbrae are everywhere: 6 % of the lit pixels'
+/// mean, as above, is √15 times as much of the picture's, 0.23; the triangles' parabolas may add
+/// half as much again.
 const MOST_BALL_RMS: f64 = 0.35;
 
 /// The dark half of the ball is seen, and the rim that its bumps rise from into the light.
@@ -218,10 +221,12 @@ fn bumps_beyond_the_horizon_rise_into_the_light() {
     assert_silent();
 }
 
-/// A lit pixel by its middle and by the mean of the paths through it, which jitter: what E changes by over half a pixel.
+/// A lit pixel by its middle and by the mean of the paths through it, which jitter: what E changes
+/// by over half a pixel.
 const EVEN: f64 = 0.02;
 
-/// In the light of a point nothing is half in shadow but at edges: neither acne nor light under what touches the floor.
+/// In the light of a point nothing is half in shadow but at edges: neither acne nor light under
+/// what touches the floor.
 #[test]
 fn contacts_leak_no_light_and_surfaces_do_not_shadow_themselves() {
     let mut scene = room(false, 0.3);
@@ -289,12 +294,12 @@ fn contacts_leak_no_light_and_surfaces_do_not_shadow_themselves() {
     assert_silent();
 }
 
-/// The least share of open triangles: of a wall's 4 × 4 cells the inner four touch no other wall, which would count as hiding
-/// the lamp; the block's and the ball's shadows take a few of them.
+/// The least share of open triangles: of a wall's 4 × 4 cells the inner four touch no other wall,
+/// which would count as hiding the lamp; the block's and the ball's shadows take a few of them.
 const OPEN: f64 = 0.15;
 
-/// Ways that nothing stands on are not followed, and the picture is the same to the bit; what the block or a card's shadow
-/// falls on is not open, however many lamps there are.
+/// Ways that nothing stands on are not followed, and the picture is the same to the bit; what the
+/// block or a card's shadow falls on is not open, however many lamps there are.
 #[test]
 fn open_triangles_follow_no_ways() {
     let camera = camera(DVec3::new(1.9, 1.2, 1.9), DVec3::new(1.0, 0.2, 0.8), 75.0);
@@ -344,8 +349,9 @@ fn open_triangles_follow_no_ways() {
     assert_silent();
 }
 
-/// Shares by which a crossing in f32 may lie on another side than in f64: coordinates of up to 4 round by 2⁻²², a volume of
-/// three such by some 2⁻²⁰ against triangles of 10⁻² and ways of 1: 10⁻⁴ of a share.
+/// Shares by which a crossing in f32 may lie on another side than in f64: coordinates of up to 4
+/// round by 2⁻²², a volume of three such by some 2⁻²⁰ against triangles of 10⁻² and ways of 1: 10⁻⁴
+/// of a share.
 const UNSURE: f64 = 1e-3;
 
 #[test]

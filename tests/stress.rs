@@ -1,4 +1,5 @@
-//! The cases of `bench stress` in their small size. Those that are not right yet are ignored, each with what is wrong.
+//! The cases of `bench stress` in their small size. Those that are not right yet are ignored, each
+//! with what is wrong.
 
 mod common;
 

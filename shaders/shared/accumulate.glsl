@@ -1,4 +1,5 @@
-// Adds to a sum that is kept with the rounding error of the last addition (Kahan), so that 10⁵ shots do not drift.
+// Adds to a sum that is kept with the rounding error of the last addition (Kahan), so that 10⁵
+// shots do not drift.
 
 void accumulate(inout vec3 sum, inout vec3 error, vec3 add) {
     precise vec3 y = add - error;

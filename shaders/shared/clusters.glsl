@@ -1,8 +1,10 @@
-// The paper's way of lighting relief: the light on a face comes as a few parallel lights, src/meso/clusters.rs, and a march
-// over the height map tells which of them a place sees. Including files have Prism, ReliefSurface, Place, facet_normal, LIFT,
-// shared/height_march.glsl and a buffer `ParallelLight parallel_lights[]`.
+// The paper's way of lighting relief: the light on a face comes as a few parallel lights,
+// src/meso/clusters.rs, and a march over the height map tells which of them a place sees. Including
+// files have Prism, ReliefSurface, Place, facet_normal, LIFT, shared/height_march.glsl and a buffer
+// `ParallelLight parallel_lights[]`.
 
-// Irradiance by the parallel lights on a face, by the surface's own normal and shadowed by the relief.
+// Irradiance by the parallel lights on a face, by the surface's own normal and shadowed by the
+// relief.
 vec3 clustered(Prism p, ReliefSurface surface, Place place) {
     vec3 sum = vec3(0.0);
     if (p.cluster_count == 0) {

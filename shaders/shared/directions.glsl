@@ -1,7 +1,8 @@
-// Directions of the hemisphere about z in cells of equal solid angle, columns × rows of the concentric map's square:
-// src/directions.rs is the same in f64.
+// Directions of the hemisphere about z in cells of equal solid angle, columns × rows of the
+// concentric map's square: src/directions.rs is the same in f64.
 
-// From the hemisphere to the square −1..1; a direction below the horizon is taken to the nearest on it.
+// From the hemisphere to the square −1..1; a direction below the horizon is taken to the nearest on
+// it.
 vec2 to_square(vec3 direction) {
     const float QUARTER = 1.57079633;
     float r = sqrt(1.0 - clamp(direction.z, 0.0, 1.0));
@@ -40,7 +41,8 @@ vec3 direction_centre(uint k, uvec2 cells) {
     return from_square((2.0 * vec2(k % cells.x, k / cells.x) + 1.0) / vec2(cells) - 1.0);
 }
 
-// The four directions about one, bilinear between the middles of the cells and held at the square's border.
+// The four directions about one, bilinear between the middles of the cells and held at the square's
+// border.
 struct Look {
     uvec4 k;
     vec4 weight;

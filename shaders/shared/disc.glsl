@@ -1,6 +1,7 @@
-// A source seen wide, as an ellipse of even radiance about the direction of its light and above the horizon, of which only the
-// vector f is known (its dot product with a normal is the form factor to a facet with that normal): points of the ellipse, with
-// f's share of each. src/reference/disc.rs is the same in f64.
+// A source seen wide, as an ellipse of even radiance about the direction of its light and above the
+// horizon, of which only the vector f is known (its dot product with a normal is the form factor to
+// a facet with that normal): points of the ellipse, with f's share of each. src/reference/disc.rs
+// is the same in f64.
 
 struct Disc {
     vec3 axis;

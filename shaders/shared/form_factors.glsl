@@ -1,6 +1,6 @@
-// Form factors of the elements that sort_receivers.comp has listed for one slot and kind. VECTOR_FLUX: the elements receive by
-// direction, and get the vector whose dot product with the normal is the form factor. SHADOW_RAYS: what is seen is asked of rays
-// instead of the item buffer.
+// Form factors of the elements that sort_receivers.comp has listed for one slot and kind.
+// VECTOR_FLUX: the elements receive by direction, and get the vector whose dot product with the
+// normal is the form factor. SHADOW_RAYS: what is seen is asked of rays instead of the item buffer.
 
 #ifdef SHADOW_RAYS
 #define RAYS 1
@@ -14,17 +14,19 @@
 #include "shared/lambert.glsl"
 #include "shared/kept.glsl"
 
-// RECEIVE_FAR, RECEIVE_OUTLINE, RECEIVE_PARTS or RECEIVE_NEAR. A software device works through both sides of every branch, so that each
-// kind has a pipeline of its own.
+// RECEIVE_FAR, RECEIVE_OUTLINE, RECEIVE_PARTS or RECEIVE_NEAR. A software device works through both
+// sides of every branch, so that each kind has a pipeline of its own.
 layout(constant_id = 0) const uint KIND = RECEIVE_OUTLINE;
 
-// xyz: a corner; w: 1 where a loop of the contour starts (each loop ends with its first corner again).
+// xyz: a corner; w: 1 where a loop of the contour starts (each loop ends with its first corner
+// again).
 layout(binding = 7) uniform usamplerBuffer contours;
 // TRIANGLE_TEXELS an element.
 layout(binding = 8) uniform usamplerBuffer triangles;
 // Of curved sources: centroid and sum of area times normal, two words unused; PART_TEXELS a part.
 layout(binding = 9) uniform usamplerBuffer parts;
-// 1 where any element of a block of GROUP sees the source, [slot][block]. Whoever reads it sets it to 0 again.
+// 1 where any element of a block of GROUP sees the source, [slot][block]. Whoever reads it sets it
+// to 0 again.
 layout(scalar, binding = 10) writeonly buffer Occupied { uint occupied[]; };
 // [slot][element of this dispatch]
 layout(scalar, binding = 11) writeonly buffer Fresh { FLUX fresh[]; };
@@ -47,8 +49,8 @@ vec3 own_corner(uint element, uint corner) {
     return fetch(triangles, TRIANGLE_TEXELS * element + corner).xyz;
 }
 
-// Form factor (see FLUX) of the source's outline, of whose edges none is seen under more than a right angle and none lies below the
-// horizon of n.
+// Form factor (see FLUX) of the source's outline, of whose edges none is seen under more than a
+// right angle and none lies below the horizon of n.
 FLUX outline_above(vec3 p, vec3 n, Source s) {
     FLUX sum = FLUX(0.0);
     vec3 last = fetch(contours, s.first_contour).xyz - p;
@@ -105,8 +107,8 @@ FLUX members(vec3 p, vec3 n, uint element, Source s) {
     uint member = s.first_element;
     uint end = member + s.element_count;
     while (member < end) {
-        // On to the next one that shows its front to any lane, in a loop of its own: a software device works through what a branch
-        // leaves out.
+        // On to the next one that shows its front to any lane, in a loop of its own: a software
+        // device works through what a branch leaves out.
         bool shows;
         do {
             float height = fetch(triangles, TRIANGLE_TEXELS * member + 1).w;
@@ -184,8 +186,9 @@ bool visible(vec3 p, vec3 n, uint element, Source s, bool asks) {
 #endif
 }
 
-// A place on a surface with normal n, put a little before a plane source where rounding leaves open on which side of its plane it is: a
-// sliver along the foot of a wall is lit by it. Surfaces that are level with the source see nothing of it there.
+// A place on a surface with normal n, put a little before a plane source where rounding leaves open
+// on which side of its plane it is: a sliver along the foot of a wall is lit by it. Surfaces that
+// are level with the source see nothing of it there.
 vec3 before_plane(vec3 p, vec3 n, Source s) {
     float height = dot(p - s.middle, s.normal);
     bool open = s.kind != KIND_POINT && s.cone_sin == 0.0 && abs(height) <= HEIGHT_EPSILON && abs(dot(n, s.normal)) < LEVEL;

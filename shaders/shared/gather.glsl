@@ -1,7 +1,7 @@
-// Every element adds up what kept rows bring it: form factor times radiosity, the paper's equation (2)
-// by reciprocity. One subgroup a block of GROUP elements, sources in slot order: no atomics, the same
-// bits every run and for every size of subgroup. FROM_RELIEF: some sources send by direction.
-// TO_RELIEF: the elements of this dispatch receive by direction.
+// Every element adds up what kept rows bring it: form factor times radiosity, the paper's equation
+// (2) by reciprocity. One subgroup a block of GROUP elements, sources in slot order: no atomics,
+// the same bits every run and for every size of subgroup. FROM_RELIEF: some sources send by
+// direction. TO_RELIEF: the elements of this dispatch receive by direction.
 //
 // A dispatch takes emitted or reflected light. Few sources emit, so that its other half mostly need
 // not run; and a software device pays for both sides of every branch, but a loop over the slots of
@@ -24,8 +24,9 @@
 #define FLUX float
 #endif
 
-// The workgroup is one subgroup. An invocation takes the FACTORS elements whose factors share a texel,
-// or several such; where there are more lanes than texels in a block, the others only look up slots.
+// The workgroup is one subgroup. An invocation takes the FACTORS elements whose factors share a
+// texel, or several such; where there are more lanes than texels in a block, the others only look
+// up slots.
 const uint FACTORS = 8;
 layout(constant_id = 0) const uint LANES = GROUP / FACTORS;
 layout(local_size_x_id = 0) in;
@@ -53,7 +54,8 @@ layout(scalar, binding = 7) readonly buffer Balls { vec4 balls[]; };
 layout(scalar, binding = 8) readonly buffer MesoElements { MesoElement meso_elements[]; };
 // Radiosity for each moment, [response][direction][colour].
 layout(scalar, binding = 9) readonly buffer Albedos { vec3 albedos[]; };
-// Moments ∫ L ω dω of the light that arrives, in the element's frame, [meso element][direction][colour].
+// Moments ∫ L ω dω of the light that arrives, in the element's frame, [meso
+// element][direction][colour].
 layout(scalar, binding = 10) buffer Moments { vec3 moments[]; };
 layout(scalar, binding = 11) buffer MesoReflected { Reflected meso_reflected[]; };
 #endif
@@ -90,7 +92,8 @@ struct Receiver {
 #endif
 };
 
-// What a slot sends, and the texel where this block's factors start; 0: the block sees nothing of it.
+// What a slot sends, and the texel where this block's factors start; 0: the block sees nothing of
+// it.
 struct Sent {
     vec3 light;
     uint block;
@@ -205,8 +208,8 @@ void main() {
 #endif
     }
 
-    // Each lane looks up one slot and shares it with the others; slots of which the block sees nothing
-    // are passed over.
+    // Each lane looks up one slot and shares it with the others; slots of which the block sees
+    // nothing are passed over.
     uint next = first_slot;
     while (next < end_slot) {
         // On to the next slots of which the block sees any, in a loop of its own: a software device

@@ -1,17 +1,20 @@
-// Where a straight segment first passes below a bilinear, periodic height map: exact, by the pyramid of maxima of
-// src/meso/height_pyramid.rs. Including files have shared/types.glsl and a buffer `float pyramid[]`; the steps of all
-// marches are added to the variable ALL_STEPS if there is one.
+// Where a straight segment first passes below a bilinear, periodic height map: exact, by the
+// pyramid of maxima of src/meso/height_pyramid.rs. Including files have shared/types.glsl and a
+// buffer `float pyramid[]`; the steps of all marches are added to the variable ALL_STEPS if there
+// is one.
 //
-// Lengths are in texels here, x along columns and y along rows (down the image, against v), heights as the map has them.
-// A texel's centre has whole coordinates. f32 keeps no more than 1e-4 of a texel a thousand texels away from where it
-// counts from; so t is a pair of floats whose sum it is, places are counted from the corner of the cell at hand, and the
-// products and sums that lose digits between the two keep their rests. A place along the segment is then right to about
-// 1e-7 of a texel however far it lies, and errors do not grow from step to step.
+// Lengths are in texels here, x along columns and y along rows (down the image, against v), heights
+// as the map has them. A texel's centre has whole coordinates. f32 keeps no more than 1e-4 of a
+// texel a thousand texels away from where it counts from; so t is a pair of floats whose sum it is,
+// places are counted from the corner of the cell at hand, and the products and sums that lose
+// digits between the two keep their rests. A place along the segment is then right to about 1e-7 of
+// a texel however far it lies, and errors do not grow from step to step.
 
 // Components of a direction below this never reach a border: they move less than 1e-20 of a texel.
 const float LEAST_STEP = 1e-20;
 const float NEVER = 1e30;
-// Times to start and to end the march are this much wider than the crossing of the highest level, for their rounding.
+// Times to start and to end the march are this much wider than the crossing of the highest level,
+// for their rounding.
 const float WIDER = 1e-6;
 // More steps than any segment with coordinates that a float still tells apart: 2^24.
 const float MOST_STEPS = 16777216.0;
@@ -88,9 +91,10 @@ Patch patch_of(HeightTile tile, ivec2 cell) {
     return Patch(corner, vec2(right - corner, down - corner), (opposite - down) - (right - corner));
 }
 
-// The first place, 0..1, where a line from `at` to `at + along` over a patch goes from above or on it to below it; -1 where
-// it does not. The height above the patch is c + b r + a r²; a line that is below where it comes in crosses there: what
-// rounding lost at the border of a cell is found at the next one's.
+// The first place, 0..1, where a line from `at` to `at + along` over a patch goes from above or on
+// it to below it; -1 where it does not. The height above the patch is c + b r + a r²; a line that
+// is below where it comes in crosses there: what rounding lost at the border of a cell is found at
+// the next one's.
 float crossing(Patch p, vec3 at, vec3 along) {
     float c = (at.z - p.corner) - (p.slope.x * at.x + p.slope.y * at.y + p.twist * at.x * at.y);
     float b = along.z - (p.slope.x * along.x + p.slope.y * along.y + p.twist * (at.x * along.y + at.y * along.x));
@@ -103,14 +107,15 @@ float crossing(Patch p, vec3 at, vec3 along) {
     if (!ends_below && !dips) {
         return -1.0;
     }
-    // Where the slope along the line is negative: (-b - root) / 2a without cancellation, nor a division by a = 0.
+    // Where the slope along the line is negative: (-b - root) / 2a without cancellation, nor a
+    // division by a = 0.
     float root = sqrt(max(b * b - 4.0 * a * c, 0.0));
     float r = b > 0.0 ? -(b + root) / (2.0 * a) : (root - b > 0.0 ? 2.0 * c / (root - b) : 0.0);
     return clamp(r, 0.0, 1.0);
 }
 
-// The first t in 0..1 where the segment goes from above or on the surface to below it; 0 where it starts below it. The
-// ends are (u, v, height). `hit` has the steps even where there is no hit.
+// The first t in 0..1 where the segment goes from above or on the surface to below it; 0 where it
+// starts below it. The ends are (u, v, height). `hit` has the steps even where there is no hit.
 bool march(HeightTile tile, vec3 from, vec3 to, out HeightHit hit) {
     hit = HeightHit(0.0, NONE, vec2(0.0), 0.0, vec2(0.0), 0);
 
@@ -123,8 +128,8 @@ bool march(HeightTile tile, vec3 from, vec3 to, out HeightHit hit) {
     vec2 t = vec2(from.z > tile.highest ? highest_at * (1.0 - WIDER) : 0.0, 0.0);
     float end = to.z > tile.highest ? min(highest_at * (1.0 + WIDER), 1.0) : 1.0;
 
-    // Find the cell of the start: `cell` in the period, `period` + `cell` counted on from the segment's own zero. The
-    // quotient may be rounded over a whole number, which is put right.
+    // Find the cell of the start: `cell` in the period, `period` + `cell` counted on from the
+    // segment's own zero. The quotient may be rounded over a whole number, which is put right.
     ivec2 size = ivec2(tile.width, tile.height);
     ivec2 cell = segment.whole + ivec2(floor(place_at(segment, t, segment.whole).xy));
     cell += ivec2(floor(place_at(segment, t, cell).xy));
@@ -142,8 +147,8 @@ bool march(HeightTile tile, vec3 from, vec3 to, out HeightHit hit) {
     uint first = tile.first + tile.width * tile.height;
     ivec2 blocks = size;
 
-    // A move passes a line between cells, of which there are so many; it is followed by one ascent at most, and there are
-    // no more descents than ascents. With NaN there are no steps.
+    // A move passes a line between cells, of which there are so many; it is followed by one ascent
+    // at most, and there are no more descents than ascents. With NaN there are no steps.
     float moves = (abs(step.x) + abs(step.y)) * (end - t.x) + 6.0;
     float most = min(2.0 * moves, MOST_STEPS);
     for (float count = 0.0; count < most; count++) {
@@ -186,8 +191,8 @@ bool march(HeightTile tile, vec3 from, vec3 to, out HeightHit hit) {
             return false;
         }
 
-        // Move over the border. The line that is crossed is known exactly; the other coordinate only goes forward, and
-        // stays in the block.
+        // Move over the border. The line that is crossed is known exactly; the other coordinate
+        // only goes forward, and stays in the block.
         bvec2 over = bvec2(leave.x <= leave.y, leave.x > leave.y);
         ivec2 least = mix(low, cell, forward);
         ivec2 greatest = mix(cell, high - 1, forward);

@@ -1,9 +1,10 @@
 // The hemicube about a source: src/hemicube.rs is the same in f64.
 //
-// A slot's faces lie in a column of N texels by 3 N: the top (N × N), then the upper halves of +x, −x, +y, −y (N × N/2
-// each). Columns stand side by side.
+// A slot's faces lie in a column of N texels by 3 N: the top (N × N), then the upper halves of +x,
+// −x, +y, −y (N × N/2 each). Columns stand side by side.
 
-// The face that `local` (in the source's frame) points into, with its texel coordinates within the column.
+// The face that `local` (in the source's frame) points into, with its texel coordinates within the
+// column.
 vec2 hemicube_texel(vec3 local, uint n) {
     vec3 a = abs(local);
     float z = max(local.z, 0.0);

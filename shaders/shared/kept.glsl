@@ -1,7 +1,9 @@
-// Form factors as they are kept: in 16 bits, so that replaying them takes little memory. Fresh ones are rounded in the same way,
-// so that a factor is the same to the bit whether it was kept or not. src/reference/kept.rs is the same.
+// Form factors as they are kept: in 16 bits, so that replaying them takes little memory. Fresh ones
+// are rounded in the same way, so that a factor is the same to the bit whether it was kept or not.
+// src/reference/kept.rs is the same.
 
-// Exponents of 2^-43 to 2^20 in 6 bits, 10 bits behind the leading one: off by 1/2048 at most. Less than 2^-43 is nothing.
+// Exponents of 2^-43 to 2^20 in 6 bits, 10 bits behind the leading one: off by 1/2048 at most. Less
+// than 2^-43 is nothing.
 const uint KEPT_ZERO = (127 - 43) << 10;
 const uint KEPT_SHIFT = 13;
 
@@ -18,7 +20,8 @@ float as_kept(float f) {
     return kept_factor(factor_code(f));
 }
 
-// A direction of the upper hemisphere, unit length, on an octahedron's upper half turned into a square of 2^16 steps a side.
+// A direction of the upper hemisphere, unit length, on an octahedron's upper half turned into a
+// square of 2^16 steps a side.
 uint direction_code(vec3 d) {
     vec2 p = d.xy / (abs(d.x) + abs(d.y) + max(d.z, 0.0));
     return packUnorm2x16(0.5 + 0.5 * vec2(p.x + p.y, p.x - p.y));

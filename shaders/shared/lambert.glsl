@@ -1,7 +1,9 @@
-// Lambert's formula for the form factor from a point to a polygon: src/form_factor.rs is the same in f64.
+// Lambert's formula for the form factor from a point to a polygon: src/form_factor.rs is the same
+// in f64.
 
-// θ / sin θ for the angle θ of which x is the cosine, |error| < 3e-7. A polynomial serves x in 0..1, where the function
-// is smooth (its pole is at −1); the other half follows from θ(−x) = π − θ(x).
+// θ / sin θ for the angle θ of which x is the cosine, |error| < 3e-7. A polynomial serves x in
+// 0..1, where the function is smooth (its pole is at −1); the other half follows from θ(−x) = π −
+// θ(x).
 float acute_angle_over_sine(float x) {
     float g = 1.7478988e-2;
     g = g * x - 9.7265430e-2;
@@ -14,13 +16,15 @@ float acute_angle_over_sine(float x) {
     return g * x + 1.5707963;
 }
 
-// The same for all x. The sine is told, as one over it: beside an edge it is far below what 1 − x² resolves.
+// The same for all x. The sine is told, as one over it: beside an edge it is far below what 1 − x²
+// resolves.
 float angle_over_sine(float x, float over_sine) {
     float g = acute_angle_over_sine(abs(x));
     return x >= 0.0 ? g : 3.14159265 * over_sine - g;
 }
 
-// What edges sum up to: the form factor, or with VECTOR_FLUX the vector whose dot product with n is the form factor.
+// What edges sum up to: the form factor, or with VECTOR_FLUX the vector whose dot product with n is
+// the form factor.
 #ifdef VECTOR_FLUX
 #define FLUX vec3
 #else
@@ -45,7 +49,8 @@ FLUX flux_above(FLUX f, vec3 n) {
 #endif
 }
 
-// One edge a → b seen from the origin by a receiver with normal n: its angle times the unit normal of its plane.
+// One edge a → b seen from the origin by a receiver with normal n: its angle times the unit normal
+// of its plane.
 FLUX edge_term(vec3 a, vec3 b, vec3 n) {
     vec3 across = cross(a, b);
     float lengths = max(dot(a, a) * dot(b, b), 1e-38);
@@ -107,7 +112,8 @@ void contour_close(inout Contour c, vec3 n) {
     c.entered = false;
 }
 
-// Form factor from the receiver to what the contour encloses, positive for contours counter-clockwise from their front.
+// Form factor from the receiver to what the contour encloses, positive for contours
+// counter-clockwise from their front.
 FLUX contour_form_factor(Contour c) {
     return -c.sum * INV_TWO_PI;
 }

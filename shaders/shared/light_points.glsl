@@ -1,8 +1,9 @@
-// Points that light comes straight from: those of emitters, which samples take turns at, then point lights. Including files
-// have shared/types.glsl, the buffer `LightPoint light_points[]`, and `light_count` and `emitter_points` of it.
+// Points that light comes straight from: those of emitters, which samples take turns at, then point
+// lights. Including files have shared/types.glsl, the buffer `LightPoint light_points[]`, and
+// `light_count` and `emitter_points` of it.
 
-// Ends of ways lie so much of their distance from the eye above what they start and end on: coordinates and their
-// interpolation round by a few 2^-24 of it.
+// Ends of ways lie so much of their distance from the eye above what they start and end on:
+// coordinates and their interpolation round by a few 2^-24 of it.
 const float ABOVE = 3.8e-6;
 
 // Of one sample.
@@ -21,7 +22,8 @@ LightPoint light_of_sample(uint i) {
     return light_points[(pixel_at.y * 4 + pixel_at.x) * LIGHT_POINTS + i * LIGHT_TURNS + turn.y * 4 + turn.x];
 }
 
-// What arrives per area of a surface that shows it a cosine, for a unit of strength, at the square of a distance.
+// What arrives per area of a surface that shows it a cosine, for a unit of strength, at the square
+// of a distance.
 float arriving(LightPoint light, vec3 towards, float cosine, float square) {
     if (light.kind == KIND_POINT) {
         return cosine / square;

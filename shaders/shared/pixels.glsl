@@ -1,7 +1,7 @@
-// The pixel estimator where light has directions. One invocation owns an element: it looks through the part of each
-// hemicube that its triangle can cover for the pixels that hold it, row by row, so that sums have one order. A dispatch
-// takes one slot of the batch and some rows of its hemicube: lavapipe ends every loop of an invocation for good after
-// 65,535 turns of all of them together.
+// The pixel estimator where light has directions. One invocation owns an element: it looks through
+// the part of each hemicube that its triangle can cover for the pixels that hold it, row by row, so
+// that sums have one order. A dispatch takes one slot of the batch and some rows of its hemicube:
+// lavapipe ends every loop of an invocation for good after 65,535 turns of all of them together.
 
 #extension GL_EXT_control_flow_attributes : require
 
@@ -36,8 +36,8 @@ layout(scalar, binding = 16) buffer MomentsIndirect { vec3 moments_indirect[]; }
 layout(scalar, binding = 17) buffer MesoReflected { Reflected meso_reflected[]; };
 // Share of a uniform sender's power in each direction.
 layout(scalar, binding = 18) readonly buffer Shares { float shares[]; };
-// With `by_pixel` alone: where each meso element lies in its texture, the facets of all textures, and the light sent
-// by direction, [meso element][direction].
+// With `by_pixel` alone: where each meso element lies in its texture, the facets of all textures,
+// and the light sent by direction, [meso element][direction].
 layout(scalar, binding = 19) readonly buffer MesoTexels { MesoTexel meso_texels[]; };
 layout(scalar, binding = 20) readonly buffer TextureFacets { TextureFacet texture_facets[]; };
 layout(scalar, binding = 21) buffer Outgoing { vec3 outgoing[]; };
@@ -64,7 +64,8 @@ const float NEAR = 1e-6;
 // A grazing pixel's light counts as coming from no lower than this.
 const float LEAST_HEIGHT = 1e-3;
 
-// A vector of the source's frame as the face sees it: along its axis, then across in columns and rows.
+// A vector of the source's frame as the face sees it: along its axis, then across in columns and
+// rows.
 vec3 on_face(uint face, vec3 d) {
     switch (face) {
     case 0: return vec3(d.z, d.x, d.y);
@@ -75,12 +76,13 @@ vec3 on_face(uint face, vec3 d) {
     }
 }
 
-// First and last column and row of the pixels that a triangle (from the eye, in the source's frame) may cover on a face.
+// First and last column and row of the pixels that a triangle (from the eye, in the source's frame)
+// may cover on a face.
 ivec4 pixels_on_face(uint face, vec3 triangle[3]) {
     vec2 low = vec2(2.0);
     vec2 high = vec2(-2.0);
-    // What lies outside one side of the face's pyramid covers none of its pixels. Without this a triangle through the plane
-    // of the eye would be looked for all over the face.
+    // What lies outside one side of the face's pyramid covers none of its pixels. Without this a
+    // triangle through the plane of the eye would be looked for all over the face.
     vec3 inside_low = vec3(-1.0);
     vec3 inside_high = vec3(-1.0);
     for (uint i = 0; i < 3; i++) {

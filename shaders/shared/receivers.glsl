@@ -37,16 +37,20 @@ layout(push_constant, scalar) uniform Parameters {
 
 // Rounding of a plane's height at a point: a few steps of f32 at coordinates up to 1.
 const float HEIGHT_EPSILON = 1e-6;
-// How many pixels' footprints two points of one surface may lie apart and still be taken for one another.
+// How many pixels' footprints two points of one surface may lie apart and still be taken for one
+// another.
 const float REACH = 1.5;
 
-// Cosine of the angle from which on two surfaces are not level: 8°, at which less than 1/200 of a fold's light comes from its other side.
+// Cosine of the angle from which on two surfaces are not level: 8°, at which less than 1/200 of a
+// fold's light comes from its other side.
 const float LEVEL = 0.99;
 
-// Where a source lies this many squared radii off, no edge of it is seen under more than a right angle.
+// Where a source lies this many squared radii off, no edge of it is seen under more than a right
+// angle.
 const float ACUTE = 2.1;
-// A source or a part of one is a point from so many of its radii off. The error of a square is then 2/3 of the square of that at most:
-// 0.07 % for flat sources; 0.26 % for curved ones, of which each has another sign.
+// A source or a part of one is a point from so many of its radii off. The error of a square is then
+// 2/3 of the square of that at most: 0.07 % for flat sources; 0.26 % for curved ones, of which each
+// has another sign.
 const float FLAT_POINT_DISTANCE = 32.0;
 const float POINT_DISTANCE = 16.0;
 // An element no further than so many of its radii from a source takes several samples.
@@ -72,8 +76,8 @@ bool visible(vec3 p, vec3 n, uint element, uint slot, Source s, bool asks) {
     if (depth <= HEIGHT_EPSILON) {
         return true;
     }
-    // The item's plane lies in front of p. It is still the same surface, seen a pixel aside, where the two planes'
-    // angle and the distance between the points explain the height.
+    // The item's plane lies in front of p. It is still the same surface, seen a pixel aside, where
+    // the two planes' angle and the distance between the points explain the height.
     vec3 ray = hemicube_direction(pixel, face_size);
     vec3 world = ray.x * s.tangent + ray.y * s.bitangent + ray.z * s.normal;
     float along = -eye_height / dot(plane.xyz, world);
@@ -82,8 +86,8 @@ bool visible(vec3 p, vec3 n, uint element, uint slot, Source s, bool asks) {
     float apart = length(p - seen);
     float grazing = min(abs(dot(n, d)), abs(dot(plane.xyz, d))) / distance_p;
     float footprint = distance_p * 2.0 / float(face_size) / max(grazing, 0.05);
-    // The item is farther off than p by more than the pixel explains: of two parallel sheets with a thin gap between them, the
-    // near one is seen beyond p in half of the pixels.
+    // The item is farther off than p by more than the pixel explains: of two parallel sheets with a
+    // thin gap between them, the near one is seen beyond p in half of the pixels.
     if (dot(seen - s.eye, d) > distance_p * (distance_p + REACH * footprint)) {
         return true;
     }
@@ -113,8 +117,8 @@ bool shows_whole_front(Source s, vec3 p) {
     return s.cone_sin == 0.0 || height * s.cone_cos - flat_part * s.cone_sin - s.radius > 0.0;
 }
 
-// Whether p, on a surface with normal n, lies in the plane of a plane source with which it is level: of the source it sees nothing that
-// rounding does not make up.
+// Whether p, on a surface with normal n, lies in the plane of a plane source with which it is
+// level: of the source it sees nothing that rounding does not make up.
 bool lies_in_plane(Source s, vec3 p, vec3 n) {
     bool level = abs(dot(n, s.normal)) >= LEVEL;
     return s.kind != KIND_POINT && s.cone_sin == 0.0 && level && dot(p - s.middle, s.normal) <= HEIGHT_EPSILON;
@@ -125,7 +129,8 @@ bool shows_front(Source s, vec3 p) {
     vec3 d = p - s.middle;
     float height = dot(d, s.normal);
     if (s.kind == KIND_POINT) {
-        // Each of the two sources of a point light serves its own side; the upper one has the plane between them.
+        // Each of the two sources of a point light serves its own side; the upper one has the plane
+        // between them.
         return s.cone_sin == 0.0 ? height >= 0.0 : height > 0.0;
     }
     if (s.cone_sin == 0.0) {

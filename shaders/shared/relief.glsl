@@ -1,5 +1,6 @@
-// A tile of relief as a periodic triangulated surface: src/meso/height_field.rs is the same in f64. Lengths are in widths
-// of a cell. Including files have the bindings heights of float and the push constants below.
+// A tile of relief as a periodic triangulated surface: src/meso/height_field.rs is the same in f64.
+// Lengths are in widths of a cell. Including files have the bindings heights of float and the push
+// constants below.
 
 layout(push_constant, scalar) uniform Parameters {
     uint columns;
@@ -10,7 +11,8 @@ layout(push_constant, scalar) uniform Parameters {
     uint count;
 };
 
-// The cell at a place, in the first period. A quotient of integers rounds to no other integer, and division of integers is dear.
+// The cell at a place, in the first period. A quotient of integers rounds to no other integer, and
+// division of integers is dear.
 vec2 cell_at(vec2 at) {
     vec2 low = floor(at);
     vec2 size = vec2(columns, rows);
@@ -59,8 +61,8 @@ Facet facet_of(uint facet) {
     return Facet(vec3(cell + share, (corner.x + corner.y + corner.z) / 3.0), normalize(vec3(-slope.x, -slope.y / aspect, 1.0)));
 }
 
-// Distances along a straight line at which it crosses the edges of facets, in order. Between two crossings the surface
-// below the line is plane.
+// Distances along a straight line at which it crosses the edges of facets, in order. Between two
+// crossings the surface below the line is plane.
 struct Crossings {
     vec3 next;    // of lines x = const, y = const, x + y = const
     vec3 each;

@@ -1,6 +1,7 @@
-// Whether places are open to a source's eye: a walk through the tree of src/passes/occluder_tree.rs that a subgroup takes
-// together, from one eye to RAYS places a lane, so that what all look at is loaded once. Nodes stand in depth-first
-// order, and each knows the one to go on with if no lane meets its box. src/reference/occluder_rays.rs is the same in f64.
+// Whether places are open to a source's eye: a walk through the tree of src/passes/occluder_tree.rs
+// that a subgroup takes together, from one eye to RAYS places a lane, so that what all look at is
+// loaded once. Nodes stand in depth-first order, and each knows the one to go on with if no lane
+// meets its box. src/reference/occluder_rays.rs is the same in f64.
 
 // NODE_TEXELS a node.
 layout(binding = 6) uniform usamplerBuffer shadow_nodes;
@@ -9,11 +10,13 @@ layout(binding = SHADOW_OCCLUDERS) uniform usamplerBuffer shadow_occluders;
 
 const uint NODE_TEXELS = 2;
 const uint OCCLUDER_TEXELS = 4;
-// Components of a way below this count as this, so that their reciprocals are finite: boxes are padded by far more.
+// Components of a way below this count as this, so that their reciprocals are finite: boxes are
+// padded by far more.
 const float LEAST_WAY = 1e-18;
 // Height above a plane from which on boxes of what lies in it are not met.
 const float CLEAR = 2.0 * HEIGHT_EPSILON;
-// How far behind a plane a place must lie to be hidden. Triangles much smaller than that are met where rounding says.
+// How far behind a plane a place must lie to be hidden. Triangles much smaller than that are met
+// where rounding says.
 const float HIDDEN = 4.0 * HEIGHT_EPSILON;
 
 // A triangle as it stands about the eye.
@@ -26,8 +29,8 @@ struct Met {
     bool hides;         // whether it can hide anything
 };
 
-// What lies in one plane with the eye hides nothing, nor do the backs of a closed part that the source is on: its group does not
-// stand behind them.
+// What lies in one plane with the eye hides nothing, nor do the backs of a closed part that the
+// source is on: its group does not stand behind them.
 Met met(Source s, uint triangle) {
     uint first = OCCLUDER_TEXELS * triangle;
     uvec4 word_a = fetch_words(shadow_occluders, first);
@@ -47,9 +50,10 @@ Met met(Source s, uint triangle) {
     return Met(over_a, over_b, over_c, n, eye_height, hides);
 }
 
-// Whether the triangle stands between the eye and the end of a way. Two triangles find the same volume over the edge that
-// they share with the opposite sign, to the bit: no way leads between them. The height tells whether it is the way that meets
-// the triangle, or the line that it is a part of.
+// Whether the triangle stands between the eye and the end of a way. Two triangles find the same
+// volume over the edge that they share with the opposite sign, to the bit: no way leads between
+// them. The height tells whether it is the way that meets the triangle, or the line that it is a
+// part of.
 bool stands_in(Met t, vec3 way) {
     precise float of_a = way.x * t.over_a.x + way.y * t.over_a.y + way.z * t.over_a.z;
     precise float of_b = way.x * t.over_b.x + way.y * t.over_b.y + way.z * t.over_b.z;
@@ -61,7 +65,8 @@ bool stands_in(Met t, vec3 way) {
     return t.hides && crossed && (least >= 0.0 || most <= 0.0) && least != most;
 }
 
-// Which of the places p.xyz, on elements with normals n, are open to the eye, among those that are asked for. All lanes must be active.
+// Which of the places p.xyz, on elements with normals n, are open to the eye, among those that are
+// asked for. All lanes must be active.
 void look(Source s, vec4 p[RAYS], vec3 n[RAYS], inout bool open[RAYS]) {
     vec3 way[RAYS];
     vec3 each[RAYS];
@@ -70,7 +75,8 @@ void look(Source s, vec4 p[RAYS], vec3 n[RAYS], inout bool open[RAYS]) {
     for (uint r = 0; r < RAYS; r++) {
         way[r] = p[r].xyz - s.eye;
         each[r] = mix(vec3(1.0), vec3(-1.0), lessThan(way[r], vec3(0.0))) / max(abs(way[r]), vec3(LEAST_WAY));
-        // The walk leaves out the ends of the way, within reach of the boxes of what lies in the planes that it begins and ends on.
+        // The walk leaves out the ends of the way, within reach of the boxes of what lies in the
+        // planes that it begins and ends on.
         float rises = s.kind == KIND_SURFACE ? dot(way[r], s.normal) : 0.0;
         begin[r] = rises > 0.0 ? min(CLEAR / rises, 0.5) : 0.0;
         float falls = -dot(way[r], n[r]);
@@ -79,8 +85,9 @@ void look(Source s, vec4 p[RAYS], vec3 n[RAYS], inout bool open[RAYS]) {
     uint count = fetch_words(shadow_nodes, 0).w;
     uint at = 0;
     while (at < count) {
-        // On to the next leaf that a ray enters, in a loop of its own: a software device works through what a branch leaves out.
-        // A ray is asked of no triangle whose box it misses: what it meets is the same in any company.
+        // On to the next leaf that a ray enters, in a loop of its own: a software device works
+        // through what a branch leaves out. A ray is asked of no triangle whose box it misses: what
+        // it meets is the same in any company.
         bool enters[RAYS];
         uint leaf = 0;
         do {

@@ -1,12 +1,15 @@
-// Whether a triangle stands on a straight way: a walk through the tree of src/passes/shadow_rays.rs. Nodes stand in
-// depth-first order, and each knows the one to go on with if its box is missed: no stack, however deep the tree. Including
-// files have shared/types.glsl and the buffers `ShadowNode shadow_nodes[]` and `ShadowTriangle shadow_triangles[]`.
+// Whether a triangle stands on a straight way: a walk through the tree of
+// src/passes/shadow_rays.rs. Nodes stand in depth-first order, and each knows the one to go on with
+// if its box is missed: no stack, however deep the tree. Including files have shared/types.glsl and
+// the buffers `ShadowNode shadow_nodes[]` and `ShadowTriangle shadow_triangles[]`.
 
-// Components of a way below this count as this, so that their reciprocals are finite: boxes are padded by far more.
+// Components of a way below this count as this, so that their reciprocals are finite: boxes are
+// padded by far more.
 const float LEAST_WAY = 1e-18;
 
-// The share of the way where it meets the triangle's plane within the triangle, or -1. Two triangles find the same volume
-// over the edge that they share with the opposite sign, to the bit: no way leads between them.
+// The share of the way where it meets the triangle's plane within the triangle, or -1. Two
+// triangles find the same volume over the edge that they share with the opposite sign, to the bit:
+// no way leads between them.
 float meets(ShadowTriangle t, vec3 from, vec3 way) {
     precise vec3 a = t.a - from;
     precise vec3 b = t.b - from;

@@ -1,7 +1,8 @@
-// Lists the elements that see each source of the batch, by how their form factor is found: as of a point, by the outline of
-// the source, by its parts as points, or, near it, with more care. Elements that it lies behind, turns its back to or is
-// hidden from are in no list, and their form factor is 0. SHADOW_RAYS: what is seen is asked of rays instead of the item
-// buffer, one slot a dispatch, since lavapipe ends all loops of an invocation after 65,535 turns.
+// Lists the elements that see each source of the batch, by how their form factor is found: as of a
+// point, by the outline of the source, by its parts as points, or, near it, with more care.
+// Elements that it lies behind, turns its back to or is hidden from are in no list, and their form
+// factor is 0. SHADOW_RAYS: what is seen is asked of rays instead of the item buffer, one slot a
+// dispatch, since lavapipe ends all loops of an invocation after 65,535 turns.
 
 #ifdef SHADOW_RAYS
 #define SHADOW_OCCLUDERS 9
@@ -45,8 +46,8 @@ void append(uint slot, uint kind, bool mine, uint i) {
     }
 }
 
-// How the form factor from an element to a source is found, should it be seen; RECEIVE_KINDS where it is 0. `near`: parts of the element
-// may be seen, whether its centroid is or not.
+// How the form factor from an element to a source is found, should it be seen; RECEIVE_KINDS where
+// it is 0. `near`: parts of the element may be seen, whether its centroid is or not.
 uint kind_of(Source s, vec4 ball, vec3 n, out bool near) {
     vec3 d = ball.xyz - s.middle;
     float distance_middle = length(d);
@@ -66,7 +67,8 @@ uint kind_of(Source s, vec4 ball, vec3 n, out bool near) {
     return !behind && (near || shows) ? kind : RECEIVE_KINDS;
 }
 
-// Whether `kind_of` is RECEIVE_KINDS for every element of a block. Each lane may ask of another source.
+// Whether `kind_of` is RECEIVE_KINDS for every element of a block. Each lane may ask of another
+// source.
 bool none_sees(ReceiverBlock block, uint source) {
     uint at = SOURCE_TEXELS * source;
     vec4 facing = fetch(sources, at + 1);
@@ -97,8 +99,8 @@ bool none_sees(ReceiverBlock block, uint source) {
     return behind || below && !near;
 }
 
-// Bit k: the k-th slot from `first` on holds a source of which one of the elements from `low` to `high` may see something. `held`: it
-// holds one at all. A lane a slot, SORT_SLOTS at most.
+// Bit k: the k-th slot from `first` on holds a source of which one of the elements from `low` to
+// `high` may see something. `held`: it holds one at all. A lane a slot, SORT_SLOTS at most.
 uint sighted_slots(uint first, uint low, uint high, out uint held) {
     uint sighted = 0;
     held = 0;

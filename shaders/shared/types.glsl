@@ -1,5 +1,5 @@
-// The structs that Rust and GLSL share, scalar layout: src/passes/types.rs has the same fields in the same order, and a
-// test compares every offset.
+// The structs that Rust and GLSL share, scalar layout: src/passes/types.rs has the same fields in
+// the same order, and a test compares every offset.
 
 #extension GL_EXT_scalar_block_layout : require
 
@@ -181,8 +181,8 @@ struct HeightHit {
     uint steps;         // of the march, hit or not
 };
 
-// A triangle with relief, extruded to the lowest and the highest of its height map. Corners a, b, c ascend by the mesh's
-// vertex, so that neighbours cut the side that they share along one diagonal.
+// A triangle with relief, extruded to the lowest and the highest of its height map. Corners a, b, c
+// ascend by the mesh's vertex, so that neighbours cut the side that they share along one diagonal.
 struct Prism {
     vec3 low_a;         // from the eye, internal units
     vec3 low_b;

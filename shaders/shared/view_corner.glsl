@@ -1,4 +1,5 @@
-// A corner of a triangle in a window: reversed infinite depth, as in the item buffer. LAID and OVERLAID as in view_mesh.glsl.
+// A corner of a triangle in a window: reversed infinite depth, as in the item buffer. LAID and
+// OVERLAID as in view_mesh.glsl.
 #include "shared/view_parameters.glsl"
 
 layout(location = 0) in vec3 position;     // from the scene's middle, internal units
@@ -8,7 +9,8 @@ layout(location = 2) in vec2 uv;
 layout(location = 0) out vec3 corner_light; // E of what is shown, W·m⁻²; negative where the triangle shows its back
 layout(location = 1) out vec2 corner_uv;
 
-// [corner] of the drawn triangles, W·m⁻²: all light, and what comes straight from emitters and point lights.
+// [corner] of the drawn triangles, W·m⁻²: all light, and what comes straight from emitters and
+// point lights.
 layout(scalar, binding = 1) readonly buffer All { vec3 all_light[]; };
 layout(scalar, binding = 2) readonly buffer Direct { vec3 direct_light[]; };
 

@@ -1,5 +1,6 @@
-// A surface in a window as sRGB codes: its radiance L = ρ(u, v) · E / π + Le by the light of the corners. LAID: what pictures drawn
-// before show there comes first. OVERLAID, with LAID: outlines of elements, colours of sources and a marked element over it.
+// A surface in a window as sRGB codes: its radiance L = ρ(u, v) · E / π + Le by the light of the
+// corners. LAID: what pictures drawn before show there comes first. OVERLAID, with LAID: outlines
+// of elements, colours of sources and a marked element over it.
 #include "shared/view_parameters.glsl"
 
 layout(location = 0) in vec3 corner_light;
@@ -42,7 +43,8 @@ vec3 lit() {
 }
 
 #ifdef LAID
-// sRGB codes of whole views, with how far along the view each pixel is: the last with all its pixels, and a later coarse one.
+// sRGB codes of whole views, with how far along the view each pixel is: the last with all its
+// pixels, and a later coarse one.
 layout(binding = 4) uniform sampler2D whole;
 layout(binding = 5) uniform sampler2D coarse;
 layout(binding = 6) uniform sampler2D whole_distances;
@@ -54,7 +56,8 @@ layout(location = 4) flat in vec4 of_whole;
 layout(location = 5) flat in vec4 of_coarse;
 layout(location = 6) flat in float triangle_rise;
 
-// Least height of a picture's eye over a surface, in distances along its view: a pixel there is as wide as four here.
+// Least height of a picture's eye over a surface, in distances along its view: a pixel there is as
+// wide as four here.
 const float LEAST_HEIGHT = 0.25;
 // Half pixels by which a surface may lie before or behind what the picture's pixel shows beside it.
 const float SLACK = 3.0;
@@ -114,7 +117,8 @@ vec3 overlaid(vec3 colour) {
     vec3 to_edge = corner_share / max(fwidth(corner_share), vec3(1e-6));
     float edge = min(to_edge.x, min(to_edge.y, to_edge.z));
     if (elements > 0.0) {
-        // Edges closer together than a few pixels fade, or the far end of a fine mesh would be black.
+        // Edges closer together than a few pixels fade, or the far end of a fine mesh would be
+        // black.
         float widest = max(fwidth(corner_share).x, max(fwidth(corner_share).y, fwidth(corner_share).z));
         float seen = elements * clamp(1.0 - 3.0 * widest, 0.0, 1.0);
         colour = mix(colour, vec3(0.0), 0.6 * seen * clamp(1.2 - edge, 0.0, 1.0));

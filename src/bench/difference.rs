@@ -18,7 +18,8 @@ pub struct Difference {
     pub rms: f64,
 }
 
-/// Triangles `[of scene, of displaced]` without relief that [`crate::scene::displace`] left as they were.
+/// Triangles `[of scene, of displaced]` without relief that [`crate::scene::displace`] left as they
+/// were.
 pub fn plain_pairs(scene: &Scene, displaced: &Scene) -> Vec<[usize; 2]> {
     let key = |t: &Triangle| (t.vertices, t.material);
     let known: HashMap<_, usize> = displaced
@@ -38,7 +39,8 @@ pub fn plain_pairs(scene: &Scene, displaced: &Scene) -> Vec<[usize; 2]> {
 }
 
 impl Difference {
-    /// Of `ours` from `reference`, `[triangle]`, over `pairs` of triangles of the two, whose areas are those of `scene`.
+    /// Of `ours` from `reference`, `[triangle]`, over `pairs` of triangles of the two, whose areas
+    /// are those of `scene`.
     pub fn new(scene: &Scene, pairs: &[[usize; 2]], (ours, reference): (&[Vec3], &[Vec3])) -> Self {
         let (mut whole, mut difference, mut squares, mut light) = (0.0, 0.0, 0.0, 0.0);
         for &[a, b] in pairs {

@@ -1,4 +1,5 @@
-//! `mesolux bench hemicube`: how fast item buffers are drawn, culled and not, of merged elements and of all.
+//! `mesolux bench hemicube`: how fast item buffers are drawn, culled and not, of merged elements
+//! and of all.
 
 use std::sync::Arc;
 
@@ -26,7 +27,8 @@ fn batch_of_sources(solver: &Solver, batch: usize) -> Vec<u32> {
     (0..slots).map(source).collect()
 }
 
-/// Prints hemicubes a second, drawing alone (culling and item buffer) and with everything (form factors, coupling and keeping too).
+/// Prints hemicubes a second, drawing alone (culling and item buffer) and with everything (form
+/// factors, coupling and keeping too).
 pub fn run(device: &Arc<Device>, scene: &Scene, hemicube: u32, rounds: usize) -> Result<()> {
     let mut solvers = Vec::new();
     for (_, culling, merging, _) in BATCHES {

@@ -1,5 +1,5 @@
-//! `mesolux bench irradiance`: irradiance of a bake against the path tracer, which knows nothing of hemicubes, sources or
-//! slots and sees relief as geometry.
+//! `mesolux bench irradiance`: irradiance of a bake against the path tracer, which knows nothing of
+//! hemicubes, sources or slots and sees relief as geometry.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -16,7 +16,8 @@ pub struct Found {
     /// Mean difference over the mean of the truth, and half of its 95 % interval.
     pub bias: f64,
     pub bias_interval: f64,
-    /// Root mean square of the difference over the mean of the truth, the path tracer's own noise taken off.
+    /// Root mean square of the difference over the mean of the truth, the path tracer's own noise
+    /// taken off.
     pub rms: f64,
     /// That noise, of one sample over the mean.
     pub noise: f64,
@@ -37,7 +38,8 @@ pub struct Sample {
     error: Vec3,
 }
 
-/// Triangles with neither relief nor emission, chosen by area, stratified; a large one may come again.
+/// Triangles with neither relief nor emission, chosen by area, stratified; a large one may come
+/// again.
 ///
 /// # Errors
 /// A scene without such triangles.
@@ -64,7 +66,8 @@ pub fn places(scene: &Scene, samples: usize, seed: u64) -> Result<Vec<usize>> {
         whole += cross(e).length();
         ends.push(whole);
     }
-    // The golden ratio's multiples run evenly through the strata's triangles, whatever order those have.
+    // The golden ratio's multiples run evenly through the strata's triangles, whatever order those
+    // have.
     let chosen = (0..samples).filter_map(|i| {
         let shift = ((i as u64 + seed) as f64 * 0.618_033_988_749_894_9).fract();
         let at = whole * (i as f64 + shift) / samples as f64;

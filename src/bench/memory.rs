@@ -2,7 +2,8 @@
 
 /// Forgets the peak so far, so that the next one is that of what runs in between.
 pub fn forget_peak() {
-    // Where it cannot be forgotten, the peak is that of the whole process, which a growing series reaches last as well.
+    // Where it cannot be forgotten, the peak is that of the whole process, which a growing series
+    // reaches last as well.
     let _ = std::fs::write("/proc/self/clear_refs", "5");
 }
 

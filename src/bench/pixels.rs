@@ -1,4 +1,5 @@
-//! Charts as pixels: a backend of plotters that draws into a picture, with letters of 8 × 8 points, so that no font has to be found.
+//! Charts as pixels: a backend of plotters that draws into a picture, with letters of 8 × 8 points,
+//! so that no font has to be found.
 
 use std::convert::Infallible;
 use std::path::Path;

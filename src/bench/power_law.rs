@@ -10,7 +10,8 @@ pub struct PowerLaw {
     pub interval: Option<f64>,
 }
 
-/// 97.5 % points of Student's t for 1, 2, 3 … degrees of freedom; beyond, the last one is 3 % too wide at most.
+/// 97.5 % points of Student's t for 1, 2, 3 … degrees of freedom; beyond, the last one is 3 % too
+/// wide at most.
 const STUDENT_95: [f64; 10] = [
     12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228,
 ];
@@ -68,7 +69,8 @@ mod tests {
         let fit = PowerLaw::fit(&exact).expect("four points");
         assert!((fit.exponent - 1.25).abs() < ROUNDING, "{fit:?}");
         assert!(fit.interval.expect("of four points") < 1e-6, "{fit:?}");
-        // ln y = 0, 1, 0 over ln x = −1, 0, 1: slope 0, residual 2/3 over one degree of freedom, squares 2.
+        // ln y = 0, 1, 0 over ln x = −1, 0, 1: slope 0, residual 2/3 over one degree of freedom,
+        // squares 2.
         let e = std::f64::consts::E;
         let fit = PowerLaw::fit(&[(1.0 / e, 1.0), (1.0, e), (e, 1.0)]).expect("three points");
         let interval = fit.interval.expect("of three points");

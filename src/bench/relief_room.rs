@@ -1,4 +1,5 @@
-//! A room whose floor is one of a few reliefs, and views of it: what pictures of relief are judged by.
+//! A room whose floor is one of a few reliefs, and views of it: what pictures of relief are judged
+//! by.
 
 use std::sync::Arc;
 
@@ -106,7 +107,8 @@ pub fn noise(x: f64, y: f64) -> f64 {
     octave(3) + 0.4 * octave(6)
 }
 
-/// A camera that sees `look_at` from a distance, so many degrees from straight above, along no axis of the relief.
+/// A camera that sees `look_at` from a distance, so many degrees from straight above, along no axis
+/// of the relief.
 pub fn camera(look_at: DVec3, angle: f64, distance: f64, fov_y: f64) -> Camera {
     let (s, c) = angle.to_radians().sin_cos();
     let aside = DVec3::new(0.6, 0.0, 0.8);
@@ -119,8 +121,8 @@ pub fn camera(look_at: DVec3, angle: f64, distance: f64, fov_y: f64) -> Camera {
     }
 }
 
-/// A room with a relief as its floor, lit from above and aside; one wall is red. Its cameras see the floor alone, one for each
-/// of [`ANGLES`].
+/// A room with a relief as its floor, lit from above and aside; one wall is red. Its cameras see
+/// the floor alone, one for each of [`ANGLES`].
 pub fn room(case: &Case) -> Scene {
     let material = |name: &str, kd, ke| Material {
         name: name.into(),
@@ -171,7 +173,8 @@ pub fn room(case: &Case) -> Scene {
         triangle.material = floor;
         triangle.uv = triangle.vertices.map(|v| {
             let at = shapes.scene.vertices[v as usize] / REPEAT;
-            // Corners of the repeats lie in the middle of texels, so that `displace` cuts along the cells of the map.
+            // Corners of the repeats lie in the middle of texels, so that `displace` cuts along the
+            // cells of the map.
             [at.z, turned * at.x].map(|a| a as f32 + 0.5 / TEXELS as f32)
         });
     }

@@ -1,8 +1,10 @@
-//! `mesolux bench scaling`: how time and memory grow with the number of elements, at one error bound.
+//! `mesolux bench scaling`: how time and memory grow with the number of elements, at one error
+//! bound.
 //!
-//! A scene is cut into more and more elements. Each size is baked once for each limit on the elements of a source: the program's
-//! own, under which the number of sources grows with that of elements, and none, under which sources are cut by area and
-//! power alone, which do not know how finely the scene is cut.
+//! A scene is cut into more and more elements. Each size is baked once for each limit on the
+//! elements of a source: the program's own, under which the number of sources grows with that of
+//! elements, and none, under which sources are cut by area and power alone, which do not know how
+//! finely the scene is cut.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -53,7 +55,8 @@ pub struct Row {
     pub elements_seconds: f64,
     pub setup_seconds: f64,
     pub solve_seconds: f64,
-    /// Of the shots, by the device's own clock: choosing, culling, drawing, form factors, gathering.
+    /// Of the shots, by the device's own clock: choosing, culling, drawing, form factors,
+    /// gathering.
     pub keep_seconds: f64,
     pub cull_seconds: f64,
     pub draw_seconds: f64,
@@ -64,11 +67,12 @@ pub struct Row {
     /// Sources whose form factors are kept.
     pub kept_sources: u64,
     pub error_bound: Option<f64>,
-    /// Bytes in buffers on the device, and bytes of the process at its peak; on a software device the first are part of the
-    /// second.
+    /// Bytes in buffers on the device, and bytes of the process at its peak; on a software device
+    /// the first are part of the second.
     pub device_bytes: u64,
     pub resident_bytes: Option<u64>,
-    /// Against path traced irradiance: bias and root mean square, over its mean; half of the bias's 95 % interval.
+    /// Against path traced irradiance: bias and root mean square, over its mean; half of the bias's
+    /// 95 % interval.
     pub bias: Option<f64>,
     pub bias_interval: Option<f64>,
     pub rms: Option<f64>,
@@ -114,11 +118,12 @@ pub fn sizes(first: usize, largest: usize) -> Vec<usize> {
     sizes
 }
 
-/// Bakes, prints and writes `scaling.csv`, `scaling.json` and `scaling.svg` into `folder` after each bake. `go_on` may stop
-/// it between batches; finished bakes are kept.
+/// Bakes, prints and writes `scaling.csv`, `scaling.json` and `scaling.svg` into `folder` after
+/// each bake. `go_on` may stop it between batches; finished bakes are kept.
 ///
 /// # Errors
-/// A scene that cannot be cut into so many elements; a device that cannot hold it; files that cannot be written.
+/// A scene that cannot be cut into so many elements; a device that cannot hold it; files that
+/// cannot be written.
 pub fn run(
     device: &Arc<Device>,
     options: &Options,

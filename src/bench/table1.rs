@@ -1,6 +1,7 @@
 //! `mesolux bench table1`: the paper's Table 1, its times and frame rates beside ours.
 //!
-//! The bakes of a scene take turns of a few seconds, so that what slows the machine slows all of them.
+//! The bakes of a scene take turns of a few seconds, so that what slows the machine slows all of
+//! them.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -21,8 +22,8 @@ use crate::vk::Device;
 use super::table1_output::{HEADER, KINDS, against_high_poly, line, write};
 use super::{Difference, frame, plain_pairs};
 
-/// A scene of the paper with its minutes and its frames a second for K = 16, 32, 64 (on hardware of 2013 and at a size that it
-/// does not name).
+/// A scene of the paper with its minutes and its frames a second for K = 16, 32, 64 (on hardware of
+/// 2013 and at a size that it does not name).
 pub const SCENES: [(&str, [f64; 3], [f64; 3]); 3] = [
     ("fruit-platter", [10.4, 11.0, 12.3], [62.0, 48.0, 29.0]),
     ("bowl-and-bunny", [6.3, 6.6, 7.8], [98.0, 67.0, 25.0]),
@@ -67,7 +68,8 @@ pub struct Row {
     pub fps_factored: Option<Rate>,
     pub fps_clusters: Option<Rate>,
     pub paper_fps: Option<f64>,
-    /// How far the triangles without relief are from those of the high-poly bake; none before that is done.
+    /// How far the triangles without relief are from those of the high-poly bake; none before that
+    /// is done.
     pub plain: Option<Difference>,
 }
 
@@ -95,8 +97,8 @@ struct Under {
 /// How long a bake goes on before the next one has its turn.
 const TURN: Duration = Duration::from_secs(4);
 
-/// Bakes, prints and writes `table1.csv`, `table1.json` and `table1.svg` into `folder` whenever bakes are
-/// done. `go_on` may stop it between turns; finished bakes are kept.
+/// Bakes, prints and writes `table1.csv`, `table1.json` and `table1.svg` into `folder` whenever
+/// bakes are done. `go_on` may stop it between turns; finished bakes are kept.
 pub fn run(
     device: &Arc<Device>,
     options: &Options,

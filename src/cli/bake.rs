@@ -21,21 +21,25 @@ use mesolux::vk::Device;
 
 /// Solve a scene and write the light on every element
 ///
-/// The result is a safetensors file: vertices [E,3,3], area [E], normal [E,3], material [E], irradiance [E,3],
-/// irradiance_direct [E,3], radiosity [E,3], in scene units and in the order of the input. Elements with a relief (M of them,
-/// whose material has a height map) add meso_elements [M], meso_frames [M,3,3], directions [K,3], incident_moment and
-/// incident_moment_direct [M,K,3,3] (colour, vector), exitant [M,K,3]. Ctrl-C stops the solver and keeps what it has.
+/// The result is a safetensors file: vertices [E,3,3], area [E], normal [E,3], material [E],
+/// irradiance [E,3], irradiance_direct [E,3], radiosity [E,3], in scene units and in the order of
+/// the input. Elements with a relief (M of them, whose material has a height map) add meso_elements
+/// [M], meso_frames [M,3,3], directions [K,3], incident_moment and incident_moment_direct [M,K,3,3]
+/// (colour, vector), exitant [M,K,3]. Ctrl-C stops the solver and keeps what it has.
 #[derive(Args)]
 pub struct Options {
-    /// A built-in name (cornell, cornell-relief, bowl-and-bunny, fruit-platter), an .obj file, or a scene.toml
+    /// A built-in name (cornell, cornell-relief, bowl-and-bunny, fruit-platter), an .obj file, or a
+    /// scene.toml
     scene: String,
     /// The file to write
     #[arg(short, long, value_name = "OUT.safetensors")]
     output: PathBuf,
-    /// Keep the form factors beside the bake, as OUT.visibility: some hundred MiB that --relight needs
+    /// Keep the form factors beside the bake, as OUT.visibility: some hundred MiB that --relight
+    /// needs
     #[arg(long)]
     keep_visibility: bool,
-    /// Light SCENE, of which emission and point lights may have changed, by the form factors that were kept with this bake
+    /// Light SCENE, of which emission and point lights may have changed, by the form factors that
+    /// were kept with this bake
     #[arg(long, value_name = "BAKE.safetensors", conflicts_with = "estimator")]
     relight: Option<PathBuf>,
     #[command(flatten)]
@@ -58,32 +62,36 @@ pub struct SolveOptions {
     /// Form factors by Lambert's formula for each receiver, or by the pixels' sums as in the paper
     #[arg(long, value_enum, default_value = "receiver")]
     estimator: EstimatorName,
-    /// Sets --hemicube, --residual and the sizes of the sources where they are not given; `bench pareto` measures what each gains
+    /// Sets --hemicube, --residual and the sizes of the sources where they are not given; `bench
+    /// pareto` measures what each gains
     #[arg(long, value_enum, default_value = "normal")]
     quality: QualityName,
     /// Pixels a side of a hemicube face [default: that of --quality, 128 for normal]
     #[arg(long, value_name = "N")]
     hemicube: Option<u32>,
-    /// The same for sources that emit strongly, whose shadows are the sharpest, in place of shadow rays; as --hemicube draws them as
-    /// all others [default: none, but with --estimator pixel four times --hemicube, at most 1024]
+    /// The same for sources that emit strongly, whose shadows are the sharpest, in place of shadow
+    /// rays; as --hemicube draws them as all others [default: none, but with --estimator pixel four
+    /// times --hemicube, at most 1024]
     #[arg(long, value_name = "N")]
     emitter_hemicube: Option<u32>,
-    /// Stop when the error bound, as a share of the emitted power, is no more than this [default: that of --quality, 0.001 for
-    /// normal]
+    /// Stop when the error bound, as a share of the emitted power, is no more than this [default:
+    /// that of --quality, 0.001 for normal]
     #[arg(long, value_name = "X")]
     residual: Option<f64>,
-    /// Most elements of a curved surface or a relief that shoot together from one hemicube [default: that of --quality, 48 for normal]
+    /// Most elements of a curved surface or a relief that shoot together from one hemicube
+    /// [default: that of --quality, 48 for normal]
     #[arg(long, value_name = "N")]
     source_elements: Option<usize>,
-    /// Most area that shoots together, as a share of the scene's; larger elements are cut [default: that of --quality, 1/256 for
-    /// normal]
+    /// Most area that shoots together, as a share of the scene's; larger elements are cut [default:
+    /// that of --quality, 1/256 for normal]
     #[arg(long, value_name = "X")]
     source_area: Option<f64>,
-    /// Most area of a plane source that has another surface close before it, as a share of the scene's [default: by --quality;
-    /// normal: a quarter of --source-area]
+    /// Most area of a plane source that has another surface close before it, as a share of the
+    /// scene's [default: by --quality; normal: a quarter of --source-area]
     #[arg(long, value_name = "SHARE")]
     source_area_near: Option<f64>,
-    /// Most emitted power that shoots together, as a share of the scene's [default: that of --quality, 1/128 for normal]
+    /// Most emitted power that shoots together, as a share of the scene's [default: that of
+    /// --quality, 1/128 for normal]
     #[arg(long, value_name = "X")]
     source_power: Option<f64>,
     /// Stop after this many seconds
@@ -92,8 +100,9 @@ pub struct SolveOptions {
     /// Stop after drawing this many sources
     #[arg(long, value_name = "N")]
     shots: Option<u32>,
-    /// MiB on the device for the form factors of sources that have been drawn, which then need no drawing for their further
-    /// shots; 0 draws for every shot [default: 768, or a third of the device's memory]
+    /// MiB on the device for the form factors of sources that have been drawn, which then need no
+    /// drawing for their further shots; 0 draws for every shot [default: 768, or a third of the
+    /// device's memory]
     #[arg(long, value_name = "MIB")]
     visibility_memory: Option<u64>,
     /// Turns the hemicubes about their axes: another seed, other aliasing
@@ -105,8 +114,8 @@ pub struct SolveOptions {
     /// How relief takes part: keeping energy, by the paper's equations, or not at all
     #[arg(long, value_enum, default_value = "physical")]
     transport: TransportName,
-    /// Folder that keeps the visibility of reliefs from run to run, and bakes that `render` makes of scenes, the 16 used last
-    /// and 1 GiB at most [default: mesolux in the user's cache folder]
+    /// Folder that keeps the visibility of reliefs from run to run, and bakes that `render` makes
+    /// of scenes, the 16 used last and 1 GiB at most [default: mesolux in the user's cache folder]
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
     /// Compute everything anew and keep nothing
@@ -141,7 +150,8 @@ enum EstimatorName {
     Pixel,
 }
 
-/// Shares of the scene that a source may have at most: a smaller one would cut a scene into millions of sources.
+/// Shares of the scene that a source may have at most: a smaller one would cut a scene into
+/// millions of sources.
 const SOURCE_SHARES: std::ops::RangeInclusive<f64> = 1e-6..=1.0;
 
 impl SolveOptions {

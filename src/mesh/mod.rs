@@ -1,4 +1,5 @@
-//! A scene as the solver sees it: elements, groups of them that send light, and triangles that hide it.
+//! A scene as the solver sees it: elements, groups of them that send light, and triangles that hide
+//! it.
 
 pub mod charts;
 pub mod contour;

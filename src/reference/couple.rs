@@ -5,8 +5,9 @@ use glam::Vec3;
 use crate::mesh::elements::Elements;
 use crate::passes::types::CouplingTarget;
 
-/// The words of one row: Σ A_j F_js / A_t of a target of one reflectance, Σ ρ_j A_j F_js / A_t by colour
-/// of any other. `row`: form factor from each element to the source; `reflectance`: of even light.
+/// The words of one row: Σ A_j F_js / A_t of a target of one reflectance, Σ ρ_j A_j F_js / A_t by
+/// colour of any other. `row`: form factor from each element to the source; `reflectance`: of even
+/// light.
 pub fn couple(
     elements: &Elements,
     reflectance: &[Vec3],

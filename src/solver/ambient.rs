@@ -1,4 +1,5 @@
-//! An estimate of the light that has not been shot yet, for pictures of a solution under way (Cohen et al. 1988).
+//! An estimate of the light that has not been shot yet, for pictures of a solution under way (Cohen
+//! et al. 1988).
 
 use glam::{DVec3, Vec3};
 
@@ -14,8 +15,9 @@ pub struct Ambient {
 }
 
 impl Ambient {
-    /// E = 1/(1 − ρ̄) · Φ / ΣA of an unshot power Φ, with the mean reflectance ρ̄ by area: Cohen's ambient radiosity, his form
-    /// factors to elements being their shares of the area. Power and areas in internal units.
+    /// E = 1/(1 − ρ̄) · Φ / ΣA of an unshot power Φ, with the mean reflectance ρ̄ by area: Cohen's
+    /// ambient radiosity, his form factors to elements being their shares of the area. Power and
+    /// areas in internal units.
     pub fn new(unshot: DVec3, elements: &Elements) -> Self {
         let area: f64 = elements.area.iter().sum();
         let reflected: DVec3 = elements
@@ -49,8 +51,8 @@ impl Solver {
 mod tests {
     use super::*;
 
-    /// In a closed room of one reflectance light of power Φ ends as E = Φ / (A (1 − ρ)) wherever it is spread evenly, so
-    /// that the estimate is the solution.
+    /// In a closed room of one reflectance light of power Φ ends as E = Φ / (A (1 − ρ)) wherever it
+    /// is spread evenly, so that the estimate is the solution.
     #[test]
     fn of_an_even_room_it_is_the_solution() {
         let elements = Elements {

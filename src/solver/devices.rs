@@ -6,8 +6,8 @@ use super::{Estimator, Settings, choose_device, open_device};
 use crate::error::{Error, Result};
 use crate::vk::{Device, Instance};
 
-/// Opens the devices asked for: one as [`open_device`] does, or several, divided by commas. One that is named twice is opened twice: a
-/// software device has threads of its own each time.
+/// Opens the devices asked for: one as [`open_device`] does, or several, divided by commas. One
+/// that is named twice is opened twice: a software device has threads of its own each time.
 ///
 /// # Errors
 /// A device that is not there or cannot run this program, or a list with a gap.

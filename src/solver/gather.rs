@@ -126,8 +126,8 @@ impl Gathering {
         })
     }
 
-    /// Finds what those of the rows with a relief send by direction, and gathers; the first has slot
-    /// `first`.
+    /// Finds what those of the rows with a relief send by direction, and gathers; the first has
+    /// slot `first`.
     fn record_relief(
         &self,
         cmd: &Commands,

@@ -41,8 +41,8 @@ pub(super) struct Drawn {
     pub directed: bool,
 }
 
-/// Of the unshot power at which the solution is done: what undrawn sources may have, and what need not
-/// be drawn again.
+/// Of the unshot power at which the solution is done: what undrawn sources may have, and what need
+/// not be drawn again.
 const UNDRAWN: f64 = 0.9;
 const UNGATHERED: f64 = 0.04;
 
@@ -50,8 +50,9 @@ const UNGATHERED: f64 = 0.04;
 const UNEVEN: f64 = 0.1;
 
 impl Ledger {
-    /// Sources that are to be drawn first, with their unshot power: the strong emitters, and after them
-    /// all others, until all emission is drawn and little is left. And whether they are strong.
+    /// Sources that are to be drawn first, with their unshot power: the strong emitters, and after
+    /// them all others, until all emission is drawn and little is left. And whether they are
+    /// strong.
     pub fn undrawn(&self) -> Option<Candidates> {
         let mut strong = Vec::new();
         let mut others = Vec::new();
@@ -157,8 +158,8 @@ impl Ledger {
         })
     }
 
-    /// Power that is in no element's light yet, nor bounced: the residual of the system, and what is owed
-    /// to the elements by sources without rows, with its first bounce.
+    /// Power that is in no element's light yet, nor bounced: the residual of the system, and what
+    /// is owed to the elements by sources without rows, with its first bounce.
     pub fn unshot(&self) -> f64 {
         let loose = |s: &usize| self.system.is_drawn(*s) && self.sources[*s].row.is_none();
         let owed: f64 = (0..self.sources.len())

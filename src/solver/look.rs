@@ -12,14 +12,14 @@ pub struct ItemPicture {
     pub source: u32,
     /// Pixels a side of a face.
     pub face: u32,
-    /// Triangles by their place in the input, or [`NONE`], `[row][column]` of a column of N × 3N pixels; see
-    /// [`crate::math::hemicube::face_rectangle`].
+    /// Triangles by their place in the input, or [`NONE`], `[row][column]` of a column of N × 3N
+    /// pixels; see [`crate::math::hemicube::face_rectangle`].
     pub items: Vec<u32>,
 }
 
 impl Solver {
-    /// The source of each triangle, by its place in the input; of one that is cut into several the first, and [`NONE`] of one
-    /// that never shoots.
+    /// The source of each triangle, by its place in the input; of one that is cut into several the
+    /// first, and [`NONE`] of one that never shoots.
     pub fn source_of_triangles(&self) -> Vec<u32> {
         let mut of_element = vec![NONE; self.elements.len()];
         for (s, source) in self.sources.list.iter().enumerate().rev() {

@@ -4,8 +4,8 @@
 //! rows ─► coupling ─► solve ─► gather
 //! ```
 //!
-//! [`spine`] is the method. The `pixel` estimator in scenes with relief shoots pixel by pixel instead:
-//! [`shots`].
+//! [`spine`] is the method. The `pixel` estimator in scenes with relief shoots pixel by pixel
+//! instead: [`shots`].
 
 mod ambient;
 mod coupling;
@@ -107,8 +107,9 @@ impl Solver {
         Self::on_devices(&[Arc::clone(device)], elements, lights, settings, None)
     }
 
-    /// As [`Self::new`], for the `elements` of a scene whose rows were kept when it was lit otherwise.
-    /// The sources are cut as they were then; point lights are drawn. See [`Visibility::check`].
+    /// As [`Self::new`], for the `elements` of a scene whose rows were kept when it was lit
+    /// otherwise. The sources are cut as they were then; point lights are drawn. See
+    /// [`Visibility::check`].
     ///
     /// # Errors
     /// Emission of elements that neither emitted nor reflected then.
@@ -123,9 +124,9 @@ impl Solver {
         Self::on_devices(&devices, elements, lights, settings, Some(kept))
     }
 
-    /// As [`Self::new`] or [`Self::relit`], with all of `devices`, the first of which holds the solution.
-    /// The others draw for it. Devices that draw alike, as those of one kind and driver do, give the
-    /// same bytes as one.
+    /// As [`Self::new`] or [`Self::relit`], with all of `devices`, the first of which holds the
+    /// solution. The others draw for it. Devices that draw alike, as those of one kind and driver
+    /// do, give the same bytes as one.
     ///
     /// # Errors
     /// No device, or several for what one alone can do; see [`check_devices`].
@@ -215,8 +216,8 @@ impl Solver {
         })
     }
 
-    /// Solves until a stop rule holds, or `go_on` says no. What has been solved so far is always valid,
-    /// and a further call goes on from it.
+    /// Solves until a stop rule holds, or `go_on` says no. What has been solved so far is always
+    /// valid, and a further call goes on from it.
     pub fn run(&mut self, go_on: impl FnMut(&Update) -> bool) -> Result<()> {
         self.turn(go_on)?;
         self.gather()
@@ -245,8 +246,8 @@ impl Solver {
         Ok(())
     }
 
-    /// As [`Self::run`], but where `go_on` has said no, the elements do not receive what has been solved
-    /// since the last time until [`Self::gather`].
+    /// As [`Self::run`], but where `go_on` has said no, the elements do not receive what has been
+    /// solved since the last time until [`Self::gather`].
     pub fn turn(&mut self, mut go_on: impl FnMut(&Update) -> bool) -> Result<()> {
         let start = Instant::now();
         let sources = self.scene.source_count;
@@ -316,8 +317,8 @@ impl Solver {
         })
     }
 
-    /// The rows that the device keeps of `scene`, whose elements these are, with their coupling; none
-    /// where nothing is kept.
+    /// The rows that the device keeps of `scene`, whose elements these are, with their coupling;
+    /// none where nothing is kept.
     pub fn visibility(&self, scene: &Scene) -> Result<Option<Visibility>> {
         let Method::Rows(spine) = &self.method else {
             return Ok(None);
@@ -336,8 +337,8 @@ impl Solver {
         Ok(Some(Visibility::new(scene, &self.settings, kept)))
     }
 
-    /// Draws sources, no more than fit a batch, without taking them into the solution: for benchmarks and
-    /// comparisons with the twins. Their rows take room from those of the solution.
+    /// Draws sources, no more than fit a batch, without taking them into the solution: for
+    /// benchmarks and comparisons with the twins. Their rows take room from those of the solution.
     ///
     /// # Panics
     /// Of the `pixel` estimator in a scene with relief, which makes no rows.
@@ -361,8 +362,8 @@ impl Solver {
         }
     }
 
-    /// Item buffers of the last shots of the `pixel` estimator in a scene with relief, `[row][slot][column]`;
-    /// none otherwise.
+    /// Item buffers of the last shots of the `pixel` estimator in a scene with relief,
+    /// `[row][slot][column]`; none otherwise.
     pub fn shot_items(&self) -> Result<Option<Vec<u32>>> {
         match &self.method {
             Method::Rows(_) => Ok(None),
@@ -382,8 +383,8 @@ impl Solver {
         &self.report
     }
 
-    /// The last sources that were gathered and what each sent, with what those with a relief sent by
-    /// direction; for comparison with the pass's twin. None without relief.
+    /// The last sources that were gathered and what each sent, with what those with a relief sent
+    /// by direction; for comparison with the pass's twin. None without relief.
     pub fn relief_exits(&self, count: usize) -> Result<Option<ReliefExits>> {
         let Some(relief) = &self.relief else {
             return Ok(None);
@@ -411,7 +412,8 @@ pub struct DrawnBatch {
     pub stages: Stages,
     /// `[source][face]`: meshlets kept, triangles tested, triangles drawn.
     pub counts: Vec<Vec<[u32; 3]>>,
-    /// Item buffers, `[row][slot][column]`: columns of N × 3N pixels side by side, one a slot of a batch.
+    /// Item buffers, `[row][slot][column]`: columns of N × 3N pixels side by side, one a slot of a
+    /// batch.
     pub items: Vec<u32>,
     /// Slots of a batch.
     pub slots: u32,
@@ -443,7 +445,8 @@ fn group(
 pub struct ReliefExits {
     /// The sources, with what each had to send.
     pub slots: Vec<Slot>,
-    /// `[slot][emitted, reflected][direction]` in the hemicube's frame; of slots without such a source, anything.
+    /// `[slot][emitted, reflected][direction]` in the hemicube's frame; of slots without such a
+    /// source, anything.
     pub exits: Vec<Vec3>,
     /// `[relief source][direction]`.
     pub kept: Vec<Vec3>,

@@ -13,8 +13,8 @@ pub struct Update {
     pub sources: u32,
     /// Unshot power as a share of all that was emitted.
     pub unshot_share: f64,
-    /// Power that can still be missing, as a share of all that was emitted; none where a reflectance
-    /// is 1.
+    /// Power that can still be missing, as a share of all that was emitted; none where a
+    /// reflectance is 1.
     pub error_bound: Option<f64>,
     /// Since the start of the solution.
     pub elapsed: Duration,
@@ -48,9 +48,9 @@ impl Bound {
         }
     }
 
-    /// Power that is missing at the elements, as a share of what is emitted: what is unshot arrives and
-    /// is reflected again, 1 + ρ + ρ² + … = 1/(1 − ρ) times; and a sum in f32 may lose half a step of
-    /// what arrives, which lacks as many bounces.
+    /// Power that is missing at the elements, as a share of what is emitted: what is unshot arrives
+    /// and is reflected again, 1 + ρ + ρ² + … = 1/(1 − ρ) times; and a sum in f32 may lose half a
+    /// step of what arrives, which lacks as many bounces.
     pub fn of(&self, unshot_share: f64) -> Option<f64> {
         let rounding = f64::from(f32::EPSILON) / 2.0;
         (self.factor).map(|factor| (unshot_share + rounding * factor) * factor)
@@ -127,7 +127,8 @@ impl<'a> Watch<'a> {
     }
 }
 
-/// Time until the unshot share falls to `target`, if it goes on falling as over the last half of the run.
+/// Time until the unshot share falls to `target`, if it goes on falling as over the last half of
+/// the run.
 fn time_left(history: &[(f64, f64)], target: f64) -> Option<Duration> {
     let &(now, share) = history.last()?;
     let &(then, share_then) = history.get(history.len() / 2)?;

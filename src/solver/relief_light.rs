@@ -12,8 +12,8 @@ use crate::passes::buffers::download;
 use crate::passes::relief_buffers::ReliefBuffers;
 use crate::vk::Device;
 
-/// Light of the elements with a relief, in internal order; `slot` is an index of [`crate::math::directions::Directions`] in the
-/// element's tangent frame.
+/// Light of the elements with a relief, in internal order; `slot` is an index of
+/// [`crate::math::directions::Directions`] in the element's tangent frame.
 pub struct ReliefLight {
     /// The elements, `[meso element]`.
     pub elements: Vec<u32>,
@@ -21,7 +21,8 @@ pub struct ReliefLight {
     pub moments: Vec<[Vec3; 3]>,
     /// Of this what comes straight from emitters and point lights.
     pub moments_direct: Vec<[Vec3; 3]>,
-    /// What is sent into a slot's directions as radiosity πL, emission included, `[meso element][slot]`, RGB, W·m⁻².
+    /// What is sent into a slot's directions as radiosity πL, emission included, `[meso
+    /// element][slot]`, RGB, W·m⁻².
     pub exitant: Vec<Vec3>,
 }
 

@@ -51,7 +51,8 @@ pub struct Skipped {
     pub degenerate_triangles: u64,
     /// Groups of elements that neither emit nor reflect.
     pub black_sources: u64,
-    /// How many triangles fewer the item buffers are drawn from, since elements of one plane are merged.
+    /// How many triangles fewer the item buffers are drawn from, since elements of one plane are
+    /// merged.
     pub triangles_merged: u64,
     /// Hemicube faces in which nothing was to be drawn.
     pub empty_faces: u64,

@@ -1,5 +1,5 @@
-//! Makes rows: what a source gives each element, drawn, evaluated, normalised and coupled. Any device
-//! that holds the scene can, whatever the light.
+//! Makes rows: what a source gives each element, drawn, evaluated, normalised and coupled. Any
+//! device that holds the scene can, whatever the light.
 
 use std::collections::VecDeque;
 use std::ops::AddAssign;
@@ -30,7 +30,8 @@ pub(super) struct Row {
     /// Words of the coupling row, not scaled.
     pub coupling: Vec<f32>,
     pub factors: Factors,
-    /// `[face]`: meshlets kept, triangles tested, triangles drawn. Empty where rays found what is seen.
+    /// `[face]`: meshlets kept, triangles tested, triangles drawn. Empty where rays found what is
+    /// seen.
     pub counts: Vec<[u32; 3]>,
     /// Elements that see nothing of the source, whatever stands between.
     pub facing_away: u32,

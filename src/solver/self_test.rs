@@ -1,4 +1,5 @@
-//! Opening a device and testing, before anything is trusted to it, that element IDs come back right.
+//! Opening a device and testing, before anything is trusted to it, that element IDs come back
+//! right.
 
 use std::sync::Arc;
 
@@ -15,7 +16,8 @@ use crate::passes::buffers::SceneBuffers;
 use crate::scene::{Material, Scene, Triangle};
 use crate::vk::{Candidate, Device, Instance};
 
-/// Opens the device asked for, by index or part of its name, or else the best one that can run this program.
+/// Opens the device asked for, by index or part of its name, or else the best one that can run this
+/// program.
 pub fn open_device(wanted: Option<&str>, validation: bool) -> Result<Arc<Device>> {
     let instance = Instance::new(validation)?;
     let candidate = choose_device(&instance, wanted)?;
@@ -42,7 +44,8 @@ pub fn choose_device(instance: &Instance, wanted: Option<&str>) -> Result<Candid
                 .and_then(|i| candidates.iter().find(|c| c.index == i));
             by_index.or_else(|| {
                 let lower = wanted.to_lowercase();
-                // A number is an index or a model: that of a version somewhere in a name is neither.
+                // A number is an index or a model: that of a version somewhere in a name is
+                // neither.
                 let number = lower.bytes().all(|b| b.is_ascii_digit());
                 candidates.iter().find(|c| {
                     let name = c.name.to_lowercase();
@@ -69,8 +72,8 @@ pub fn choose_device(instance: &Instance, wanted: Option<&str>) -> Result<Candid
     }))
 }
 
-/// Draws one hemicube inside a small box of distinct triangles and compares every pixel's ID with the triangle that the
-/// pixel's own ray meets.
+/// Draws one hemicube inside a small box of distinct triangles and compares every pixel's ID with
+/// the triangle that the pixel's own ray meets.
 pub fn ids_come_back_right(device: &Arc<Device>) -> Result<bool> {
     const SIZE: u32 = 16;
     let mut elements = Elements::new(&open_box());

@@ -41,7 +41,8 @@ pub struct Settings {
     pub estimator: Estimator,
     /// Pixels a side of a hemicube's face; even.
     pub hemicube: u32,
-    /// The same for sources that emit strongly; `hemicube` or more, even. None: see [`Self::emitter_shadows`].
+    /// The same for sources that emit strongly; `hemicube` or more, even. None: see
+    /// [`Self::emitter_shadows`].
     pub emitter_hemicube: Option<u32>,
     /// Stops when the error bound is no more than this.
     pub residual: f64,
@@ -52,20 +53,20 @@ pub struct Settings {
     pub seed: u64,
     pub grouping: Grouping,
     pub culling: Culling,
-    /// Draws connected elements of one plane as few triangles; see [`crate::mesh::occluders`]. The `pixel` estimator asks for every
-    /// element and does without.
+    /// Draws connected elements of one plane as few triangles; see [`crate::mesh::occluders`]. The
+    /// `pixel` estimator asks for every element and does without.
     pub merging: bool,
     /// Sources of a batch that are drawn, at most.
     pub batch: u32,
-    /// Triangles that are listed at once for a face of a hemicube, at most; what is left is drawn after them. None: as many as fit
-    /// the device's largest buffer. The light is the same.
+    /// Triangles that are listed at once for a face of a hemicube, at most; what is left is drawn
+    /// after them. None: as many as fit the device's largest buffer. The light is the same.
     pub list_room: Option<u32>,
-    /// Bytes on the device for the rows of sources that have been drawn. Sources whose rows find no room
-    /// are drawn once more. None: [`VISIBILITY_MEMORY`], or a third of the device's memory if that is
-    /// less.
+    /// Bytes on the device for the rows of sources that have been drawn. Sources whose rows find no
+    /// room are drawn once more. None: [`VISIBILITY_MEMORY`], or a third of the device's memory if
+    /// that is less.
     pub visibility_memory: Option<u64>,
-    /// Bytes in the host's memory for the coupling between sources. What the sources beyond it send is
-    /// found by gathering and measuring, again and again.
+    /// Bytes in the host's memory for the coupling between sources. What the sources beyond it send
+    /// is found by gathering and measuring, again and again.
     pub coupling_memory: u64,
     /// How relief takes part; see [`crate::bake::elements`].
     pub relief: meso::Options,
@@ -102,14 +103,16 @@ pub const VISIBILITY_MEMORY: u64 = 768 << 20;
 /// Smallest and largest hemicube.
 pub const HEMICUBE_RANGE: std::ops::RangeInclusive<u32> = 8..=2048;
 
-/// With the `pixel` estimator the side of the faces of strong emitters over that of all others, unless told otherwise, and up to which size: a
-/// hemicube of 1024 takes four times as long as one of 512, and lowers the error hardly more.
+/// With the `pixel` estimator the side of the faces of strong emitters over that of all others,
+/// unless told otherwise, and up to which size: a hemicube of 1024 takes four times as long as one
+/// of 512, and lowers the error hardly more.
 pub const EMITTER_SCALE: u32 = 4;
 const FINEST: u32 = 1024;
 
 impl Settings {
-    /// How it is found what strong emitters see: unless [`Self::emitter_hemicube`] is given, by rays, or, with the `pixel` estimator,
-    /// which takes form factors from pixels, by hemicubes [`EMITTER_SCALE`] times as fine as all others, of 1024 pixels at most.
+    /// How it is found what strong emitters see: unless [`Self::emitter_hemicube`] is given, by
+    /// rays, or, with the `pixel` estimator, which takes form factors from pixels, by hemicubes
+    /// [`EMITTER_SCALE`] times as fine as all others, of 1024 pixels at most.
     pub fn emitter_shadows(&self) -> EmitterShadows {
         match (self.emitter_hemicube, self.estimator) {
             (Some(face), _) => EmitterShadows::Hemicubes(face),

@@ -1,6 +1,6 @@
-//! The `pixel` estimator in a scene with relief: each pixel brings light by its own direction, so that
-//! there is no row to keep. Sources are drawn for every shot, those with the most unshot power first
-//! (Southwell), and what they reflect is measured before each batch.
+//! The `pixel` estimator in a scene with relief: each pixel brings light by its own direction, so
+//! that there is no row to keep. Sources are drawn for every shot, those with the most unshot power
+//! first (Southwell), and what they reflect is measured before each batch.
 
 use std::sync::Arc;
 
@@ -147,8 +147,8 @@ impl Shots {
         Ok(reflected.into_iter().map(Vec3::as_dvec3).collect())
     }
 
-    /// Sources with unshot power, the strongest first: of the strong emitters while one has not sent its
-    /// emission, which the flag says.
+    /// Sources with unshot power, the strongest first: of the strong emitters while one has not
+    /// sent its emission, which the flag says.
     fn choose(&self, reflected: &[DVec3]) -> (Vec<usize>, bool) {
         let mut powers: Vec<(usize, f64)> = Vec::new();
         let strong = self.sources.iter().any(|s| s.strong && !s.emission_shot);

@@ -1,8 +1,8 @@
 //! The method: rows, coupling, solve, gather.
 //!
-//! Sources are drawn once, the strongest emitters first and then by unshot power (Southwell). What a
-//! row brings to every other source is summed while the row is at hand, so that bounces are solved
-//! among the sources. In the end the rows bring what the sources send to the elements.
+//! Sources are drawn once, the strongest emitters first and then by unshot power (Southwell). What
+//! a row brings to every other source is summed while the row is at hand, so that bounces are
+//! solved among the sources. In the end the rows bring what the sources send to the elements.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -73,7 +73,8 @@ enum Phase {
 /// Of the unshot power at which the solution is done: what sweeps may leave.
 const UNSOLVED: f64 = 0.01;
 
-/// Between batches sweeps leave this share of what the undrawn sources have: it orders them well enough.
+/// Between batches sweeps leave this share of what the undrawn sources have: it orders them well
+/// enough.
 const ORDERED: f64 = 0.1;
 
 /// Times that light is measured and corrected, at most.
@@ -146,7 +147,8 @@ impl Spine {
             if !self.draw(on, Phase::Again, report, watch)? {
                 break;
             }
-            // By coupling alone the light is solved where every source has its row, and sends evenly.
+            // By coupling alone the light is solved where every source has its row, and sends
+            // evenly.
             if on.relief.is_none() && self.ledger.system.is_whole() {
                 break;
             }
@@ -295,8 +297,8 @@ impl Spine {
         self.gather(on, &loose, report)
     }
 
-    /// Sends what all sources owe through the rows that are kept; of those with a relief, `by_direction`,
-    /// also what changes its direction alone.
+    /// Sends what all sources owe through the rows that are kept; of those with a relief,
+    /// `by_direction`, also what changes its direction alone.
     fn gather_kept(&mut self, on: On<'_>, by_direction: bool, report: &mut Report) -> Result<()> {
         let rows: Vec<LitRow> = (0..self.ledger.sources.len())
             .filter_map(|s| {

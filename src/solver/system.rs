@@ -1,9 +1,9 @@
 //! Radiosity of the sources: B_t = M_t + Σ_s G[s,t] B_s, solved by Gauss–Seidel in f64 among the
 //! sources whose coupling is known.
 //!
-//! The iteration is kept in its shooting form (Gortler et al. 1994): each source has shot part of its
-//! radiosity through its row, and what it has not shot is the residual of its equation. So rows can
-//! join at any time, and the sum of what is unshot bounds what is missing.
+//! The iteration is kept in its shooting form (Gortler et al. 1994): each source has shot part of
+//! its radiosity through its row, and what it has not shot is the residual of its equation. So rows
+//! can join at any time, and the sum of what is unshot bounds what is missing.
 
 use glam::DVec3;
 
@@ -26,7 +26,8 @@ pub(super) struct System {
 struct Unknown {
     emitted: DVec3,
     emitted_power: f64,
-    /// That radiosity is multiplied by for power: a surface's area, half the sphere of a point light.
+    /// That radiosity is multiplied by for power: a surface's area, half the sphere of a point
+    /// light.
     area: f64,
     drawn: bool,
     row: Option<CouplingRow>,
@@ -81,7 +82,8 @@ impl System {
         self.sources[s].emitted
     }
 
-    /// What radiosity is multiplied by for power: a surface's area, half the sphere of a point light.
+    /// What radiosity is multiplied by for power: a surface's area, half the sphere of a point
+    /// light.
     pub fn area(&self, s: usize) -> f64 {
         self.sources[s].area
     }
@@ -233,7 +235,8 @@ impl System {
         }
     }
 
-    /// Sources that were drawn and have no row shoot what they have: measuring will find what arrived.
+    /// Sources that were drawn and have no row shoot what they have: measuring will find what
+    /// arrived.
     pub fn shoot_unknown(&mut self) {
         for s in 0..self.sources.len() {
             let reflected = self.reflected(s);

@@ -1,8 +1,8 @@
 //! The devices of a bake. Each holds the scene and makes rows; the first one keeps them.
 //!
-//! A batch is shared out source by source as devices become free. Who makes a row changes nothing of
-//! it, and rows are kept in the order of the batch, so that devices of one kind and driver give the
-//! same bytes, however many they are.
+//! A batch is shared out source by source as devices become free. Who makes a row changes nothing
+//! of it, and rows are kept in the order of the batch, so that devices of one kind and driver give
+//! the same bytes, however many they are.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -163,7 +163,8 @@ impl Team {
         }
     }
 
-    /// The item buffers of the last batch that was drawn, `[row][slot][column]`; none of several devices.
+    /// The item buffers of the last batch that was drawn, `[row][slot][column]`; none of several
+    /// devices.
     pub fn items(&self) -> Result<Vec<u32>> {
         match self {
             Self::Alone { makers, .. } => makers.all.items(),

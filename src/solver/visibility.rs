@@ -17,7 +17,8 @@ use crate::passes::kept_rows::RestoredSize;
 use crate::passes::types::{KeptRow, KeptState};
 use crate::scene::{PointLight, Scene};
 
-/// Form factors of the sources of a scene that had been drawn, for the same scene with other emission and point lights.
+/// Form factors of the sources of a scene that had been drawn, for the same scene with other
+/// emission and point lights.
 pub struct Visibility {
     header: Header,
     /// `[source]`; chunk `NONE` where a source has none.

@@ -27,7 +27,8 @@ pub enum Order {
         settings: Box<Settings>,
         epoch: u64,
     },
-    /// Lights the scene of the last bake, of which emission and point lights have changed, by the form factors that are kept.
+    /// Lights the scene of the last bake, of which emission and point lights have changed, by the
+    /// form factors that are kept.
     Relight { scene: Arc<Scene>, epoch: u64 },
     /// Tells the sources of a bake from a file.
     Sources,
@@ -43,7 +44,8 @@ pub enum Stage {
     Scene,
     /// Lights the scene as if it were flat, before its relief is prepared.
     Flat,
-    /// Finds what reliefs see of themselves and how they answer light; the scene is lit as if it were flat meanwhile.
+    /// Finds what reliefs see of themselves and how they answer light; the scene is lit as if it
+    /// were flat meanwhile.
     Relief,
 }
 
@@ -150,7 +152,8 @@ impl Drop for Baker {
 
 /// Shortest and longest time between two snapshots of a bake.
 const SLICES: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(2)];
-/// A snapshot costs no more than this share of the bake's time, one over it, unless that makes it wait too long.
+/// A snapshot costs no more than this share of the bake's time, one over it, unless that makes it
+/// wait too long.
 const SHARE: u32 = 8;
 
 /// How long a scene is lit as if its relief were flat before that is prepared.
@@ -246,8 +249,8 @@ impl Work {
         }
     }
 
-    /// A solver with the sources of what is shown: the one under way; of a bake from a file one that is never run, of elements without
-    /// relief, whose preparation would take long.
+    /// A solver with the sources of what is shown: the one under way; of a bake from a file one
+    /// that is never run, of elements without relief, whose preparation would take long.
     fn sources(&mut self) -> Result<&Solver> {
         if let Some(solving) = &self.solving {
             return Ok(&solving.solver);

@@ -37,7 +37,8 @@ pub struct Snapshot {
     pub progress: Progress,
 }
 
-/// Share of the area that is darker than what the exposure is for, and the luminance which that is brought to, as in pictures.
+/// Share of the area that is darker than what the exposure is for, and the luminance which that is
+/// brought to, as in pictures.
 const METERED_SHARE: f64 = 0.9;
 const METER_TARGET: f32 = 0.6;
 
@@ -96,7 +97,8 @@ impl Snapshot {
         Self::new(0, scene, light, bake.relief, Ambient::default(), progress)
     }
 
-    /// What is shown before any light is known: shapes and colours, as on a drawing table, brighter from one side than from another.
+    /// What is shown before any light is known: shapes and colours, as on a drawing table, brighter
+    /// from one side than from another.
     pub fn unlit(scene: &Arc<Scene>) -> Self {
         let side = DVec3::new(0.5, 0.8, 0.35).normalize();
         let shade = |triangle: &Triangle| {
@@ -120,7 +122,8 @@ impl Snapshot {
     }
 }
 
-/// ∫ L ω dω over each slot of a sky whose irradiance is 1, the directions of a slot taken as one; L = 1/π.
+/// ∫ L ω dω over each slot of a sky whose irradiance is 1, the directions of a slot taken as one; L
+/// = 1/π.
 pub fn even_moments(directions: &[DVec3]) -> Vec<Vec3> {
     let angle = std::f64::consts::TAU / directions.len() as f64;
     let moment = |d: &DVec3| (*d * (angle / std::f64::consts::PI)).as_vec3();
@@ -135,8 +138,8 @@ pub fn is_done(stop: StopReason) -> bool {
     )
 }
 
-/// Stops that bring the luminance under which METERED_SHARE of the area that does not emit lies to METER_TARGET. It does not
-/// depend on the view: a window that orbits does not flicker.
+/// Stops that bring the luminance under which METERED_SHARE of the area that does not emit lies to
+/// METER_TARGET. It does not depend on the view: a window that orbits does not flicker.
 fn exposure(scene: &Scene, irradiance: &[Vec3], ambient: Vec3) -> f32 {
     let mut lit: Vec<(f32, f64)> = scene
         .triangles

@@ -1,4 +1,5 @@
-//! Small scenes and the device for the tests. Validation is on: one message fails the test that saw it.
+//! Small scenes and the device for the tests. Validation is on: one message fails the test that saw
+//! it.
 #![allow(dead_code)]
 
 pub mod random;
@@ -19,7 +20,8 @@ use mesolux::solver::ReliefLight;
 use mesolux::solver::{Light, Report, Settings, Solver, open_device};
 use mesolux::vk::{Device, validation_log};
 
-/// The device that the program itself would take, watched by the validation layer. No device is a failure.
+/// The device that the program itself would take, watched by the validation layer. No device is a
+/// failure.
 pub fn device() -> Arc<Device> {
     open_device(std::env::var("MESOLUX_TEST_DEVICE").ok().as_deref(), true).expect(
         "the tests need a Vulkan device (Debian: mesa-vulkan-drivers, vulkan-validationlayers)",
@@ -35,7 +37,8 @@ pub fn assert_silent() {
     );
 }
 
-/// Writes a picture beside its reference to be looked at, where MESOLUX_TEST_PICTURES names a folder.
+/// Writes a picture beside its reference to be looked at, where MESOLUX_TEST_PICTURES names a
+/// folder.
 pub fn show(name: &str, ours: &Picture, reference: &Picture) {
     if let Some(folder) = std::env::var_os("MESOLUX_TEST_PICTURES") {
         let path = Path::new(&folder).join(format!("{name}.png"));
@@ -79,10 +82,11 @@ impl Build {
         }
     }
 
-    /// Gives triangles a material and texture coordinates, one repeat each [`REPEAT`] along two directions.
+    /// Gives triangles a material and texture coordinates, one repeat each [`REPEAT`] along two
+    /// directions.
     ///
-    /// Corners of the texture's repeats lie in the middle of texels, so that `displace` cuts along the cells of the bilinear
-    /// map.
+    /// Corners of the texture's repeats lie in the middle of texels, so that `displace` cuts along
+    /// the cells of the bilinear map.
     pub fn cover(&mut self, triangles: Range<usize>, material: u32, (u, v): (DVec3, DVec3)) {
         self.uv(triangles.clone(), u * REPEAT, v * REPEAT);
         for t in &mut self.scene.triangles[triangles.clone()] {
@@ -93,7 +97,8 @@ impl Build {
         self.paint(triangles, material);
     }
 
-    /// A ball made of a cube of n × n cells a side, facing outward, one repeat of the texture a side.
+    /// A ball made of a cube of n × n cells a side, facing outward, one repeat of the texture a
+    /// side.
     pub fn cube_sphere(&mut self, centre: DVec3, radius: f64, n: u32, material: u32) {
         let first = self.scene.vertices.len();
         let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);

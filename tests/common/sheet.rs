@@ -7,7 +7,8 @@ use mesolux::scene::Scene;
 
 use super::Build;
 
-/// A sheet of n × n cells over 0..1 × 0..1, bent to z = −bend · (x² + y²) about its middle, with its texture along x and y.
+/// A sheet of n × n cells over 0..1 × 0..1, bent to z = −bend · (x² + y²) about its middle, with
+/// its texture along x and y.
 pub fn sheet(n: u32, bend: f64) -> Scene {
     let mut build = Build::new();
     let relief = build.material(0.7, 0.0);

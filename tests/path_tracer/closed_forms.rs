@@ -24,7 +24,8 @@ fn lit_cube() -> Build {
     build
 }
 
-/// Red irradiance at a place, within so many of its standard errors of `exact`, themselves at most a share of it.
+/// Red irradiance at a place, within so many of its standard errors of `exact`, themselves at most
+/// a share of it.
 fn assert_irradiance(
     tracer: &PathTracer,
     (at, normal): (DVec3, DVec3),
@@ -39,7 +40,8 @@ fn assert_irradiance(
     assert!(error <= most_noise * exact);
 }
 
-/// A room whose sides reflect and emit one half: L = 1/2 + 1/2 L everywhere, at the origin and far from it.
+/// A room whose sides reflect and emit one half: L = 1/2 + 1/2 L everywhere, at the origin and far
+/// from it.
 #[test]
 fn furnace() {
     for offset in [DVec3::ZERO, FAR] {
@@ -72,7 +74,8 @@ fn furnace() {
     }
 }
 
-/// A share of 95 % of the intervals of ±1.96 standard errors hold the truth: of 400, the share's own error is 1.1 %.
+/// A share of 95 % of the intervals of ±1.96 standard errors hold the truth: of 400, the share's
+/// own error is 1.1 %.
 #[test]
 fn tells_its_own_error() {
     let build = lit_cube();
@@ -130,7 +133,8 @@ fn point_light() {
     }
 }
 
-/// E = π Le F by Lambert's formula, from afar, from so near that light samples alone would be all noise, and from behind.
+/// E = π Le F by Lambert's formula, from afar, from so near that light samples alone would be all
+/// noise, and from behind.
 #[test]
 fn area_light() {
     let mut build = Build::new();
@@ -164,8 +168,9 @@ fn area_light() {
     assert_eq!(dark, Vec3::ZERO, "a lamp's back is black");
 }
 
-/// Unit cube, ρ = 0.5, the floor emits 1: radiosity of the continuous solution in the middle of each side, from a fine
-/// quadrature of the integral equation, and the light straight from the floor.
+/// Unit cube, ρ = 0.5, the floor emits 1: radiosity of the continuous solution in the middle of
+/// each side, from a fine quadrature of the integral equation, and the light straight from the
+/// floor.
 #[test]
 fn cube() {
     let build = lit_cube();
@@ -212,7 +217,8 @@ fn cube() {
     }
 }
 
-/// Not one of 10⁵ rays in a closed ball with lamps outside finds a gap, nor a lit place behind a sheet with two fronts.
+/// Not one of 10⁵ rays in a closed ball with lamps outside finds a gap, nor a lit place behind a
+/// sheet with two fronts.
 #[test]
 fn nothing_leaks() {
     for offset in [DVec3::ZERO, FAR] {

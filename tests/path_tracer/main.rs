@@ -1,4 +1,5 @@
-//! The reference path tracer against closed forms, against the rasteriser's view of a scene, and against itself.
+//! The reference path tracer against closed forms, against the rasteriser's view of a scene, and
+//! against itself.
 
 mod closed_forms;
 #[path = "../common/mod.rs"]
@@ -13,7 +14,8 @@ use mesolux::path_tracer::{Film, PathTracer, Settings};
 use mesolux::render::{Light, View};
 use mesolux::scene::{Camera, Scene};
 
-/// Standard errors that an estimate may lie from the truth: one normal variable in 15 000 does, and every seed is fixed.
+/// Standard errors that an estimate may lie from the truth: one normal variable in 15 000 does, and
+/// every seed is fixed.
 const SIGMAS: f64 = 4.0;
 /// What f32 leaves of a value.
 const ROUNDING: f64 = 1e-6;

@@ -10,8 +10,9 @@ use mesolux::scene::{Camera, Texture};
 use crate::common::{Build, assert_silent, device};
 use crate::{FAR, ROUNDING, camera, draw, settings, view};
 
-/// Emitters of three colours and a back, none symmetric, seen from 10⁶ units off the origin by an eye outside of them and by
-/// one with an oblique up: what the rasteriser shows, but for the edges, where both have samples of their own.
+/// Emitters of three colours and a back, none symmetric, seen from 10⁶ units off the origin by an
+/// eye outside of them and by one with an oblique up: what the rasteriser shows, but for the edges,
+/// where both have samples of their own.
 #[test]
 fn sees_what_the_rasteriser_sees() {
     let mut build = Build::new();
@@ -70,7 +71,8 @@ fn sees_what_the_rasteriser_sees() {
     }
 }
 
-/// A texture of four colours, upright and mirrored as the rasteriser has it, under light from so far that it is even.
+/// A texture of four colours, upright and mirrored as the rasteriser has it, under light from so
+/// far that it is even.
 #[test]
 fn looks_textures_up_as_the_rasteriser_does() {
     let mut build = Build::new();

@@ -14,19 +14,21 @@ use crate::{run, run_to};
 /// Height of 1 in texels: flanks of bricks and ridges rise by as many within one texel.
 pub const RELIEF: f64 = 24.0;
 
-/// Heights within which a decision may differ: heights of 1 and products of them are right to 6e-8 each, places to 1e-7
-/// of a texel on flanks of 1 a texel.
+/// Heights within which a decision may differ: heights of 1 and products of them are right to 6e-8
+/// each, places to 1e-7 of a texel on flanks of 1 a texel.
 const DECISION_TOLERANCE: f64 = 1e-6;
-/// Texels along the way, of a hit that is not grazing: t is rounded by 3e-8 of up to 1,500 texels, 4.5e-5, besides what
-/// the place is off.
+/// Texels along the way, of a hit that is not grazing: t is rounded by 3e-8 of up to 1,500 texels,
+/// 4.5e-5, besides what the place is off.
 const APART_TOLERANCE: f64 = 1e-4;
 /// Texels over the map, of the same: a height off by 1e-7 over a fall of at least GRAZING.
 const PLACE_TOLERANCE: f64 = 1e-5;
-/// Where the fall goes to 0 a height off by d moves the hit by the root of d over the patch's curvature: √1e-6.
+/// Where the fall goes to 0 a height off by d moves the hit by the root of d over the patch's
+/// curvature: √1e-6.
 const APART_GRAZING: f64 = 1e-3;
 /// Heights: rounding of the sum of four products of heights up to 1.
 const SURFACE_TOLERANCE: f64 = 1e-6;
-/// Heights, and as many times RELIEF in texels: t's rounding, as above, on falls of up to 1 a texel.
+/// Heights, and as many times RELIEF in texels: t's rounding, as above, on falls of up to 1 a
+/// texel.
 const RAY_TOLERANCE: f64 = 1e-5;
 
 /// Rise of the ray against the surface, in heights a texel of the way, below which it grazes.
@@ -38,7 +40,8 @@ struct Compared {
     other_decisions: usize,
     /// Of other decisions: the height that decides, at most.
     doubt: f64,
-    /// Between the hits, along the ray in texels: at most and on average, of those that meet the surface clearly.
+    /// Between the hits, along the ray in texels: at most and on average, of those that meet the
+    /// surface clearly.
     most: f64,
     sum: f64,
     clear: usize,

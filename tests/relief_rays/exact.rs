@@ -69,8 +69,8 @@ fn starts_on_and_below_the_surface() {
     assert_silent();
 }
 
-/// Share of a sinusoid A cos(2πx / λ) in shadow, A = 0.1 λ, by the light's elevation: closed form, horizons cast and
-/// slopes turned away together.
+/// Share of a sinusoid A cos(2πx / λ) in shadow, A = 0.1 λ, by the light's elevation: closed form,
+/// horizons cast and slopes turned away together.
 const SINUSOID_SHADOW: [(f64, f64); 3] = [
     (10.0, 0.669_353_760_901_578_8),
     (20.0, 0.472_178_077_935_689),
@@ -82,8 +82,8 @@ fn shadows_of_a_sinusoid() {
     let device = device();
     const WIDTH: u32 = 1024;
     const RAYS: u32 = 100_000;
-    // Wavelengths. Rounded ways from the surface would shadow themselves; a lift of δ moves a shadow's edge where the slope
-    // turns away by √(2δ / |h″|), 2e-4.
+    // Wavelengths. Rounded ways from the surface would shadow themselves; a lift of δ moves a
+    // shadow's edge where the slope turns away by √(2δ / |h″|), 2e-4.
     const LIFT: f64 = 1e-7;
     let height = |u: f64| 0.1 * (std::f64::consts::TAU * u).cos();
     let map = maps::map(WIDTH, 1, |column, _| {

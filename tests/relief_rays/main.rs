@@ -1,5 +1,5 @@
-//! Rays over height maps: the march with the pyramid on the device against the walk from cell to cell, and shadows of a
-//! sinusoid against their exact share.
+//! Rays over height maps: the march with the pyramid on the device against the walk from cell to
+//! cell, and shadows of a sinusoid against their exact share.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -43,7 +43,8 @@ fn run_to(device: &Arc<Device>, map: &HeightMap, rays: &[[Vec3; 2]], top: u32) -
         .expect("the device marches")
 }
 
-/// From above all of the map to below it, or to or from a place among the heights; up to 85° from the normal in texels.
+/// From above all of the map to below it, or to or from a place among the heights; up to 85° from
+/// the normal in texels.
 fn random_rays(map: &HeightMap, count: usize, random: &mut Random) -> Vec<[Vec3; 2]> {
     (0..count)
         .map(|i| {
@@ -140,7 +141,8 @@ fn maps_of_any_size() {
     assert_silent();
 }
 
-/// Along columns, along rows, upright, and at 45° through corners; from places on and between the texels' centres.
+/// Along columns, along rows, upright, and at 45° through corners; from places on and between the
+/// texels' centres.
 #[test]
 fn rays_along_axes_and_through_corners() {
     let device = device();

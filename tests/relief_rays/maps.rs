@@ -16,7 +16,8 @@ pub fn map(width: u32, height: u32, value: impl Fn(u32, u32) -> f32) -> HeightMa
     }
 }
 
-/// A running bond of bricks with flat tops; the mortar lies deep, and its flanks are one texel wide.
+/// A running bond of bricks with flat tops; the mortar lies deep, and its flanks are one texel
+/// wide.
 pub fn bricks() -> HeightMap {
     map(256, 256, |column, row| {
         let course = row / 32;

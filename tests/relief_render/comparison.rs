@@ -41,7 +41,8 @@ fn comparisons_have_closed_forms() {
     close(found.rel_mse, expected.iter().sum::<f64>() / 3.0);
     close(found.bias, 0.1);
     close(found.rms, (0.01_f64 * 14.0 / 3.0).sqrt() / 2.0);
-    // One red value of twelve is off by 1; a black reference pixel counts by the hundredth of the mean.
+    // One red value of twelve is off by 1; a black reference pixel counts by the hundredth of the
+    // mean.
     let mut spot = reference.clone();
     spot.radiance[3][0] = 0.0;
     let found = Comparison::new(&spot, &reference).expect("alike in size");
@@ -71,7 +72,8 @@ fn comparisons_have_closed_forms() {
     }
 }
 
-/// A row and a picture for each view and part of the light, and the same rows in both files; no row for what is not there.
+/// A row and a picture for each view and part of the light, and the same rows in both files; no row
+/// for what is not there.
 #[test]
 fn bench_writes_rows_and_pictures() {
     let folder = tempfile::tempdir().expect("a folder for the test");

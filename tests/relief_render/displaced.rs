@@ -14,7 +14,8 @@ use mesolux::solver::Settings;
 use crate::common::{Build, assert_silent, show};
 use crate::{baked, draw, quick, settings, view};
 
-/// Paths of each pixel. Their noise is known and taken off; what is left of it is a fiftieth of it, for the pixels are many.
+/// Paths of each pixel. Their noise is known and taken off; what is left of it is a fiftieth of it,
+/// for the pixels are many.
 const DIRECT_PATHS: u32 = 64;
 const INDIRECT_PATHS: u32 = 96;
 
@@ -31,8 +32,8 @@ const PROMISED: Limits = Limits {
     bias: 0.01,
 };
 
-/// What is held of it in the parts of the light. Of the indirect light the elements alone take 1.2 % where the red wall is
-/// near, as on the flat floor.
+/// What is held of it in the parts of the light. Of the indirect light the elements alone take 1.2
+/// % where the red wall is near, as on the flat floor.
 const LIMITS: [(Light, Limits); 3] = [
     (Light::Global, PROMISED),
     (Light::Direct, PROMISED),
@@ -45,7 +46,8 @@ const LIMITS: [(Light, Limits); 3] = [
     ),
 ];
 
-/// Bias of a relief's picture beyond that of the flat floor's: thrice the paths' error of the mean, 0.3 % of indirect light.
+/// Bias of a relief's picture beyond that of the flat floor's: thrice the paths' error of the mean,
+/// 0.3 % of indirect light.
 const RELIEF_BIAS: f64 = 0.01;
 
 #[test]
@@ -118,8 +120,9 @@ fn pictures_are_those_of_the_displaced_scene() {
     assert_silent();
 }
 
-/// Shares of samples and of heights' ranges by which silhouettes and heights differ from the displaced mesh's: one sample of
-/// sixteen in every other pixel of the outline, and what triangles of a texel leave of the bumps.
+/// Shares of samples and of heights' ranges by which silhouettes and heights differ from the
+/// displaced mesh's: one sample of sixteen in every other pixel of the outline, and what triangles
+/// of a texel leave of the bumps.
 const MOST_UNCOVERED: f64 = 0.03;
 const MOST_HEIGHT: f64 = 0.015;
 

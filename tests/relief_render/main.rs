@@ -1,5 +1,5 @@
-//! Pictures of relief: against the path tracer on the displaced mesh, against the rasterised displaced mesh, against
-//! themselves.
+//! Pictures of relief: against the path tracer on the displaced mesh, against the rasterised
+//! displaced mesh, against themselves.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -154,8 +154,8 @@ fn shadings_differ_and_pictures_are_repeated() {
 /// Samples, of 147 456, that may be seen through between prisms.
 const MOST_CRACKS: f32 = 0.0;
 
-/// From the front nothing is seen through a relief, from behind nothing of it. Lamps are beyond. Straight above and below,
-/// rays pass along diagonals and sides of the prisms.
+/// From the front nothing is seen through a relief, from behind nothing of it. Lamps are beyond.
+/// Straight above and below, rays pass along diagonals and sides of the prisms.
 #[test]
 fn prisms_have_no_cracks() {
     let mut failures = Vec::new();

@@ -33,7 +33,8 @@ fn try_files(dir: &Path, first: &str, files: [(&str, impl AsRef<[u8]>); 3]) -> R
     .map_err(|error| error.to_string())
 }
 
-/// Replaces `from` by `to` in one of the three files, loads `first`, and looks for each fragment in the message.
+/// Replaces `from` by `to` in one of the three files, loads `first`, and looks for each fragment in
+/// the message.
 fn refused(first: &str, file: &str, from: &str, to: &str, fragments: &[&str]) {
     let dir = tempfile::tempdir().unwrap();
     let mut files = GOOD.map(|(name, text)| (name, text.to_owned()));

@@ -1,4 +1,5 @@
-//! Height and normal maps: what is read, what is refused, what is told, and that they are written out the same.
+//! Height and normal maps: what is read, what is refused, what is told, and that they are written
+//! out the same.
 
 mod images;
 mod materials;

@@ -87,7 +87,8 @@ fn maps_that_contradict_each_other_are_told_with_the_cure() {
             }
         }
     }
-    // Another scale is another strength, no contradiction; a flat normal map is one, which no sign mends.
+    // Another scale is another strength, no contradiction; a flat normal map is one, which no sign
+    // mends.
     let (height, normal) = waves(0.2, [1.0, 1.0]);
     let flat = rgb_float(4, 4, |_, _| [0.5, 0.5, 1.0]);
     let dir = folder(&[("h.png", &height), ("n.exr", &normal), ("flat.exr", &flat)]);

@@ -1,4 +1,5 @@
-//! The shaded picture against its CPU twin, and what a person would notice first: left and right, up and down.
+//! The shaded picture against its CPU twin, and what a person would notice first: left and right,
+//! up and down.
 
 mod files;
 mod textures;
@@ -11,8 +12,9 @@ use mesolux::render::{Picture, View, corner_irradiance, render};
 use mesolux::scene::{Camera, Material, Scene, Triangle};
 use mesolux::vk::Device;
 
-/// Relative to the brightest radiance of a picture without textures: positions, weights and products in f32 round by some
-/// 10 · 2⁻²⁴, more where weights are steep: samples of the smallest triangle here span 1/160 of it.
+/// Relative to the brightest radiance of a picture without textures: positions, weights and
+/// products in f32 round by some 10 · 2⁻²⁴, more where weights are steep: samples of the smallest
+/// triangle here span 1/160 of it.
 const PLAIN: f64 = 1e-4;
 
 const RED: [f32; 3] = [0.8, 0.1, 0.05];
@@ -71,7 +73,8 @@ fn add(scene: &mut Scene, corners: [[f64; 3]; 3], uv: [[f32; 2]; 3], material: u
     });
 }
 
-/// A square of half side `half` about `centre`, towards +z or away from it; texture upright seen from its front.
+/// A square of half side `half` about `centre`, towards +z or away from it; texture upright seen
+/// from its front.
 fn add_square(scene: &mut Scene, [x, y, z]: [f64; 3], half: f64, towards: bool, material: u32) {
     let side = if towards { half } else { -half };
     let corner = |i: f64, j: f64| [x + side * i, y + half * j, z];
@@ -95,7 +98,8 @@ fn add_square(scene: &mut Scene, [x, y, z]: [f64; 3], half: f64, towards: bool, 
     );
 }
 
-/// Red left, green right, blue above, nothing below; a lamp in front of the green; a back in front of the red.
+/// Red left, green right, blue above, nothing below; a lamp in front of the green; a back in front
+/// of the red.
 fn asymmetric() -> Scene {
     let lamp = Material {
         ke: [7.0, 6.0, 5.0],

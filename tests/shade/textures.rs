@@ -11,7 +11,8 @@ use super::{
     BLUE, GREEN, RED, add_square, agree, camera, device, draw, material, no_messages, view,
 };
 
-/// Relative to the brightest radiance: filters weigh texels in steps of no more than 2⁻⁸ along each side.
+/// Relative to the brightest radiance: filters weigh texels in steps of no more than 2⁻⁸ along each
+/// side.
 const TEXTURED: f64 = 2.0 / 256.0;
 
 fn texture(width: u32, height: u32, texels: Vec<[f32; 3]>) -> Arc<Texture> {

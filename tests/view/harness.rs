@@ -82,7 +82,8 @@ pub fn told(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// Shows `input` on a display of its own, driven by a script, under the validation layer; returns what the program told.
+/// Shows `input` on a display of its own, driven by a script, under the validation layer; returns
+/// what the program told.
 pub fn view(folder: &Path, input: &str, script: &str) -> String {
     view_in(SIZE, folder, input, script)
 }
@@ -169,8 +170,9 @@ pub fn mean(picture: &RgbImage) -> [f64; 3] {
     [0, 1, 2].map(|c| picture.pixels().map(|p| f64::from(p[c])).sum::<f64>() / count)
 }
 
-/// A room of 2 × 2 × 2 with a red and a green wall, a lamp in its ceiling and a point light, seen through the side that it
-/// lacks; and its bake with what --relight needs. As `relief.toml` its back wall has a bump on each of its squares.
+/// A room of 2 × 2 × 2 with a red and a green wall, a lamp in its ceiling and a point light, seen
+/// through the side that it lacks; and its bake with what --relight needs. As `relief.toml` its
+/// back wall has a bump on each of its squares.
 pub struct Room {
     folder: tempfile::TempDir,
 }

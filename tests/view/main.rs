@@ -1,5 +1,5 @@
-//! The window under a display in memory: what a script or real keys and mouse do shows on the screen, nothing is left behind, and
-//! the validation layer stays silent.
+//! The window under a display in memory: what a script or real keys and mouse do shows on the
+//! screen, nothing is left behind, and the validation layer stays silent.
 #![cfg(all(target_os = "linux", feature = "window"))]
 
 mod harness;
@@ -52,10 +52,11 @@ fn opens_orbits_and_flies() {
     }
 }
 
-/// Two pictures of one view that were drawn in tiles of other sizes: corners are rounded in the frame of their tile, so that a sample
-/// which lies on an edge falls on either side of it. From the front, the four edges between the side walls, floor and ceiling run
-/// through the corners of samples, along 75 pixels each; elsewhere edges pass between samples. One sample of sixteen changes
-/// sides, which is at most the code of 1/16. All other pixels are the same.
+/// Two pictures of one view that were drawn in tiles of other sizes: corners are rounded in the
+/// frame of their tile, so that a sample which lies on an edge falls on either side of it. From the
+/// front, the four edges between the side walls, floor and ceiling run through the corners of
+/// samples, along 75 pixels each; elsewhere edges pass between samples. One sample of sixteen
+/// changes sides, which is at most the code of 1/16. All other pixels are the same.
 const ON_EDGES: usize = 4 * 75;
 const ONE_SAMPLE: u8 = 71;
 
@@ -137,7 +138,8 @@ fn relief_is_shaded_as_render_does() {
     }
 }
 
-/// What a detailed picture shows stays on the surfaces while the view moves; what it does not show is drawn by the corners' light.
+/// What a detailed picture shows stays on the surfaces while the view moves; what it does not show
+/// is drawn by the corners' light.
 #[test]
 fn relief_stays_while_the_view_moves() {
     let room = Room::baked("relief");
@@ -240,7 +242,8 @@ fn overlays_show_sources_slots_and_items() {
         let changed = |name: &str, place: [u32; 4]| {
             difference(&part(&none, place), &part(&room.picture(name), place))
         };
-        // Every wall is tinted; the hemisphere hangs at the pointer, the item buffer in the corner, and elsewhere is nothing new.
+        // Every wall is tinted; the hemisphere hangs at the pointer, the item buffer in the corner,
+        // and elsewhere is nothing new.
         assert!(changed("sources.png", [0, 0, 320, 240]) > 5.0, "{input}");
         let disc = [167, 127, 96, 96];
         assert!(changed("slots.png", disc) > 10.0, "{input}");
@@ -253,14 +256,16 @@ fn overlays_show_sources_slots_and_items() {
         let corner = [228, 148, 84, 84];
         assert!(changed("items.png", corner) > 20.0, "{input}");
         assert!(changed("items.png", [0, 0, 100, 240]) == 0.0, "{input}");
-        // A source on the back wall sees four walls, the lamp and the open side; walls are of one piece in an item buffer.
+        // A source on the back wall sees four walls, the lamp and the open side; walls are of one
+        // piece in an item buffer.
         let items = part(&room.picture("items.png"), corner);
         let colours: std::collections::HashSet<_> = items.pixels().map(|p| p.0).collect();
         assert!(colours.len() > 5, "{input}: {} colours", colours.len());
     }
 }
 
-/// With the light that is not shot, what is cut short has nearly its brightness; the key takes it away.
+/// With the light that is not shot, what is cut short has nearly its brightness; the key takes it
+/// away.
 #[test]
 fn the_estimate_of_unshot_light_is_switched() {
     let room = Room::new();
@@ -392,7 +397,8 @@ fn relights_what_was_baked() {
     assert!(found > 1.0, "a moved light changes {found}");
 }
 
-/// A scene refines while it is shown, and with the estimate of the light that is not shot it has its brightness from the start.
+/// A scene refines while it is shown, and with the estimate of the light that is not shot it has
+/// its brightness from the start.
 #[test]
 fn a_scene_refines_while_it_bakes() {
     let room = Room::new();

@@ -20,8 +20,8 @@ const PLANE: f64 = 2e-7;
 /// Largest sine of the angle between a member's normal and the item's, beyond the effect of
 /// rounding.
 const SINE: f64 = 1e-6;
-/// How far two corners' rounding (see [`crate::mesh::elements`]) may lift one over the other: √3 steps of
-/// 2⁻²⁶, and a margin.
+/// How far two corners' rounding (see [`crate::mesh::elements`]) may lift one over the other: √3
+/// steps of 2⁻²⁶, and a margin.
 const ROUNDING: f64 = 4e-8;
 
 /// All regions of two or more elements, in order of their first members; they do not overlap. Each
