@@ -84,7 +84,9 @@ impl Preprocessor<'_> {
                     any: holds || before.any,
                 });
             }
-            "endif" => drop(last(conditions)?),
+            "endif" => {
+                last(conditions)?;
+            }
             _ => return Ok(false),
         }
         Ok(true)

@@ -158,16 +158,15 @@ impl Shade {
         cmd: &Commands,
         target: &Target,
         (width, height): (u32, u32),
-        vertices: &Buffer,
-        indices: &Buffer,
+        mesh: &Mesh<'_>,
         draws: impl Iterator<Item = Draw<'a>>,
         then: impl FnOnce(),
     ) {
         cmd.begin_render_pass(&self.pass, &target.framebuffer, [0; 4]);
-        cmd.bind_indices(indices);
+        cmd.bind_indices(mesh.indices);
         cmd.viewport(0, 0, width, height);
         for draw in draws {
-            cmd.bind_graphics(&self.pipeline, draw.texture, vertices);
+            cmd.bind_graphics(&self.pipeline, draw.texture, mesh.vertices);
             cmd.push_graphics(&self.pipeline, &draw.parameters);
             cmd.draw_indexed(draw.first_vertex, draw.vertex_count);
         }
@@ -179,6 +178,12 @@ impl Shade {
         }
         cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
     }
+}
+
+/// What is drawn.
+pub struct Mesh<'a> {
+    pub vertices: &'a Buffer,
+    pub indices: &'a Buffer,
 }
 
 impl Target {

@@ -13,7 +13,7 @@ use super::seen_scene::SeenScene;
 use super::textures::{Bound, Textures};
 use super::{Lighting, Overdraw, Show, View};
 use crate::error::Result;
-use crate::passes::shade::{Shade, Target};
+use crate::passes::shade::{self, Shade, Target};
 use crate::passes::shadow_rays::LightBuffers;
 use crate::scene::Scene;
 use crate::vk::{Commands, Device, Timestamps};
@@ -324,8 +324,10 @@ impl<'a> Renderer<'a> {
             cmd,
             target,
             (tile.width * samples, tile.height * samples),
-            &mesh.vertices,
-            &mesh.indices,
+            &shade::Mesh {
+                vertices: &mesh.vertices,
+                indices: &mesh.indices,
+            },
             plain,
             || {
                 if let Some(relief) = relief {

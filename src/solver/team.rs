@@ -27,6 +27,7 @@ pub(super) struct Batch {
 }
 
 /// What makes rows and keeps them.
+#[allow(clippy::large_enum_variant)] // one of them lives as long as the solver
 pub(super) enum Team {
     Alone {
         makers: Makers,
