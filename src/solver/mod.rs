@@ -4,8 +4,8 @@
 //! rows ─► coupling ─► solve ─► gather
 //! ```
 //!
-//! [`spine`] is the method. The `pixel` estimator in scenes with relief shoots pixel by pixel
-//! instead: [`shots`].
+//! `spine` is the method. The `pixel` estimator in scenes with relief shoots pixel by pixel
+//! instead: `shots`.
 
 mod ambient;
 mod coupling;
