@@ -1,9 +1,9 @@
-//! A few pictures as they were when someone last looked at them, kept in `tests/golden`. They tell
-//! that something changed, not what is right: that is what the path tracer is asked for, in
-//! `relief_render` and `bench pictures`.
+//! A few pictures as they were when someone last looked at them, kept in `tests/golden`. They show
+//! that something changed, not what is right: `relief_render` and `bench pictures` compare with the
+//! path tracer.
 //!
-//! `MESOLUX_WRITE_GOLDEN=1 cargo test --test golden` writes them anew; look at them, and say in the
-//! commit what changed them.
+//! `MESOLUX_WRITE_GOLDEN=1 cargo test --test golden` writes them again; look at them, and say in
+//! the commit what changed them.
 
 mod common;
 
@@ -91,11 +91,11 @@ fn check(name: &str, picture: &Picture, exposure: f32) {
     }
 }
 
-/// Bakes with so many shots, which end anywhere at the same place, and draws.
-fn draw(scene: &Scene, camera: &Camera, shots: u32, part: Light, direct: Direct) -> Picture {
+/// Bakes and draws.
+fn draw(scene: &Scene, camera: &Camera, part: Light, direct: Direct) -> Picture {
     let settings = Settings {
         hemicube: 64,
-        shots: Some(shots),
+        residual: 3e-3,
         ..Settings::default()
     };
     let solution =
@@ -126,7 +126,7 @@ fn built_in(name: &str, patches: usize) -> Scene {
 #[test]
 fn cornell_box() {
     let scene = built_in("cornell", 4000);
-    let picture = draw(&scene, &scene.cameras[0], 256, Light::Global, Direct::Sharp);
+    let picture = draw(&scene, &scene.cameras[0], Light::Global, Direct::Sharp);
     check("cornell", &picture, 3.5);
 }
 
@@ -134,7 +134,7 @@ fn cornell_box() {
 #[test]
 fn relief_by_its_factors() {
     let scene = room(&CASES[1]);
-    let picture = draw(&scene, &scene.cameras[1], 256, Light::Global, Direct::Slots);
+    let picture = draw(&scene, &scene.cameras[1], Light::Global, Direct::Slots);
     check("relief-factored", &picture, 3.5);
 }
 
@@ -142,7 +142,7 @@ fn relief_by_its_factors() {
 #[test]
 fn relief_in_sharp_direct_light() {
     let scene = room(&CASES[3]);
-    let picture = draw(&scene, &scene.cameras[2], 64, Light::Direct, Direct::Sharp);
+    let picture = draw(&scene, &scene.cameras[2], Light::Direct, Direct::Sharp);
     check("relief-sharp", &picture, 4.5);
 }
 
@@ -164,6 +164,6 @@ fn figure_with_a_texture() {
             texels: checks.clone(),
         }));
     }
-    let picture = draw(&scene, &scene.cameras[0], 256, Light::Global, Direct::Sharp);
+    let picture = draw(&scene, &scene.cameras[0], Light::Global, Direct::Sharp);
     check("figure", &picture, 2.5);
 }

@@ -232,7 +232,10 @@ fn bindings_and_push_constants_are_those_of_the_spirv() {
                 "binding {number} of {name}: Rust left, SPIR-V right"
             );
         }
-        assert!(in_spirv.len() + 1 >= generated.len(), "{name} declares bindings for nothing");
+        assert!(
+            in_spirv.len() + 1 >= generated.len(),
+            "{name} declares bindings for nothing"
+        );
         let offsets: Vec<u32> = interface.parameters.iter().map(|p| p.offset).collect();
         let mut longest = 0;
         for (in_spirv, end) in stages.iter().filter_map(|s| s.push_constants.as_ref()) {

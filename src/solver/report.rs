@@ -21,6 +21,8 @@ pub enum StopReason {
     Shots,
     /// Ctrl-C.
     Interrupted,
+    /// All is drawn, and light still goes to and fro: no surface absorbs it.
+    Unsolved,
 }
 
 /// Seconds by stage; of several devices together.

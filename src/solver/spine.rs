@@ -168,11 +168,14 @@ impl Spine {
             self.solve(UNSOLVED * self.ledger.stop_power, report);
         }
         let limit = on.settings.shots.unwrap_or(u32::MAX);
-        let reached = report.shots >= limit && self.ledger.unshot() > self.ledger.stop_power;
-        let done = match reached {
-            true => StopReason::Shots,
-            false => StopReason::Residual,
+        let done = match self.ledger.unshot() <= self.ledger.stop_power {
+            true => StopReason::Residual,
+            false if report.shots >= limit => StopReason::Shots,
+            false => StopReason::Unsolved,
         };
+        if watch.stop.is_none() && done == StopReason::Unsolved {
+            tracing::warn!("the scene absorbs no light: what is emitted goes to and fro for ever");
+        }
         watch.stop.get_or_insert(done);
         report.kept_sources = self
             .ledger

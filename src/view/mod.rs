@@ -20,6 +20,7 @@ mod detailer;
 mod event;
 mod laid_pictures;
 mod lamps;
+mod orders;
 mod overlay;
 mod panel;
 mod panel_pass;

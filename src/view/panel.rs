@@ -3,8 +3,8 @@
 use egui::{Color32, ComboBox, DragValue, RichText, Slider, Ui};
 use glam::DVec3;
 
-use super::baker::Stage;
 use super::lamps::Lamp;
+use super::orders::Stage;
 use super::snapshot::Progress;
 use super::switches::{DIRECTIONS, DIRECTS, EXPOSURES, PARTS, SHADINGS, Switches};
 use crate::render::Show;

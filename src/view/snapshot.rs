@@ -134,7 +134,7 @@ pub fn even_moments(directions: &[DVec3]) -> Vec<Vec3> {
 pub fn is_done(stop: StopReason) -> bool {
     matches!(
         stop,
-        StopReason::Residual | StopReason::Shots | StopReason::Budget
+        StopReason::Residual | StopReason::Shots | StopReason::Budget | StopReason::Unsolved
     )
 }
 

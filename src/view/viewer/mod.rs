@@ -14,11 +14,12 @@ use std::time::Instant;
 use glam::Vec3;
 use winit::window::Window;
 
-use super::baker::{Baker, Given, Order, Stage};
+use super::baker::Baker;
 use super::camera::Eye;
 use super::detailer::{Detailer, PAUSE};
 use super::event::Event;
 use super::lamps::{Lamp, lamps, lit};
+use super::orders::{Given, Order, Stage};
 use super::panel_pass::PanelPass;
 use super::screen::Screen;
 use super::snapshot::{Progress, Snapshot};

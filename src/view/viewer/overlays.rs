@@ -4,7 +4,7 @@ use super::Viewer;
 use super::layout::KeptTexture;
 use crate::constants::NONE;
 use crate::solver::ItemPicture;
-use crate::view::baker::Order;
+use crate::view::orders::Order;
 use crate::view::switches::Switches;
 
 /// Overlays received so far.
