@@ -266,6 +266,7 @@ fn traced(
 
 /// Rms error over all lights and slots as a share of the mean, and bias.
 #[test]
+#[ignore = "long: runs by scripts/test --all"]
 fn plate_sends_what_its_displaced_mesh_sends() {
     let mesh = Mesh::new();
     for k in [16, 32, 64] {
@@ -310,6 +311,7 @@ fn plate_sends_what_its_displaced_mesh_sends() {
 /// One bump map over a plate of 72 elements: what each sends, by its own footprint and by the mean
 /// of the tile.
 #[test]
+#[ignore = "long: runs by scripts/test --all"]
 fn elements_of_a_plate_send_what_their_part_of_the_mesh_sends() {
     let mesh = Mesh::new();
     let directions = Directions::new(64).expect("a number of the paper");

@@ -239,6 +239,7 @@ fn flat_maps_and_scenes_without_relief_are_plain() {
 
 /// The same run gives the same bits, directions included.
 #[test]
+#[ignore = "long: runs by scripts/test --all"]
 fn relief_is_deterministic() {
     let build = furnace();
     let quick = Settings {

@@ -96,6 +96,30 @@ enum Method {
     Shots(Shots),
 }
 
+/// What a solver's method needs of it, borrowed beside the method.
+macro_rules! parts {
+    ($solver:ident) => {
+        SceneParts {
+            elements: &$solver.elements,
+            sources: &$solver.sources,
+            connections: &$solver.connections,
+            occluders: &$solver.occluders,
+        }
+    };
+}
+
+macro_rules! on {
+    ($solver:ident, $parts:expr) => {
+        On {
+            settings: &$solver.settings,
+            parts: $parts,
+            scene: &$solver.scene,
+            state: &$solver.state,
+            relief: $solver.relief.as_ref(),
+        }
+    };
+}
+
 impl Solver {
     /// Groups the elements into sources and brings everything to the device.
     pub fn new(
@@ -226,19 +250,8 @@ impl Solver {
     /// Brings to the elements what has been solved by [`Self::turn`].
     pub fn gather(&mut self) -> Result<()> {
         let start = Instant::now();
-        let parts = SceneParts {
-            elements: &self.elements,
-            sources: &self.sources,
-            connections: &self.connections,
-            occluders: &self.occluders,
-        };
-        let on = On {
-            settings: &self.settings,
-            parts: &parts,
-            scene: &self.scene,
-            state: &self.state,
-            relief: self.relief.as_ref(),
-        };
+        let parts = parts!(self);
+        let on = on!(self, &parts);
         if let Method::Rows(spine) = &mut self.method {
             spine.gather_solved(on, &mut self.report)?;
         }
@@ -252,19 +265,8 @@ impl Solver {
         let start = Instant::now();
         let sources = self.scene.source_count;
         let mut watch = Watch::new(&self.settings, self.bound, sources, &mut go_on);
-        let parts = SceneParts {
-            elements: &self.elements,
-            sources: &self.sources,
-            connections: &self.connections,
-            occluders: &self.occluders,
-        };
-        let on = On {
-            settings: &self.settings,
-            parts: &parts,
-            scene: &self.scene,
-            state: &self.state,
-            relief: self.relief.as_ref(),
-        };
+        let parts = parts!(self);
+        let on = on!(self, &parts);
         let report = &mut self.report;
         let unshot = match &mut self.method {
             Method::Rows(spine) => {
@@ -343,19 +345,8 @@ impl Solver {
     /// # Panics
     /// Of the `pixel` estimator in a scene with relief, which makes no rows.
     pub fn draw(&mut self, sources: &[u32]) -> Result<DrawnBatch> {
-        let parts = SceneParts {
-            elements: &self.elements,
-            sources: &self.sources,
-            connections: &self.connections,
-            occluders: &self.occluders,
-        };
-        let on = On {
-            settings: &self.settings,
-            parts: &parts,
-            scene: &self.scene,
-            state: &self.state,
-            relief: self.relief.as_ref(),
-        };
+        let parts = parts!(self);
+        let on = on!(self, &parts);
         match &mut self.method {
             Method::Rows(spine) => spine.draw_alone(on, sources),
             Method::Shots(_) => panic!("the pixel estimator makes no rows in a scene with relief"),
