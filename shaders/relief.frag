@@ -265,7 +265,7 @@ Base base_of(Prism p, ReliefSurface surface, Place place) {
 // leaves the relief's shell if nothing does, internal units.
 //
 // Over its own triangle the way is straight above the height map. Past it, the surface turns away
-// from the way as the smooth normals of the triangle tell, by triangles like this one, so that the
+// from the way as the smooth normals of the triangle say, by triangles like this one, so that the
 // way's height above it is a parabola: bumps beyond a triangle's horizon still rise into the light,
 // and the next triangle's do not shadow what they cannot.
 bool shadowed_by_relief(Prism p, ReliefSurface surface, Place place, Base base, vec3 towards, out float leaves) {

@@ -25,8 +25,8 @@ layout(binding = 7) uniform usamplerBuffer contours;
 layout(binding = 8) uniform usamplerBuffer triangles;
 // Of curved sources: centroid and sum of area times normal, two words unused; PART_TEXELS a part.
 layout(binding = 9) uniform usamplerBuffer parts;
-// 1 where any element of a block of GROUP sees the source, [slot][block]. Whoever reads it sets it
-// to 0 again.
+// 1 where any element of a block of GROUP sees the source, [slot][block]. A batch
+// begins with zeros.
 layout(scalar, binding = 10) writeonly buffer Occupied { uint occupied[]; };
 // [slot][element of this dispatch]
 layout(scalar, binding = 11) writeonly buffer Fresh { FLUX fresh[]; };

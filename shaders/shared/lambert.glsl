@@ -16,8 +16,8 @@ float acute_angle_over_sine(float x) {
     return g * x + 1.5707963;
 }
 
-// The same for all x. The sine is told, as one over it: beside an edge it is far below what 1 − x²
-// resolves.
+// The same for all x. The caller passes 1/sin: beside an edge the sine is far below what
+// 1 − x² resolves.
 float angle_over_sine(float x, float over_sine) {
     float g = acute_angle_over_sine(abs(x));
     return x >= 0.0 ? g : 3.14159265 * over_sine - g;

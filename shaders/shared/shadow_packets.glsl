@@ -52,7 +52,7 @@ Met met(Source s, uint triangle) {
 
 // Whether the triangle stands between the eye and the end of a way. Two triangles find the same
 // volume over the edge that they share with the opposite sign, to the bit: no way leads between
-// them. The height tells whether it is the way that meets the triangle, or the line that it is a
+// them. By the height, the way itself meets the triangle and not only the line that it is a
 // part of.
 bool stands_in(Met t, vec3 way) {
     precise float of_a = way.x * t.over_a.x + way.y * t.over_a.y + way.z * t.over_a.z;

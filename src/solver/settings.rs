@@ -104,7 +104,7 @@ pub const VISIBILITY_MEMORY: u64 = 768 << 20;
 pub const HEMICUBE_RANGE: std::ops::RangeInclusive<u32> = 8..=2048;
 
 /// With the `pixel` estimator the side of the faces of strong emitters over that of all others,
-/// unless told otherwise, and up to which size: a hemicube of 1024 takes four times as long as one
+/// unless set otherwise, and up to which size: a hemicube of 1024 takes four times as long as one
 /// of 512, and lowers the error hardly more.
 pub const EMITTER_SCALE: u32 = 4;
 const FINEST: u32 = 1024;

@@ -283,7 +283,7 @@ impl Drop for Worker {
     fn drop(&mut self) {
         self.1.close();
         if let Some(thread) = self.0.take() {
-            // What ended it was reported to whoever waited for its rows.
+            // What ended it was reported where its rows were awaited.
             let _ = thread.join();
         }
     }

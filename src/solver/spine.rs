@@ -77,6 +77,10 @@ const UNSOLVED: f64 = 0.01;
 /// enough.
 const ORDERED: f64 = 0.1;
 
+/// Sweeps between two batches, and of a whole solution, at most.
+const ORDERING_SWEEPS: usize = 4;
+const MOST_SWEEPS: usize = 1000;
+
 /// Times that light is measured and corrected, at most.
 const CORRECTIONS: u32 = 50;
 
@@ -142,7 +146,7 @@ impl Spine {
     pub fn run(&mut self, on: On<'_>, report: &mut Report, watch: &mut Watch<'_>) -> Result<()> {
         let mut corrections = 0;
         while self.draw(on, Phase::First, report, watch)? {
-            self.solve(UNSOLVED * self.ledger.stop_power, report);
+            self.solve(UNSOLVED * self.ledger.stop_power, MOST_SWEEPS, report);
             self.gather_kept(on, corrections > 0, report)?;
             if !self.draw(on, Phase::Again, report, watch)? {
                 break;
@@ -165,7 +169,7 @@ impl Spine {
             self.ledger.system.shoot_unknown();
         }
         if watch.stop.is_some() {
-            self.solve(UNSOLVED * self.ledger.stop_power, report);
+            self.solve(UNSOLVED * self.ledger.stop_power, MOST_SWEEPS, report);
         }
         let limit = on.settings.shots.unwrap_or(u32::MAX);
         let done = match self.ledger.unshot() <= self.ledger.stop_power {
@@ -232,7 +236,8 @@ impl Spine {
         self.take_in(on, made, report)?;
         if phase == Phase::First {
             let undrawn = self.ledger.system.unshot().undrawn;
-            self.solve(ORDERED * undrawn.max(self.ledger.stop_power), report);
+            let most = ORDERED * undrawn.max(self.ledger.stop_power);
+            self.solve(most, ORDERING_SWEEPS, report);
         }
         Ok(true)
     }
@@ -250,16 +255,7 @@ impl Spine {
             return Ok(None);
         };
         let mut candidates = powers;
-        let slots = self.slots;
-        let kept = &self.kept;
-        let team = Self::team(
-            &mut self.team,
-            on,
-            &self.devices,
-            &self.ledger.system,
-            kept,
-            slots,
-        )?;
+        let team = self.team(on)?;
         if !team.has_room(strong) {
             return Ok(None);
         }
@@ -329,9 +325,9 @@ impl Spine {
         }
     }
 
-    fn solve(&mut self, most: f64, report: &mut Report) {
+    fn solve(&mut self, most: f64, sweeps: usize, report: &mut Report) {
         let start = Instant::now();
-        self.ledger.system.solve(most);
+        self.ledger.system.solve(most, sweeps);
         report.seconds.solve += start.elapsed().as_secs_f64();
     }
 
@@ -350,21 +346,14 @@ impl Spine {
 
     /// See [`super::Solver::draw`].
     pub fn draw_alone(&mut self, on: On<'_>, sources: &[u32]) -> Result<DrawnBatch> {
-        let slots = self.slots;
-        let kept = &self.kept;
-        let team = Self::team(
-            &mut self.team,
-            on,
-            &self.devices,
-            &self.ledger.system,
-            kept,
-            slots,
-        )?;
-        team.submit(Batch {
+        self.team(on)?.submit(Batch {
             sources: sources.to_vec(),
             strong: false,
         })?;
-        let made = team.take(kept)?.expect("a batch was submitted");
+        let Some(team) = &mut self.team else {
+            unreachable!("it was made above")
+        };
+        let made = team.take(&self.kept)?.expect("a batch was submitted");
         Ok(DrawnBatch {
             stages: made.stages,
             facing_away: made.rows.iter().map(|row| row.facing_away).collect(),
@@ -378,33 +367,26 @@ impl Spine {
     }
 
     /// The team, which is made when it is first asked for.
-    fn team<'a>(
-        team: &'a mut Option<Team>,
-        on: On<'_>,
-        devices: &[Arc<Device>],
-        system: &System,
-        kept: &KeptRows,
-        slots: u32,
-    ) -> Result<&'a mut Team> {
-        match team {
-            Some(team) => Ok(team),
-            none => {
+    fn team(&mut self, on: On<'_>) -> Result<&mut Team> {
+        let team = match self.team.take() {
+            Some(team) => team,
+            None => {
                 let meso = match &on.parts.elements.relief {
                     Some(relief) => meso_elements(on.parts.elements, relief),
                     None => Vec::new(),
                 };
-                let least = least_strong(&on.parts.sources.list, &on.settings.grouping);
                 let parts = TeamParts {
                     settings: on.settings,
                     scene: on.parts,
-                    targets: &system.targets.list,
+                    targets: &self.ledger.system.targets.list,
                     meso: &meso,
-                    strong: least > 0.0,
-                    slots,
+                    strong: (self.ledger.sources.iter()).any(|d| d.strong && d.row.is_none()),
+                    slots: self.slots,
                 };
-                Ok(none.insert(Team::new(devices, parts, on.scene, kept)?))
+                Team::new(&self.devices, parts, on.scene, &self.kept)?
             }
-        }
+        };
+        Ok(self.team.insert(team))
     }
 
     /// The last rows that were gathered with their light, for comparison with the twins.

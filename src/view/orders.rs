@@ -18,7 +18,7 @@ pub enum Order {
     /// Lights the scene of the last bake, of which emission and point lights have changed, by the
     /// form factors that are kept.
     Relight { scene: Arc<Scene>, epoch: u64 },
-    /// Tells the sources of a bake from a file.
+    /// Finds the sources of a bake from a file.
     Sources,
     /// Draws what a source sees.
     Items { source: u32 },
@@ -38,7 +38,7 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// As the panel tells it.
+    /// As the panel shows it.
     pub fn line(self) -> &'static str {
         match self {
             Self::Device => "opening the device",
