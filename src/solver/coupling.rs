@@ -19,8 +19,8 @@ enum Receives {
     Nothing,
     /// One word, and the reflectance of all members.
     Evenly { word: usize, reflectance: DVec3 },
-    /// Three words, RGB.
-    ByColour { word: usize },
+    /// Three words, RGB, and the largest reflectance of a member.
+    ByColour { word: usize, reflectance: DVec3 },
 }
 
 /// The sources as they receive.
@@ -67,7 +67,13 @@ impl Targets {
         }
         let even_words = words;
         for s in coloured {
-            receives[s] = Receives::ByColour { word: words };
+            let largest = members(&sources[s])
+                .map(|e| even[e])
+                .fold(Vec3::ZERO, Vec3::max);
+            receives[s] = Receives::ByColour {
+                word: words,
+                reflectance: largest.as_dvec3(),
+            };
             list.push(target(elements, &sources[s], words, 3));
             words += 3;
         }
@@ -82,6 +88,16 @@ impl Targets {
     /// Words of a row.
     pub fn words(&self) -> usize {
         self.words
+    }
+
+    /// The largest reflectance of a member of source `t`.
+    pub fn reflectance(&self, t: usize) -> DVec3 {
+        match self.receives[t] {
+            Receives::Nothing => DVec3::ZERO,
+            Receives::Evenly { reflectance, .. } | Receives::ByColour { reflectance, .. } => {
+                reflectance
+            }
+        }
     }
 }
 
@@ -204,12 +220,20 @@ impl Arrived {
         }
     }
 
+    /// Mean irradiance of source `t`; none where its words hold more than form factors.
+    pub fn irradiance(&self, targets: &Targets, t: usize) -> Option<DVec3> {
+        match targets.receives[t] {
+            Receives::Evenly { word, .. } => Some(self.irradiance[word]),
+            Receives::Nothing | Receives::ByColour { .. } => None,
+        }
+    }
+
     /// Radiosity that source `t` reflects of this.
     pub fn reflected(&self, targets: &Targets, t: usize) -> DVec3 {
         match targets.receives[t] {
             Receives::Nothing => DVec3::ZERO,
             Receives::Evenly { word, reflectance } => reflectance * self.irradiance[word],
-            Receives::ByColour { word } => {
+            Receives::ByColour { word, .. } => {
                 let at = word - self.irradiance.len();
                 DVec3::new(
                     self.reflected[at],
@@ -218,5 +242,53 @@ impl Arrived {
                 )
             }
         }
+    }
+}
+
+/// What radiosity counts for at each source, as [`Arrived`] counts what has arrived.
+pub(super) struct Weights {
+    /// Times the reflectance, of targets of one word, `[word]`.
+    irradiance: Vec<DVec3>,
+    /// Of the others, `[word]`.
+    reflected: Vec<f64>,
+}
+
+impl Weights {
+    pub fn none(targets: &Targets) -> Self {
+        Self {
+            irradiance: vec![DVec3::ZERO; targets.even_words],
+            reflected: vec![0.0; targets.words - targets.even_words],
+        }
+    }
+
+    /// What a unit of radiosity at source `t` counts for.
+    pub fn set(&mut self, targets: &Targets, t: usize, weight: DVec3) {
+        match targets.receives[t] {
+            Receives::Nothing => {}
+            Receives::Evenly { word, reflectance } => self.irradiance[word] = reflectance * weight,
+            Receives::ByColour { word, .. } => {
+                let at = word - self.irradiance.len();
+                self.reflected[at..at + 3].copy_from_slice(&weight.to_array());
+            }
+        }
+    }
+
+    /// What a unit of radiosity that is sent with a row counts for, once reflected: Σ_t w_t G[s,t].
+    pub fn of_row(&self, row: &CouplingRow) -> DVec3 {
+        let even_words = self.irradiance.len();
+        let mut values = row.values.iter().map(|&v| f64::from(v));
+        let mut sum = DVec3::ZERO;
+        for &[first, count] in &row.runs {
+            for (w, value) in (first as usize..).zip(values.by_ref().take(count as usize)) {
+                match self.irradiance.get(w) {
+                    Some(&weight) => sum += weight * value,
+                    None => {
+                        let at = w - even_words;
+                        sum[at % 3] += self.reflected[at] * value;
+                    }
+                }
+            }
+        }
+        sum
     }
 }

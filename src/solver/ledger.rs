@@ -11,8 +11,10 @@ pub(super) struct Ledger {
     pub system: System,
     /// `[source]`
     pub sources: Vec<Drawn>,
-    /// Unshot power at which the solution is done, internal units.
-    pub stop_power: f64,
+    /// Missing power at which the solution is done, internal units.
+    pub most_missing: f64,
+    /// What a unit of unshot power can turn into at most.
+    pub importance: f64,
 }
 
 /// Sources that are to be drawn, with the power that they have to send.
@@ -41,7 +43,7 @@ pub(super) struct Drawn {
     pub directed: bool,
 }
 
-/// Of the unshot power at which the solution is done: what undrawn sources may have, and what need
+/// Of the missing power at which the solution is done: what undrawn sources may lack, and what need
 /// not be drawn again.
 const UNDRAWN: f64 = 0.9;
 const UNGATHERED: f64 = 0.04;
@@ -56,7 +58,7 @@ impl Ledger {
     pub fn undrawn(&self) -> Option<Candidates> {
         let mut strong = Vec::new();
         let mut others = Vec::new();
-        let (mut emitted_left, mut power_left) = (0.0, 0.0);
+        let (mut emitted_left, mut missing) = (0.0, 0.0);
         for (s, drawn) in self.sources.iter().enumerate() {
             if self.system.is_drawn(s) || drawn.under_way {
                 continue;
@@ -64,7 +66,7 @@ impl Ledger {
             let (power, emitted) = self.system.unshot_power(s);
             if power > 0.0 {
                 emitted_left += emitted;
-                power_left += power;
+                missing += self.system.missing(s);
                 let list = if drawn.strong {
                     &mut strong
                 } else {
@@ -79,7 +81,7 @@ impl Ledger {
                 strong: true,
             });
         }
-        let done = emitted_left == 0.0 && power_left <= UNDRAWN * self.stop_power;
+        let done = emitted_left == 0.0 && missing <= UNDRAWN * self.most_missing;
         (!done).then_some(Candidates {
             powers: others,
             strong: false,
@@ -98,7 +100,7 @@ impl Ledger {
         // The last ones may keep what is little together.
         let mut kept_back = 0.0;
         while let Some(&(_, power)) = owing.last()
-            && kept_back + power <= UNGATHERED * self.stop_power
+            && kept_back + power <= UNGATHERED * self.stop_power()
         {
             kept_back += power;
             owing.pop();
@@ -109,6 +111,11 @@ impl Ledger {
             powers: owing,
             strong,
         })
+    }
+
+    /// Unshot power that turns into the missing power at which the solution is done, at most.
+    pub fn stop_power(&self) -> f64 {
+        self.most_missing / self.importance
     }
 
     /// What a source has to send the elements: emitted and reflected radiosity.
@@ -158,19 +165,33 @@ impl Ledger {
         })
     }
 
-    /// Power that is in no element's light yet, nor bounced: the residual of the system, and what
-    /// is owed to the elements by sources without rows, with its first bounce.
-    pub fn unshot(&self) -> f64 {
+    /// What sources without rows owe to the elements, by source and colour, with its first bounce:
+    /// it is in no element's light yet, though the system takes it for shot.
+    fn owed_by_loose(&self) -> impl Iterator<Item = (usize, DVec3)> {
         let loose = |s: &usize| self.system.is_drawn(*s) && self.sources[*s].row.is_none();
-        let owed: f64 = (0..self.sources.len())
-            .filter(loose)
-            .map(|s| {
-                let (emitted, reflected) = self.owed(s);
-                let light = emitted.as_dvec3() + reflected.abs();
-                2.0 * self.system.area(s) * light.element_sum()
-            })
+        (0..self.sources.len()).filter(loose).map(|s| {
+            let (emitted, reflected) = self.owed(s);
+            let light = emitted.as_dvec3() + reflected.abs();
+            (s, 2.0 * self.system.area(s) * light)
+        })
+    }
+
+    /// Power that is in no element's light yet, nor bounced: the residual of the system, and what
+    /// is owed to the elements.
+    pub fn unshot(&self) -> f64 {
+        let owed: f64 = self
+            .owed_by_loose()
+            .map(|(_, power)| power.element_sum())
             .sum();
         self.system.unshot().all + owed
+    }
+
+    /// Power that the elements lack for it, at most.
+    pub fn missing(&self) -> f64 {
+        let owed = |(s, power): (usize, DVec3)| power.dot(self.system.importance(s));
+        let owed: f64 = self.owed_by_loose().map(owed).sum();
+        let unshot = (0..self.sources.len()).map(|s| self.system.missing(s));
+        unshot.sum::<f64>() + owed
     }
 
     /// Unshot power by colour.

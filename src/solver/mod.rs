@@ -195,7 +195,6 @@ impl Solver {
             .map(sources::Source::emitted_power)
             .sum();
         let bound = Bound::new(&elements, emitted);
-        let stop_power = bound.stop_power(settings.residual);
         let on = On {
             settings,
             parts: &parts,
@@ -204,13 +203,14 @@ impl Solver {
             relief: relief.as_ref(),
         };
         let method = match (&relief, shoots) {
-            (Some(relief), true) => Method::Shots(Shots::new(device, on, relief, stop_power)?),
+            (Some(relief), true) => Method::Shots(Shots::new(device, on, relief, bound)?),
             _ => {
                 let most = VISIBILITY_MEMORY.min(device.limits().heap_bytes / 3);
                 let size = SpineSize {
                     memory: settings.visibility_memory.unwrap_or(most),
                     slots,
-                    stop_power,
+                    most_missing: bound.most_missing(settings.residual),
+                    importance: bound.importance(),
                 };
                 Method::Rows(Spine::new(devices, on, size, kept)?)
             }
@@ -268,19 +268,20 @@ impl Solver {
         let parts = parts!(self);
         let on = on!(self, &parts);
         let report = &mut self.report;
-        let unshot = match &mut self.method {
+        let (unshot, missing) = match &mut self.method {
             Method::Rows(spine) => {
                 spine.run(on, report, &mut watch)?;
-                spine.ledger.unshot()
+                (spine.ledger.unshot(), spine.ledger.missing())
             }
             Method::Shots(shots) => {
                 shots.run(on, report, &mut watch)?;
-                shots.left(on)?
+                let unshot = shots.left(on)?;
+                (unshot, self.bound.importance() * unshot)
             }
         };
         report.stop = watch.stop.unwrap_or(StopReason::Residual);
         report.unshot_share = self.bound.share(unshot);
-        report.error_bound = self.bound.of(report.unshot_share);
+        report.error_bound = self.bound.of(missing);
         report.seconds.solve_wall += start.elapsed().as_secs_f64();
         if let Some(relief) = &self.relief {
             let sources = relief.source_count as usize;

@@ -48,21 +48,23 @@ impl Bound {
         }
     }
 
-    /// Power that is missing at the elements, as a share of what is emitted: what is unshot arrives
-    /// and is reflected again, 1 + ρ + ρ² + … = 1/(1 − ρ) times; and a sum in f32 may lose half a
-    /// step of what arrives, which lacks as many bounces.
-    pub fn of(&self, unshot_share: f64) -> Option<f64> {
+    /// What a unit of power that is sent can turn into at the elements: it arrives and is reflected
+    /// again, 1 + ρ + ρ² + … = 1/(1 − ρ) times; at a reflectance of 1 as at 0.999.
+    pub fn importance(&self) -> f64 {
+        self.factor.unwrap_or(1e3)
+    }
+
+    /// Power that is missing at the elements, as a share of what is emitted: what unshot power can
+    /// turn into; and a sum in f32 may lose half a step of what arrives, which lacks as many
+    /// bounces.
+    pub fn of(&self, missing: f64) -> Option<f64> {
         let rounding = f64::from(f32::EPSILON) / 2.0;
-        (self.factor).map(|factor| (unshot_share + rounding * factor) * factor)
+        (self.factor).map(|factor| self.share(missing) + rounding * factor * factor)
     }
 
-    /// Unshot power at which the bound is `residual`; at a reflectance of 1 as at 0.999.
-    pub fn stop_power(&self, residual: f64) -> f64 {
-        residual * self.emitted / self.factor.unwrap_or(1e3)
-    }
-
-    fn stop_share(&self, residual: f64) -> f64 {
-        residual / self.factor.unwrap_or(1e3)
+    /// Missing power at which the bound is `residual`, rounding apart.
+    pub fn most_missing(&self, residual: f64) -> f64 {
+        residual * self.emitted
     }
 }
 
@@ -71,7 +73,7 @@ pub(super) struct Watch<'a> {
     start: Instant,
     budget: Duration,
     bound: Bound,
-    stop_share: f64,
+    residual: f64,
     sources: u32,
     history: Vec<(f64, f64)>,
     go_on: &'a mut dyn FnMut(&Update) -> bool,
@@ -90,7 +92,7 @@ impl<'a> Watch<'a> {
             start: Instant::now(),
             budget: settings.budget.unwrap_or(Duration::MAX),
             bound,
-            stop_share: bound.stop_share(settings.residual),
+            residual: settings.residual,
             sources,
             history: Vec::new(),
             go_on,
@@ -98,20 +100,22 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Whether to go on with so much drawn and unshot.
-    pub fn look(&mut self, shots: u32, unshot_share: f64) -> bool {
+    /// Whether to go on with so many sources drawn and so much power unshot and missing, internal
+    /// units.
+    pub fn look(&mut self, shots: u32, unshot: f64, missing: f64) -> bool {
         if self.stop.is_some() {
             return false;
         }
         let elapsed = self.start.elapsed();
-        self.history.push((elapsed.as_secs_f64(), unshot_share));
+        let share = self.bound.share(missing);
+        self.history.push((elapsed.as_secs_f64(), share));
         let update = Update {
             shots,
             sources: self.sources,
-            unshot_share,
-            error_bound: self.bound.of(unshot_share),
+            unshot_share: self.bound.share(unshot),
+            error_bound: self.bound.of(missing),
             elapsed,
-            left: time_left(&self.history, self.stop_share),
+            left: time_left(&self.history, self.residual),
         };
         if !(self.go_on)(&update) {
             self.stop = Some(StopReason::Interrupted);
@@ -120,14 +124,9 @@ impl<'a> Watch<'a> {
         }
         self.stop.is_none()
     }
-
-    /// Unshot power as a share of what is emitted.
-    pub fn share(&self, unshot: f64) -> f64 {
-        self.bound.share(unshot)
-    }
 }
 
-/// Time until the unshot share falls to `target`, if it goes on falling as over the last half of
+/// Time until the missing share falls to `target`, if it goes on falling as over the last half of
 /// the run.
 fn time_left(history: &[(f64, f64)], target: f64) -> Option<Duration> {
     let &(now, share) = history.last()?;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use super::drawing::{Drawing, read_items};
-use super::progress::Watch;
+use super::progress::{Bound, Watch};
 use super::rows::{Looks, Stages, emitter_looks};
 use super::spine::On;
 use super::{Report, StopReason};
@@ -31,7 +31,10 @@ pub(super) struct Shots {
     emitters: Option<ShotPass>,
     /// `[source]`
     sources: Vec<Shot>,
-    stop_power: f64,
+    /// Missing power at which the solution is done, internal units, and what a unit of unshot power
+    /// can turn into at most.
+    most_missing: f64,
+    importance: f64,
 }
 
 /// What a source has sent.
@@ -56,7 +59,7 @@ impl Shots {
         device: &Arc<Device>,
         on: On<'_>,
         relief: &ReliefBuffers,
-        stop_power: f64,
+        bound: Bound,
     ) -> Result<Self> {
         let measure = Measure::new(device)?;
         let measure_relief = MeasureRelief::new(device)?;
@@ -101,7 +104,8 @@ impl Shots {
             all: ShotPass::new(device, on, relief, relief.slots, face)?,
             emitters,
             sources,
-            stop_power,
+            most_missing: bound.most_missing(on.settings.residual),
+            importance: bound.importance(),
         })
     }
 
@@ -110,7 +114,8 @@ impl Shots {
         let limit = on.settings.shots.unwrap_or(u32::MAX);
         loop {
             let reflected = self.measure(on)?;
-            if !watch.look(report.shots, watch.share(self.unshot(&reflected))) {
+            let unshot = self.unshot(&reflected);
+            if !watch.look(report.shots, unshot, self.importance * unshot) {
                 return Ok(());
             }
             let (chosen, strong) = self.choose(&reflected);
@@ -161,7 +166,7 @@ impl Shots {
                 powers.push((s, power));
             }
         }
-        if emitted_left == 0.0 && power_left <= self.stop_power {
+        if emitted_left == 0.0 && self.importance * power_left <= self.most_missing {
             return (Vec::new(), false);
         }
         powers.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));

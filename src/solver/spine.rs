@@ -47,8 +47,10 @@ pub(super) struct SpineSize {
     pub memory: u64,
     /// Sources of a batch.
     pub slots: u32,
-    /// Unshot power at which the solution is done, internal units.
-    pub stop_power: f64,
+    /// Missing power at which the solution is done, internal units.
+    pub most_missing: f64,
+    /// What a unit of unshot power can turn into at most.
+    pub importance: f64,
 }
 
 /// What a solution is of, and where its light lies.
@@ -70,7 +72,7 @@ enum Phase {
     Again,
 }
 
-/// Of the unshot power at which the solution is done: what sweeps may leave.
+/// Of the unshot power that turns into what may be missing: what sweeps may leave.
 const UNSOLVED: f64 = 0.01;
 
 /// Between batches sweeps leave this share of what the undrawn sources have: it orders them well
@@ -80,6 +82,12 @@ const ORDERED: f64 = 0.1;
 /// Sweeps between two batches, and of a whole solution, at most.
 const ORDERING_SWEEPS: usize = 4;
 const MOST_SWEEPS: usize = 1000;
+
+/// Over what may be missing, what is missing when the importance of sources is first lowered.
+const NEAR_THE_END: f64 = 8.0;
+
+/// How often the importance of sources is lowered before the first is drawn, for those with rows.
+const RESTORED_WEIGHINGS: usize = 8;
 
 /// Times that light is measured and corrected, at most.
 const CORRECTIONS: u32 = 50;
@@ -102,7 +110,7 @@ impl Spine {
         let kept = KeptRows::new(device, shape, kept_size, restored.map(Visibility::size))?;
         let list = &on.parts.sources.list;
         let targets = Targets::new(on.parts.elements, list);
-        let mut system = System::new(targets, list, on.settings.coupling_memory);
+        let mut system = System::new(targets, list, on.settings.coupling_memory, size.importance);
         let least = least_strong(list, &on.settings.grouping);
         let of_relief = &on.parts.sources.relief;
         let looks = looks_closer(device, on.settings);
@@ -135,7 +143,8 @@ impl Spine {
             ledger: Ledger {
                 system,
                 sources,
-                stop_power: size.stop_power,
+                most_missing: size.most_missing,
+                importance: size.importance,
             },
             kept,
             slots: size.slots,
@@ -144,9 +153,11 @@ impl Spine {
 
     /// Goes on until the solution is done, which the elements have then, or the watch says stop.
     pub fn run(&mut self, on: On<'_>, report: &mut Report, watch: &mut Watch<'_>) -> Result<()> {
+        // Of rows that are restored.
+        (0..RESTORED_WEIGHINGS).for_each(|_| self.ledger.system.weigh());
         let mut corrections = 0;
         while self.draw(on, Phase::First, report, watch)? {
-            self.solve(UNSOLVED * self.ledger.stop_power, MOST_SWEEPS, report);
+            self.solve(UNSOLVED * self.ledger.stop_power(), MOST_SWEEPS, report);
             self.gather_kept(on, corrections > 0, report)?;
             if !self.draw(on, Phase::Again, report, watch)? {
                 break;
@@ -157,8 +168,8 @@ impl Spine {
                 break;
             }
             self.measure(on)?;
-            let left = self.ledger.unshot();
-            if corrections > u32::from(on.relief.is_some()) && left <= self.ledger.stop_power {
+            let left = self.ledger.missing();
+            if corrections > u32::from(on.relief.is_some()) && left <= self.ledger.most_missing {
                 break;
             }
             if corrections == CORRECTIONS {
@@ -169,10 +180,10 @@ impl Spine {
             self.ledger.system.shoot_unknown();
         }
         if watch.stop.is_some() {
-            self.solve(UNSOLVED * self.ledger.stop_power, MOST_SWEEPS, report);
+            self.solve(UNSOLVED * self.ledger.stop_power(), MOST_SWEEPS, report);
         }
         let limit = on.settings.shots.unwrap_or(u32::MAX);
-        let done = match self.ledger.unshot() <= self.ledger.stop_power {
+        let done = match self.ledger.missing() <= self.ledger.most_missing {
             true => StopReason::Residual,
             false if report.shots >= limit => StopReason::Shots,
             false => StopReason::Unsolved,
@@ -217,8 +228,8 @@ impl Spine {
             if !self.take(on, phase, report)? {
                 return Ok(watch.stop.is_none());
             }
-            let share = watch.share(self.ledger.unshot());
-            if !watch.look(report.shots, share) {
+            let (unshot, missing) = (self.ledger.unshot(), self.ledger.missing());
+            if !watch.look(report.shots, unshot, missing) {
                 while self.take(on, phase, report)? {}
                 return Ok(false);
             }
@@ -236,8 +247,12 @@ impl Spine {
         self.take_in(on, made, report)?;
         if phase == Phase::First {
             let undrawn = self.ledger.system.unshot().undrawn;
-            let most = ORDERED * undrawn.max(self.ledger.stop_power);
+            let most = ORDERED * undrawn.max(self.ledger.stop_power());
             self.solve(most, ORDERING_SWEEPS, report);
+            // Importance matters once the end is near.
+            if self.ledger.missing() <= NEAR_THE_END * self.ledger.most_missing {
+                self.ledger.system.weigh();
+            }
         }
         Ok(true)
     }

@@ -7,7 +7,7 @@
 
 use glam::DVec3;
 
-use super::coupling::{Arrived, CouplingRow, Targets};
+use super::coupling::{Arrived, CouplingRow, Targets, Weights};
 use crate::constants::KIND_POINT;
 use crate::mesh::sources::Source;
 
@@ -21,6 +21,7 @@ pub(super) struct System {
     bytes: u64,
     /// Gauss–Seidel sweeps so far.
     pub sweeps: u64,
+    weights: Weights,
 }
 
 struct Unknown {
@@ -36,6 +37,8 @@ struct Unknown {
     shot: DVec3,
     /// Reflected radiosity that has not arrived by coupling, but was measured.
     measured: DVec3,
+    /// Power that arrives at elements in the end for a unit of power that is sent, by colour, at most.
+    importance: DVec3,
 }
 
 /// Sums of unshot power, internal units, over the colours.
@@ -48,7 +51,8 @@ pub(super) struct Unshot {
 }
 
 impl System {
-    pub fn new(targets: Targets, sources: &[Source], memory: u64) -> Self {
+    /// `importance`: what a unit of power that is sent can turn into at most, anywhere.
+    pub fn new(targets: Targets, sources: &[Source], memory: u64, importance: f64) -> Self {
         let unknown = |source: &Source| Unknown {
             emitted: source.emitted.as_dvec3(),
             emitted_power: source.emitted_power(),
@@ -61,9 +65,16 @@ impl System {
             emission_shot: false,
             shot: DVec3::ZERO,
             measured: DVec3::ZERO,
+            importance: DVec3::splat(importance),
         };
+        let mut weights = Weights::none(&targets);
+        let areas = sources.iter().map(|source| source.area);
+        for (t, area) in areas.enumerate() {
+            weights.set(&targets, t, DVec3::splat(area * importance));
+        }
         Self {
             arrived: Arrived::none(&targets),
+            weights,
             targets,
             sources: sources.iter().map(unknown).collect(),
             memory,
@@ -112,6 +123,54 @@ impl System {
             }
         }
         sums
+    }
+
+    /// Lowers the importance of each source to what its row says: v_s = 1 + Σ_t A_t G[s,t] v_t / A_s,
+    /// the adjoint of the system. Where the light of a source without a row goes follows from the
+    /// rows of others by reciprocity; the rest may go to whatever counts most. The iteration starts
+    /// from above and falls, so that it can stop at any time.
+    pub fn weigh(&mut self) {
+        let mut brought = Arrived::none(&self.targets);
+        let mut shares = Arrived::none(&self.targets);
+        let mut most = DVec3::ZERO;
+        for (s, source) in self.sources.iter().enumerate() {
+            let counts = self.targets.reflectance(s) * source.importance;
+            most = most.max(counts);
+            if let Some(row) = &source.row {
+                brought.add(row, counts);
+                shares.add(row, DVec3::ONE);
+            }
+        }
+        for s in 0..self.sources.len() {
+            let source = &mut self.sources[s];
+            let known = |arrived: &Arrived| arrived.irradiance(&self.targets, s);
+            let brought = match (&source.row, known(&brought), known(&shares)) {
+                (Some(row), ..) => self.weights.of_row(row) / source.area,
+                (None, Some(brought), Some(shares)) => {
+                    brought + most * (DVec3::ONE - shares).max(DVec3::ZERO)
+                }
+                _ => most,
+            };
+            source.importance = source.importance.min(DVec3::ONE + brought);
+            let weight = source.importance * source.area;
+            self.weights.set(&self.targets, s, weight);
+        }
+    }
+
+    /// Power that is missing at the elements for what a source has not shot, at most.
+    pub fn missing(&self, s: usize) -> f64 {
+        let source = &self.sources[s];
+        let emitted = match source.emission_shot {
+            true => DVec3::ZERO,
+            false => source.emitted,
+        };
+        let unshot = emitted + (self.reflected(s) - source.shot).abs();
+        source.area * unshot.dot(source.importance)
+    }
+
+    /// What a unit of power from a source can turn into at the elements, at most, by colour.
+    pub fn importance(&self, s: usize) -> DVec3 {
+        self.sources[s].importance
     }
 
     /// Takes in the row of a source that has been drawn, and shoots all that it has. What a source
@@ -279,6 +338,8 @@ mod tests {
         coupling: Vec<Vec<f64>>,
     }
 
+    const SCALINGS: usize = 60;
+
     /// Half of the elements are coloured, in turns where `mixed`.
     fn room(white: f32, mixed: bool) -> Room {
         let mut shapes = Shapes::new();
@@ -306,13 +367,19 @@ mod tests {
                 .wrapping_add(1);
             (state >> 40) as f64 / (1 << 24) as f64
         };
-        let coupling = (list.iter())
-            .map(|source| {
-                let shares: Vec<f64> = list.iter().map(|t| random() * t.area).collect();
-                let all: f64 = shares.iter().sum();
-                let of = |(t, share): (&Source, f64)| share / all * source.area / t.area;
-                list.iter().zip(shares).map(of).collect()
-            })
+        // Symmetric weights, scaled until all that each source sends arrives.
+        let mut pairs = DMatrix::from_fn(list.len(), list.len(), |_, _| random());
+        pairs = &pairs + pairs.transpose();
+        let mut scale = vec![1.0; list.len()];
+        for _ in 0..SCALINGS {
+            for s in 0..list.len() {
+                let sent: f64 = (0..list.len()).map(|t| pairs[(s, t)] * scale[t]).sum();
+                scale[s] = f64::sqrt(scale[s] * list[s].area / sent);
+            }
+        }
+        let share = |s: usize, t: usize| scale[s] * pairs[(s, t)] * scale[t] / list[t].area;
+        let coupling = (0..list.len())
+            .map(|s| (0..list.len()).map(|t| share(s, t)).collect())
             .collect();
         Room {
             elements,
@@ -322,13 +389,23 @@ mod tests {
     }
 
     fn system(room: &Room, memory: u64) -> System {
+        let mut system = undrawn(room, memory, 1e3);
+        draw(room, &mut system, 1);
+        system
+    }
+
+    fn undrawn(room: &Room, memory: u64, importance: f64) -> System {
         let targets = Targets::new(&room.elements, &room.sources);
-        let mut system = System::new(targets, &room.sources, memory);
-        for s in 0..room.sources.len() {
-            let words = words(room, &system, s);
+        System::new(targets, &room.sources, memory, importance)
+    }
+
+    /// Draws one source in `every`.
+    fn draw(room: &Room, system: &mut System, every: usize) {
+        let all = (0..room.sources.len()).step_by(every);
+        for s in all.filter(|&s| !system.is_drawn(s)).collect::<Vec<_>>() {
+            let words = words(room, system, s);
             system.draw(s, Some(CouplingRow::new(&words, 1.0)));
         }
-        system
     }
 
     /// What the coupling pass would write.
@@ -361,19 +438,45 @@ mod tests {
         members.map(of).sum()
     }
 
-    /// B = M + Gᵀ B of one colour, by LU.
-    fn exact(room: &Room, colour: usize) -> DVector<f64> {
+    /// I − Gᵀ of one colour, `[target][source]`.
+    fn matrix(room: &Room, colour: usize) -> DMatrix<f64> {
         let even = room.elements.even_reflectance();
         let n = room.sources.len();
-        let g = DMatrix::from_fn(n, n, |t, s| {
+        DMatrix::from_fn(n, n, |t, s| {
             let here = f64::from(u8::from(s == t));
             here - room.coupling[s][t] * mean_reflectance(room, &even, t)[colour]
-        });
+        })
+    }
+
+    /// B = M + Gᵀ B of one colour, by LU.
+    fn exact(room: &Room, colour: usize) -> DVector<f64> {
         let emitted = (room.sources.iter()).map(|s| f64::from(s.emitted[colour]));
-        let emitted = DVector::from_iterator(n, emitted);
-        g.lu()
+        let emitted = DVector::from_iterator(room.sources.len(), emitted);
+        (matrix(room, colour).lu())
             .solve(&emitted)
             .expect("light is lost at each bounce")
+    }
+
+    /// Power that arrives in the end for a unit of power sent, of one colour, by LU: what arrives
+    /// at once is what is sent.
+    fn exact_importance(room: &Room, colour: usize) -> DVector<f64> {
+        let areas = DVector::from_iterator(room.sources.len(), room.sources.iter().map(|s| s.area));
+        let weights = (matrix(room, colour).transpose().lu())
+            .solve(&areas)
+            .expect("light is lost at each bounce");
+        weights.component_div(&areas)
+    }
+
+    /// Largest ratio of a source's importance to the exact one of each colour, and the smallest.
+    fn importance_ratios(system: &System, exact: &[DVector<f64>]) -> (f64, f64) {
+        let mut ratios = (0.0_f64, f64::INFINITY);
+        for (c, exact) in exact.iter().enumerate() {
+            for s in 0..exact.len() {
+                let ratio = system.importance(s)[c] / exact[s];
+                ratios = (ratios.0.max(ratio), ratios.1.min(ratio));
+            }
+        }
+        ratios
     }
 
     /// Also where next to nothing is lost at a bounce, and sweeps alone would take thousands.
@@ -406,6 +509,26 @@ mod tests {
                 system.sweeps
             );
             assert!(system.sweeps <= most_sweeps && apart <= tolerance);
+        }
+    }
+
+    /// A bound from the first weighing on, and exact once all rows are known.
+    #[test]
+    fn importance_falls_to_the_exact_one() {
+        for mixed in [false, true] {
+            let room = room(0.7, mixed);
+            let mut system = undrawn(&room, u64::MAX, 1.0 / (1.0 - 0.7));
+            let exact: Vec<_> = (0..3).map(|c| exact_importance(&room, c)).collect();
+            let mut last = f64::INFINITY;
+            for (every, weighings) in [(7, 1), (7, 50), (2, 50), (1, 50)] {
+                draw(&room, &mut system, every);
+                (0..weighings).for_each(|_| system.weigh());
+                let (most, least) = importance_ratios(&system, &exact);
+                println!("mixed {mixed}, one in {every}: {most:.6} to {least:.9}");
+                assert!(least >= 1.0 - 1e-6 && most <= last);
+                last = most;
+            }
+            assert!(last <= 1.0 + 1e-6, "{last}");
         }
     }
 
