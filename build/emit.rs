@@ -107,16 +107,7 @@ fn layout(fields: &[Field]) -> Result<Vec<Laid<'_>>, String> {
     fields
         .iter()
         .map(|field| {
-            let (rust_type, bytes) = match field.glsl_type.as_str() {
-                "uint" => ("u32", 4),
-                "int" => ("i32", 4),
-                "float" => ("f32", 4),
-                "uvec2" => ("[u32; 2]", 8),
-                "vec2" => ("glam::Vec2", 8),
-                "vec3" => ("glam::Vec3", 12),
-                "vec4" => ("glam::Vec4", 16),
-                other => return Err(format!("a push constant has the unknown type {other}")),
-            };
+            let (rust_type, bytes) = rust_type(&field.glsl_type)?;
             let laid = Laid {
                 field,
                 rust_type,
@@ -126,6 +117,20 @@ fn layout(fields: &[Field]) -> Result<Vec<Laid<'_>>, String> {
             Ok(laid)
         })
         .collect()
+}
+
+/// The Rust type of a GLSL type in scalar layout, and its bytes.
+pub fn rust_type(glsl_type: &str) -> Result<(&'static str, u32), String> {
+    Ok(match glsl_type {
+        "uint" => ("u32", 4),
+        "int" => ("i32", 4),
+        "float" => ("f32", 4),
+        "uvec2" => ("[u32; 2]", 8),
+        "vec2" => ("glam::Vec2", 8),
+        "vec3" => ("glam::Vec3", 12),
+        "vec4" => ("glam::Vec4", 16),
+        other => return Err(format!("the type {other} has no counterpart in Rust")),
+    })
 }
 
 fn parameters(out: &mut String, fields: &[Laid<'_>]) -> fmt::Result {

@@ -1,11 +1,12 @@
-//! Turns GLSL into what the crate includes as `passes::shaders`: SPIR-V, and bindings and push
-//! constants as structs with the names of the GLSL.
+//! Turns GLSL into what the crate includes as `passes::shaders` and `structs`: SPIR-V, and bindings,
+//! push constants and the structs of buffers with the names of the GLSL.
 
 mod emit;
 mod glsl;
 mod interface;
 mod preprocess;
 mod spirv;
+mod structs;
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -48,7 +49,12 @@ fn shaders() -> Result<(), String> {
     }
     let out = std::env::var("OUT_DIR").map_err(|e| e.to_string())?;
     let module = emit::module(&programs)?;
-    fs::write(Path::new(&out).join("shaders.rs"), module).map_err(|e| e.to_string())
+    fs::write(Path::new(&out).join("shaders.rs"), module).map_err(|e| e.to_string())?;
+    let types = shared
+        .get("types.glsl")
+        .ok_or("no shaders/shared/types.glsl")?;
+    let module = structs::module(types).map_err(|e| format!("shaders/shared/types.glsl: {e}"))?;
+    fs::write(Path::new(&out).join("structs.rs"), module).map_err(|e| e.to_string())
 }
 
 fn read_all(dir: &str, endings: &[&str]) -> Result<Files, String> {

@@ -44,6 +44,7 @@ pub mod reference;
 pub mod render;
 pub mod scene;
 pub mod solver;
+pub mod structs;
 #[cfg(feature = "window")]
 pub mod view;
 pub mod vk;

@@ -114,7 +114,7 @@ fn agree(what: &str, (scene, enclosed): (&Scene, bool), settings: &Settings) -> 
     let all = devices(3);
     let alone = solve(&all[..1], scene, settings, None);
     let report = alone.report().clone();
-    assert_eq!(alone.connections.enclosed, enclosed, "{what}");
+    assert_eq!(alone.problem.connections.enclosed, enclosed, "{what}");
     println!("{what}: {}", counts(&report));
     let bits_alone = bits(&alone);
     for several in [2, 3] {

@@ -216,7 +216,7 @@ fn stops_and_goes_on_in_either_loop() {
         );
         assert_eq!(report.shots, whole.report.shots);
         let light = solver.light().expect("the light comes back").irradiance;
-        let light = solver.elements.to_input_order(&light);
+        let light = solver.problem.elements.to_input_order(&light);
         // The sums have another order.
         let apart = light
             .iter()

@@ -337,7 +337,7 @@ fn sources_with_relief_send_by_direction_in_the_end() {
         bake::solve(&device(), &scene, &settings, None, |_| true).expect("the scene is solved");
     let exits = solver.relief_exits(0).expect("they come back");
     let kept = exits.expect("it has relief").kept;
-    let of_relief = &solver.sources.list[solver.sources.relief.clone()];
+    let of_relief = &solver.problem.sources.list[solver.problem.sources.relief.clone()];
     let directions = kept.len() / of_relief.len();
     let power = |source: &mesolux::mesh::sources::Source, light: Vec3| {
         source.area * f64::from(light.element_sum())
@@ -350,7 +350,7 @@ fn sources_with_relief_send_by_direction_in_the_end() {
             even += power(source, mean);
         }
     }
-    let emitted: f64 = (solver.sources.list.iter())
+    let emitted: f64 = (solver.problem.sources.list.iter())
         .map(mesolux::mesh::sources::Source::emitted_power)
         .sum();
     println!(

@@ -311,7 +311,7 @@ fn merged_elements_show_the_same_planes() {
         .expect("the scene fits the device");
         let n = FACE as usize;
         let mut columns = BTreeMap::new();
-        let count = solver.sources.list.len() as u32;
+        let count = solver.problem.sources.list.len() as u32;
         let slots = solver.report().batch;
         for first in (0..count.min(24 * slots)).step_by(slots as usize) {
             let sources: Vec<u32> = (first..count.min(first + slots)).collect();
@@ -328,7 +328,7 @@ fn merged_elements_show_the_same_planes() {
         (solver, columns)
     };
     let ((solver, merged), (_, apart)) = (draw(true), draw(false));
-    let elements = &solver.elements;
+    let elements = &solver.problem.elements;
     let plane = |item: u32| {
         let normal = elements.normal[item as usize];
         normal.extend(normal.dot(elements.centroid[item as usize]))
@@ -364,7 +364,10 @@ fn the_pixel_estimator_draws_every_element() {
     };
     let elements = Elements::new(&build.scene);
     let solver = Solver::new(&device(), elements, &[], &settings).expect("it fits the device");
-    assert_eq!(solver.occluders, Occluders::elements(&solver.elements));
+    assert_eq!(
+        solver.problem.occluders,
+        Occluders::elements(&solver.problem.elements)
+    );
     assert_eq!(solver.report().skipped.triangles_merged, 0);
     assert_silent();
 }

@@ -127,7 +127,7 @@ fn doubled(device: &Arc<Device>, times: u32) -> (Commands, Buffer) {
             sampler: &sampler,
         },
     };
-    let set = pipeline.bind("doubling", &bindings).expect("a set");
+    let bound = pipeline.bind(&bindings).expect("a set");
     let stamps = Timestamps::new(device, "doubling", 1).expect("timestamps");
     let texels = buffer(device, "texels", 4 * (16 + 4 + 1), BufferUse::Upload);
     let commands = Commands::record(device, "doubling", |cmd| {
@@ -136,7 +136,7 @@ fn doubled(device: &Arc<Device>, times: u32) -> (Commands, Buffer) {
         cmd.fill(&words, 1);
         cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
         for _ in 0..times {
-            cmd.dispatch(&pipeline, &set, &(), [1, 1, 1]);
+            cmd.dispatch(&bound, &(), [1, 1, 1]);
             cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         }
         cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);

@@ -100,7 +100,7 @@ fn item_buffers_equal_rays_and_culling_changes_nothing() {
     for culling in [Culling::Off, Culling::Meshlets, Culling::Triangles] {
         let mut solver = solver(&scene(), Estimator::Receiver, culling, 200);
         let mut buffers = Vec::new();
-        let count = solver.sources.list.len() as u32;
+        let count = solver.problem.sources.list.len() as u32;
         for first in (0..count.min(48)).step_by(6) {
             let sources: Vec<u32> = (first..count.min(first + 6)).collect();
             let drawn = solver.draw(&sources).expect("a batch is drawn");
@@ -112,11 +112,11 @@ fn item_buffers_equal_rays_and_culling_changes_nothing() {
                     );
                     continue;
                 };
-                let source = &solver.sources.list[source as usize];
+                let source = &solver.problem.sources.list[source as usize];
                 let wrong = reference::item_buffer::disagreements(
-                    &solver.elements,
-                    &solver.connections,
-                    &solver.occluders,
+                    &solver.problem.elements,
+                    &solver.problem.connections,
+                    &solver.problem.occluders,
                     source,
                     FACE,
                     column,
@@ -153,14 +153,14 @@ fn item_buffers_equal_rays_and_culling_changes_nothing() {
 fn drawn_without_culling(solver: &Solver, source: &Source) -> usize {
     let is_left_out = |&i: &usize| {
         reference::item_buffer::is_left_out(
-            &solver.elements,
-            &solver.connections,
-            &solver.occluders,
+            &solver.problem.elements,
+            &solver.problem.connections,
+            &solver.problem.occluders,
             source,
             i,
         )
     };
-    (0..solver.occluders.len())
+    (0..solver.problem.occluders.len())
         .filter(|i| !is_left_out(i))
         .count()
 }
@@ -226,12 +226,12 @@ fn culling_keeps_every_element_that_owns_a_pixel() {
     let sources = strongest(&solver, 6);
     let counts = solver.draw(&sources).expect("a batch is drawn").counts;
     for (slot, &source) in sources.iter().enumerate() {
-        let source = &solver.sources.list[source as usize];
+        let source = &solver.problem.sources.list[source as usize];
         for face in 0..5 {
             let shown: BTreeSet<u32> = reference::cull::shown(
-                &solver.elements,
-                &solver.connections,
-                &solver.occluders,
+                &solver.problem.elements,
+                &solver.problem.connections,
+                &solver.problem.occluders,
                 source,
                 face,
                 FACE,
@@ -243,7 +243,7 @@ fn culling_keeps_every_element_that_owns_a_pixel() {
                 shown.len()
             );
             assert!(
-                (drawn as usize) < solver.occluders.len(),
+                (drawn as usize) < solver.problem.occluders.len(),
                 "something is culled"
             );
         }
@@ -256,8 +256,8 @@ const DOUBT: f64 = 1e-4;
 
 /// The sources with the most emitted power, ties to the lower index.
 fn strongest(solver: &Solver, count: usize) -> Vec<u32> {
-    let power = |s: &u32| solver.sources.list[*s as usize].emitted_power() as f32;
-    let mut order: Vec<u32> = (0..solver.sources.list.len() as u32).collect();
+    let power = |s: &u32| solver.problem.sources.list[*s as usize].emitted_power() as f32;
+    let mut order: Vec<u32> = (0..solver.problem.sources.list.len() as u32).collect();
     order.retain(|s| power(s) > 0.0);
     order.sort_by(|a, b| power(b).total_cmp(&power(a)).then(a.cmp(b)));
     order.truncate(count);
@@ -281,12 +281,12 @@ fn coupling_equals_its_twin() {
         solver.run(|_| true).expect("one source is drawn");
         let light = solver.light().expect("the light comes back");
         let source = strongest(&solver, 1)[0];
-        let emitted = solver.sources.list[source as usize].emitted.x;
+        let emitted = solver.problem.sources.list[source as usize].emitted.x;
         let row: Vec<f32> = (light.irradiance_direct.iter())
             .map(|e| e.x / emitted)
             .collect();
         let found = &solver.draw(&[source]).expect("it is drawn").coupling[0];
-        let elements = &solver.elements;
+        let elements = &solver.problem.elements;
         let even = elements.even_reflectance();
         let targets = solver.coupling_targets();
         coloured += targets.iter().filter(|t| t.word_count == 3).count();
@@ -346,18 +346,22 @@ fn estimators_equal_their_twins() {
         let mut solver = solve_so(&build, &settings);
         solver.run(|_| true).expect("the batch runs");
         let light = solver.light().expect("the light comes back");
-        let elements = &solver.elements;
+        let elements = &solver.problem.elements;
         let chosen = strongest(&solver, shots as usize);
         let mut expected = vec![0.0; elements.len()];
-        let occluders = shadow_occluders(elements, &solver.connections, &solver.occluders);
+        let occluders = shadow_occluders(
+            elements,
+            &solver.problem.connections,
+            &solver.problem.occluders,
+        );
         // Where a ray passes so close to an edge that rounding decides.
         let doubtful: Vec<Cell<bool>> = vec![Cell::new(false); elements.len()];
         for &s in &chosen {
-            let source = &solver.sources.list[s as usize];
+            let source = &solver.problem.sources.list[s as usize];
             let items = reference::item_buffer::item_buffer(
                 elements,
-                &solver.connections,
-                &solver.occluders,
+                &solver.problem.connections,
+                &solver.problem.occluders,
                 source,
                 FACE,
             );
@@ -384,7 +388,7 @@ fn estimators_equal_their_twins() {
                     }
                 })
                 .collect();
-            let scale = match solver.connections.enclosed {
+            let scale = match solver.problem.connections.enclosed {
                 true => {
                     let elements = elements.area.iter().copied().zip(factors.iter().copied());
                     reference::normalise::scale(elements, source.area)
@@ -429,10 +433,10 @@ fn estimators_equal_their_twins() {
             (got / want - 1.0).abs() < 2e-3,
             "{estimator:?}: power {got} for {want}"
         );
-        if solver.connections.enclosed {
+        if solver.problem.connections.enclosed {
             let sent: f64 = chosen
                 .iter()
-                .map(|&s| &solver.sources.list[s as usize])
+                .map(|&s| &solver.problem.sources.list[s as usize])
                 .map(|s| s.area * f64::from(s.emitted.x))
                 .sum();
             assert!(

@@ -116,14 +116,19 @@ fn sources_send_as_their_twin() {
             }
             let sent = exits(&now, rows);
             let before = &now;
-            let relief = before.elements.relief.as_ref().expect("it has relief");
+            let relief = before
+                .problem
+                .elements
+                .relief
+                .as_ref()
+                .expect("it has relief");
             let directions = k as usize;
             for (i, slot) in sent.slots.iter().enumerate() {
-                let of_relief = &before.sources.relief;
+                let of_relief = &before.problem.sources.relief;
                 if slot.source == NONE || !of_relief.contains(&(slot.source as usize)) {
                     continue;
                 }
-                let source = &before.sources.list[slot.source as usize];
+                let source = &before.problem.sources.list[slot.source as usize];
                 let first = (source.first_element - light.elements[0]) as usize;
                 let members =
                     first * directions..(first + source.element_count as usize) * directions;
@@ -133,7 +138,7 @@ fn sources_send_as_their_twin() {
                     .map(|v| v.as_dvec3())
                     .collect();
                 let twin = send_relief(
-                    &before.elements,
+                    &before.problem.elements,
                     relief,
                     source,
                     &light.moments[members],
@@ -189,7 +194,7 @@ fn wide_sources_fill_slots_as_their_twin() {
         let light = light.expect("it has relief");
         let directions = Directions::new(k).expect("a number of the paper");
         // The strongest of all, by the twin of what chose it.
-        let powers = solver.sources.list.iter().map(|s| match s.kind {
+        let powers = solver.problem.sources.list.iter().map(|s| match s.kind {
             KIND_POINT => std::f64::consts::TAU * f64::from(s.emitted.x),
             _ => s.area * f64::from(s.emitted.x),
         });
@@ -197,7 +202,7 @@ fn wide_sources_fill_slots_as_their_twin() {
             .enumerate()
             .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
         let emitted = f64::from(
-            solver.sources.list[strongest.expect("some shine").0]
+            solver.problem.sources.list[strongest.expect("some shine").0]
                 .emitted
                 .x,
         );
@@ -286,14 +291,14 @@ fn pixels_bring_light_as_their_twin() {
                 .expect("it has relief");
             let items = now.shot_items().expect("they come back");
             let items = items.expect("it shoots by pixel");
-            let relief = now.elements.relief.as_ref().expect("it has relief");
-            let mut twin = Received::new(&now.elements, relief);
+            let relief = now.problem.elements.relief.as_ref().expect("it has relief");
+            let mut twin = Received::new(&now.problem.elements, relief);
             let width = exits.slots.len() * FACE as usize;
             for (i, slot) in exits.slots.iter().enumerate() {
                 if slot.source == NONE {
                     continue;
                 }
-                let source = &now.sources.list[slot.source as usize];
+                let source = &now.problem.sources.list[slot.source as usize];
                 let column: Vec<u32> = items
                     .chunks_exact(width)
                     .flat_map(|row| &row[i * FACE as usize..][..FACE as usize])
@@ -304,7 +309,7 @@ fn pixels_bring_light_as_their_twin() {
                     row.iter().map(|v| v.as_dvec3()).collect()
                 };
                 let (emitted, reflected) = (part(0), part(1));
-                let of_relief = now.sources.relief.contains(&(slot.source as usize));
+                let of_relief = now.problem.sources.relief.contains(&(slot.source as usize));
                 let light = if of_relief {
                     by_direction += 1;
                     Light::ByDirection(&emitted, &reflected)
@@ -312,7 +317,7 @@ fn pixels_bring_light_as_their_twin() {
                     even += 1;
                     Light::Even(slot.emitted.as_dvec3(), slot.reflected.as_dvec3())
                 };
-                twin.add(&now.elements, relief, source, &column, FACE, &light);
+                twin.add(&now.problem.elements, relief, source, &column, FACE, &light);
             }
             let (after, before) = (now.light(), before.light());
             let (after, before) = (after.expect("it comes"), before.expect("it comes"));
@@ -336,7 +341,7 @@ fn pixels_bring_light_as_their_twin() {
             let moments = after.moments.iter().zip(&before.moments);
             let moments = moments.flat_map(|(a, b)| [0, 1, 2].map(|c| (a[c] - b[c]).as_dvec3()));
             let sent = change(&after.exitant, &before.exitant);
-            let meso = now.elements.len() - relief.count();
+            let meso = now.problem.elements.len() - relief.count();
             let errors = [
                 apart(direct.iter().copied(), twin.direct.iter()),
                 apart(whole.iter().copied(), expected.iter()),

@@ -193,7 +193,7 @@ fn baked(
     let solved = solver.light().expect("the device gives the solution");
     assert_silent();
     let relief = solved.relief.expect("the plate has one");
-    let of = &solver.elements;
+    let of = &solver.problem.elements;
     let k = directions.count();
     relief
         .elements

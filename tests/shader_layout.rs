@@ -1,41 +1,11 @@
-//! What Rust and GLSL share. Structs: the GLSL text's members against Rust's by name and offset,
-//! and the compiled SPIR-V (which keeps no names) against both by its offsets and array strides.
-//! Bindings and push constants: what the build wrote from the GLSL text against the SPIR-V.
+//! What Rust and GLSL share: structs, bindings and push constants as the build wrote them from the
+//! GLSL text, against the compiled SPIR-V, which keeps no names, by offsets and array strides.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::mem::{offset_of, size_of};
 
-use mesolux::passes::{shaders, types};
+use mesolux::passes::shaders;
+use mesolux::structs::{self, Struct};
 use mesolux::vk::Binding;
-
-/// Struct name → members with their offsets in scalar layout, in order, and the size.
-fn glsl() -> BTreeMap<String, Vec<(String, u32)>> {
-    let text = include_str!("../shaders/shared/types.glsl");
-    let mut structs = BTreeMap::new();
-    type Members = Vec<(String, u32)>;
-    let mut current: Option<(String, Members, u32)> = None;
-    for line in text.lines() {
-        let words: Vec<_> = line.split([' ', ';']).filter(|w| !w.is_empty()).collect();
-        match (&mut current, &words[..]) {
-            (None, ["struct", name, "{"]) => current = Some(((*name).to_owned(), Vec::new(), 0)),
-            (Some(_), ["}", ..] | []) => {
-                let (name, members, size) = current.take().expect("a struct is open");
-                structs.insert(name, [members, vec![("size".to_owned(), size)]].concat());
-            }
-            (Some((_, members, offset)), [kind, name, ..]) => {
-                members.push(((*name).to_owned(), *offset));
-                *offset += match *kind {
-                    "vec3" => 12,
-                    "vec2" => 8,
-                    "float" | "uint" | "int" => 4,
-                    other => panic!("types.glsl: {other} has no size here"),
-                };
-            }
-            _ => {}
-        }
-    }
-    structs
-}
 
 // Of the SPIR-V specification.
 const OP_TYPE_INT: u32 = 21;
@@ -164,54 +134,31 @@ fn read(words: &[u32]) -> Read {
     read
 }
 
-macro_rules! check {
-    ($in_array:expr, $name:ident: $($field:ident)*) => {{
-        let rust = vec![
-            $((stringify!($field).to_owned(), offset_of!(types::$name, $field) as u32),)*
-            ("size".to_owned(), size_of::<types::$name>() as u32),
-        ];
-        assert_eq!(glsl()[stringify!($name)], rust, "{}: GLSL left, Rust right", stringify!($name));
-        let offsets: Vec<u32> = rust.iter().map(|m| m.1).collect();
-        if $in_array {
-            assert!(spirv().contains(&offsets), "{}: not in the SPIR-V", stringify!($name));
-        }
-    }};
-}
+/// Loaded word by word, in the order that `load_triangle` and `met` expect.
+const BY_WORDS: [&str; 2] = ["Triangle", "ShadowOccluder"];
+/// Alone in its buffer.
+const NOT_IN_ARRAYS: [&str; 1] = ["KeptState"];
 
 #[test]
-fn rust_and_glsl_agree() {
-    check!(true, Source: eye area normal radius tangent cone_sin bitangent cone_cos emitted kind
-        first_element element_count first_contour contour_count component middle facing part_radius first_part part_count);
-    check!(true, Meshlet: centre radius axis cutoff first count component);
-    check!(true, ReceiverBlock: centre radius axis half_height cone_sin cone_cos largest);
-    check!(true, Component: low closed high);
-    check!(true, Slot: emitted source reflected scale);
-    check!(true, View: eye x y w);
-    check!(true, Draw: index_count instance_count first_index vertex_offset first_instance);
-    check!(true, KeptRow: chunk first scale);
-    check!(true, ReceiverList: groups_x groups_y groups_z count);
-    check!(true, MesoElement: tangent response bitangent scale);
-    check!(true, Reflected: sum error);
-    check!(true, MesoTexel: uv_a uv_b uv_c first columns rows);
-    check!(true, TextureFacet: reflectance above_low above_high);
-    check!(true, Prism: low_a low_b low_c high_a high_b high_c uv_a uv_b uv_c light_a light_b light_c surface
-        tangent texel bitangent normal first_cluster cluster_count slots);
-    check!(true, ParallelLight: towards fluence_a fluence_b fluence_c);
-    check!(true, LightPoint: position kind normal area strength);
-    check!(true, ShadowNode: low skip high leaf);
-    check!(true, ShadowTriangle: a b c relief);
-    check!(true, ShadowRay: from clear to);
-    check!(true, LitTriangle: a b c normal_a normal_b normal_c plane above open);
-    check!(true, ReliefSurface: lowest top mean columns rows rank first_factor slope);
-    check!(true, HeightTile: first width height top highest);
-    check!(true, HeightRay: from tile to);
-    check!(true, HeightHit: t cell local height gradient steps);
-    // These are loaded word by word, in the order that load_triangle and met expect.
-    check!(false, Triangle: a area b height c unused_c normal unused);
-    check!(false, ShadowOccluder: a component b closed c height normal unused);
-    check!(true, CouplingTarget: first_element element_count first_word word_count inverse_area);
-    // KeptState stands alone in its buffer, not in an array.
-    check!(false, KeptState: chunk used rows);
+fn structs_lie_as_in_the_spirv() {
+    let in_spirv = spirv();
+    let mut found = 0;
+    for Struct {
+        name,
+        offsets,
+        bytes,
+    } in structs::ALL
+    {
+        let words = offsets.iter().chain([bytes]).map(|&at| at as u32);
+        let there = in_spirv.contains(&words.collect::<Vec<_>>());
+        let elsewhere = BY_WORDS.contains(name) || NOT_IN_ARRAYS.contains(name);
+        assert!(
+            there != elsewhere,
+            "{name}: offsets {offsets:?}, {bytes} bytes"
+        );
+        found += usize::from(there);
+    }
+    assert!(found >= 26, "{found} structs in arrays");
 }
 
 #[test]

@@ -67,11 +67,10 @@ layout(push_constant, scalar) uniform Parameters {
     uint end_slot;
     uint first_block;
     uint reflected;           // 0: light that is emitted, 1: that is reflected
-#ifdef FROM_RELIEF
+    // With relief:
     uint first_relief_source;
     uint relief_source_count;
     uvec2 cells;              // of the directions' square
-#endif
 };
 
 #include "shared/accumulate.glsl"

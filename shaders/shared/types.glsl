@@ -1,5 +1,4 @@
-// The structs that Rust and GLSL share, scalar layout: src/passes/types.rs has the same fields in
-// the same order, and a test compares every offset.
+// The structs that Rust and GLSL share, scalar layout: the build writes src/structs.rs from them.
 
 #extension GL_EXT_scalar_block_layout : require
 

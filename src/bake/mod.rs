@@ -69,7 +69,7 @@ pub fn solution(scene: &Scene, solver: &Solver) -> Result<Solution> {
     report.skipped.degenerate_triangles = scene.dropped_degenerate as u64;
     Ok(Solution::new(
         scene,
-        &solver.elements,
+        &solver.problem.elements,
         &solver.light()?,
         report,
     ))

@@ -21,7 +21,7 @@ const BATCHES: [(&str, Culling, bool, usize); 4] = [
 
 /// The sources of a batch, each batch spread over all of them.
 fn batch_of_sources(solver: &Solver, batch: usize) -> Vec<u32> {
-    let count = solver.sources.list.len();
+    let count = solver.problem.sources.list.len();
     let slots = (solver.report().batch as usize).min(count);
     let source = |slot: usize| ((slot * count / slots + batch) % count) as u32;
     (0..slots).map(source).collect()
@@ -65,7 +65,7 @@ pub fn run(device: &Arc<Device>, scene: &Scene, hemicube: u32, rounds: usize) ->
         "{}: {} elements, {} sources, hemicube {hemicube}, {}",
         scene.name,
         scene.triangles.len(),
-        solvers[0].sources.list.len(),
+        solvers[0].problem.sources.list.len(),
         device.name()
     );
     println!("hemicubes a second      drawn (10 % to 90 %)         with form factors and keeping");

@@ -210,7 +210,7 @@ fn bake(
             };
             let samples = irradiance::samples(&scene, &wanted)?;
             let light = solver.light()?.irradiance;
-            let light = solver.elements.to_input_order(&light);
+            let light = solver.problem.elements.to_input_order(&light);
             Some(irradiance::compare(&light, &samples))
         }
     };

@@ -215,7 +215,7 @@ fn begin(device: &Arc<Device>, scene: &Scene, options: &Options, how: How<'_>) -
             kind: kind.into(),
             elements: scene.triangles.len() as u64,
             meso_elements,
-            sources: solver.sources.list.len() as u64,
+            sources: solver.problem.sources.list.len() as u64,
             hemicubes: 0,
             error_bound: None,
             relief_seconds,
@@ -255,7 +255,7 @@ fn in_turns(mut under: Vec<Under>, scene: &Scene, go_on: &impl Fn() -> bool) -> 
         let light = u.solver.light()?;
         let report = u.solver.report().clone();
         Ok(Done {
-            solution: Solution::new(scene, &u.solver.elements, &light, report),
+            solution: Solution::new(scene, &u.solver.problem.elements, &light, report),
             row: u.row,
         })
     });

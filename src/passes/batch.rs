@@ -2,12 +2,10 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
-
 use super::buffers::{SceneBuffers, upload};
 use super::occluder_tree::OccluderTree;
 use super::types::{Draw, Slot, View};
-use crate::constants::{FACES, MESHLET_TRIANGLES, NONE, RECEIVE_KINDS};
+use crate::constants::{FACES, MESHLET_TRIANGLES, RECEIVE_KINDS};
 use crate::error::Result;
 use crate::math::hemicube::pixel_count;
 use crate::vk::{
@@ -67,13 +65,7 @@ const CORNER_BYTES: u64 = 12;
 
 impl Batch {
     pub fn new(device: &Arc<Device>, slot_count: u32, sight: Sight) -> Result<Self> {
-        let empty = Slot {
-            emitted: Vec3::ZERO,
-            source: NONE,
-            reflected: Vec3::ZERO,
-            scale: 1.0,
-        };
-        let empty = vec![empty; slot_count as usize];
+        let empty = vec![Slot::EMPTY; slot_count as usize];
         Ok(Self {
             slot_count,
             slots: upload(device, "slots", &empty, BufferUse::Storage)?,

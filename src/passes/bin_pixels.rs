@@ -4,27 +4,32 @@
 use std::sync::Arc;
 
 use super::batch::Batch;
-use super::buffers::{SceneBuffers, upload};
+use super::buffers::{SceneBuffers, filled, upload};
 use super::fresh_rows::FreshRows;
 use super::groups;
 use super::shaders::{bin_pixels, pixel_rows};
 use crate::error::{Error, Result};
 use crate::math::hemicube::{fixed_point_tables, pixel_count};
-use crate::vk::{Buffer, BufferUse, Commands, ComputePipeline, DescriptorSet, Device, Stage};
-
-pub struct BinPixels {
-    bin: ComputePipeline,
-    rows: ComputePipeline,
-}
+use crate::vk::{BoundCompute, Buffer, BufferUse, Commands, ComputePipeline, Device, Stage};
 
 /// Bound to the pixels' own form factors and their sums for a batch, `[slot][element]`.
-pub struct Bound {
-    bin: DescriptorSet,
-    rows: DescriptorSet,
+pub struct BinPixels {
+    bin: BoundCompute,
+    rows: BoundCompute,
+    element_count: u32,
+    block_count: u32,
+    face_size: u32,
+    slot_count: u32,
+    occupied: Buffer,
 }
 
 impl BinPixels {
-    pub fn new(device: &Arc<Device>) -> Result<Self> {
+    pub fn new(
+        device: &Arc<Device>,
+        scene: &SceneBuffers,
+        batch: &Batch,
+        rows: &FreshRows,
+    ) -> Result<Self> {
         if !device.candidate().int64_atomics {
             return Err(Error::Device(format!(
                 "device {} has no 64-bit integer atomics on buffers, which --estimator pixel \
@@ -32,74 +37,55 @@ impl BinPixels {
                 device.name()
             )));
         }
-        Ok(Self {
-            bin: ComputePipeline::new(device, "bin pixels", &bin_pixels::SHADER)?,
-            rows: ComputePipeline::new(device, "pixel rows", &pixel_rows::SHADER)?,
-        })
-    }
-
-    pub fn bind(
-        &self,
-        device: &Arc<Device>,
-        scene: &SceneBuffers,
-        batch: &Batch,
-        rows: &FreshRows,
-    ) -> Result<Bound> {
         let hemicubes = batch.hemicubes();
         let tables = fixed_point_tables(hemicubes.face_size);
         let deltas = upload(device, "delta form factors", &tables, BufferUse::Storage)?;
         let bytes = 8 * u64::from(batch.slot_count) * u64::from(scene.element_count);
-        let sums = Buffer::new(device, "pixel sums", bytes, BufferUse::Storage)?;
-        Commands::run(device, "pixel sums", |cmd| {
-            cmd.fill(&sums, 0);
-            Ok(())
-        })?;
-        let bin = bin_pixels::Bindings {
-            slots: &batch.slots,
-            sources: &scene.sources,
-            deltas: &deltas,
-            form_factors: &sums,
-            planes: &scene.planes,
-            items: hemicubes.sampled_items(),
-        };
-        let rows = pixel_rows::Bindings {
-            slots: &batch.slots,
-            sources: &scene.sources,
-            sums: &sums,
-            element_area: &scene.areas,
-            fresh: &rows.plain,
-            occupied: &rows.occupied,
-        };
-        let bin = self.bin.bind("bin pixels", &bin)?;
-        let rows = self.rows.bind("pixel rows", &rows)?;
-        Ok(Bound { bin, rows })
+        let sums = filled(device, "pixel sums", bytes, 0)?;
+        let bin = ComputePipeline::new(device, "bin pixels", &bin_pixels::SHADER)?;
+        let pixel_rows = ComputePipeline::new(device, "pixel rows", &pixel_rows::SHADER)?;
+        Ok(Self {
+            bin: bin.bind(&bin_pixels::Bindings {
+                slots: &batch.slots,
+                sources: &scene.sources,
+                deltas: &deltas,
+                form_factors: &sums,
+                planes: &scene.planes,
+                items: hemicubes.sampled_items(),
+            })?,
+            rows: pixel_rows.bind(&pixel_rows::Bindings {
+                slots: &batch.slots,
+                sources: &scene.sources,
+                sums: &sums,
+                element_area: &scene.areas,
+                fresh: &rows.plain,
+                occupied: &rows.occupied,
+            })?,
+            element_count: rows.shape.plain_count,
+            block_count: rows.shape.blocks(),
+            face_size: hemicubes.face_size,
+            slot_count: batch.slot_count,
+            occupied: rows.occupied.clone(),
+        })
     }
 
     /// After a barrier between earlier readers of the rows and transfers.
-    pub fn record(&self, cmd: &Commands, bound: &Bound, batch: &Batch, rows: &FreshRows) {
-        cmd.fill(&rows.occupied, 0);
+    pub fn record(&self, cmd: &Commands) {
+        cmd.fill(&self.occupied, 0);
         cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
-        let element_count = rows.shape.plain_count;
-        let hemicubes = batch.hemicubes();
-        let pixels = pixel_count(hemicubes.face_size) as u32;
-        cmd.dispatch(
-            &self.bin,
-            &bound.bin,
-            &bin_pixels::Parameters {
-                element_count,
-                face_size: hemicubes.face_size,
-            },
-            [groups(pixels), batch.slot_count, 1],
-        );
+        let element_count = self.element_count;
+        let bin = bin_pixels::Parameters {
+            element_count,
+            face_size: self.face_size,
+        };
+        let pixels = pixel_count(self.face_size) as u32;
+        cmd.dispatch(&self.bin, &bin, [groups(pixels), self.slot_count, 1]);
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-        cmd.dispatch(
-            &self.rows,
-            &bound.rows,
-            &pixel_rows::Parameters {
-                element_count,
-                block_count: rows.shape.blocks(),
-            },
-            [groups(element_count), batch.slot_count, 1],
-        );
+        let rows = pixel_rows::Parameters {
+            element_count,
+            block_count: self.block_count,
+        };
+        let size = [groups(element_count), self.slot_count, 1];
+        cmd.dispatch(&self.rows, &rows, size);
     }
 }

@@ -8,7 +8,7 @@ use super::buffers::SceneBuffers;
 use super::shaders::cull::{Bindings, Parameters, SHADER};
 use crate::constants::FACES;
 use crate::error::Result;
-use crate::vk::{Commands, ComputePipeline, DescriptorSet, Device};
+use crate::vk::{BoundCompute, Commands, ComputePipeline, Device};
 
 /// What is left out of the item buffer's draws. Every level gives the same item buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -23,66 +23,60 @@ pub enum Culling {
 }
 
 pub struct Cull {
-    pipeline: ComputePipeline,
+    bound: BoundCompute,
+    parameters: Parameters,
+    slot_count: u32,
 }
 
 impl Cull {
-    pub fn new(device: &Arc<Device>, culling: Culling) -> Result<Self> {
+    pub fn new(
+        device: &Arc<Device>,
+        culling: Culling,
+        scene: &SceneBuffers,
+        batch: &Batch,
+    ) -> Result<Self> {
         let constants = [
             device.limits().subgroup_size,
             (culling != Culling::Off).into(),
             (culling == Culling::Triangles).into(),
             device.limits().subpixel_bits,
         ];
+        let hemicubes = batch.hemicubes();
+        let pipeline = ComputePipeline::in_subgroups(device, "cull", &SHADER, &constants)?;
+        let bindings = Bindings {
+            slots: &batch.slots,
+            sources: &scene.sources,
+            meshlets: &scene.meshlets,
+            components: &scene.components,
+            corners: &scene.occluder_corners,
+            vertices: &scene.vertices,
+            planes: &scene.planes,
+            drawn_corners: &hemicubes.drawn_corners,
+            drawn_items: &hemicubes.drawn_items,
+            draws: &hemicubes.draws,
+            views: &hemicubes.views,
+            counts: &hemicubes.counts,
+            items: &scene.occluder_items,
+            resume: &hemicubes.resume,
+        };
         Ok(Self {
-            pipeline: ComputePipeline::in_subgroups(device, "cull", &SHADER, &constants)?,
+            bound: pipeline.bind(&bindings)?,
+            parameters: Parameters {
+                meshlet_count: scene.meshlet_count,
+                room: hemicubes.room,
+                face_size: hemicubes.face_size,
+                part: 0,
+            },
+            slot_count: batch.slot_count,
         })
     }
 
-    pub fn bind(&self, scene: &SceneBuffers, batch: &Batch) -> Result<DescriptorSet> {
-        let hemicubes = batch.hemicubes();
-        self.pipeline.bind(
-            "cull",
-            &Bindings {
-                slots: &batch.slots,
-                sources: &scene.sources,
-                meshlets: &scene.meshlets,
-                components: &scene.components,
-                corners: &scene.occluder_corners,
-                vertices: &scene.vertices,
-                planes: &scene.planes,
-                drawn_corners: &hemicubes.drawn_corners,
-                drawn_items: &hemicubes.drawn_items,
-                draws: &hemicubes.draws,
-                views: &hemicubes.views,
-                counts: &hemicubes.counts,
-                items: &scene.occluder_items,
-                resume: &hemicubes.resume,
-            },
-        )
-    }
-
     /// Lists what the part of this number draws: what found no room before.
-    pub(super) fn record(
-        &self,
-        cmd: &Commands,
-        set: &DescriptorSet,
-        scene: &SceneBuffers,
-        batch: &Batch,
-        part: u32,
-    ) {
-        let hemicubes = batch.hemicubes();
+    pub(super) fn record(&self, cmd: &Commands, part: u32) {
         let parameters = Parameters {
-            meshlet_count: scene.meshlet_count,
-            room: hemicubes.room,
-            face_size: hemicubes.face_size,
             part,
+            ..self.parameters
         };
-        cmd.dispatch(
-            &self.pipeline,
-            set,
-            &parameters,
-            [FACES, batch.slot_count, 1],
-        );
+        cmd.dispatch(&self.bound, &parameters, [FACES, self.slot_count, 1]);
     }
 }

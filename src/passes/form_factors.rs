@@ -17,36 +17,19 @@ use super::shaders::{
 use super::types::ReceiverList;
 use crate::constants::{RECEIVE_KINDS, SORT_ELEMENTS, SORT_SLOTS};
 use crate::error::Result;
-use crate::vk::{Buffer, Commands, ComputePipeline, ComputeShader, DescriptorSet, Device, Stage};
+use crate::vk::{
+    BoundCompute, Buffer, Commands, ComputePipeline, ComputeShader, Device, ShaderBindings, Stage,
+};
 
+/// Bound to a batch.
 pub struct FormFactors {
-    sort: ComputePipeline,
-    /// One a kind.
-    plain: Vec<ComputePipeline>,
-    /// For elements with relief, in scenes that have some.
-    meso: Vec<ComputePipeline>,
-}
-
-/// What decides whether an element sees a source.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SeenBy {
-    ItemBuffer,
-    ShadowRays,
-}
-
-/// How receivers are sorted.
-#[derive(Debug, Clone, Copy)]
-pub struct Sorting {
-    pub seen_by: SeenBy,
-    /// Whether blocks of elements that see nothing of a source are passed over as a whole. The
-    /// lists are the same.
-    pub culls: bool,
-}
-
-/// Sets of [`FormFactors`].
-pub struct Sets {
-    plain: Range,
-    meso: Option<Range>,
+    /// Elements without relief, and in scenes that have some those with it.
+    ranges: Vec<Range>,
+    rows: FreshRows,
+    /// Pixels a side of the batch's hemicubes; 0 where it has none.
+    face_size: u32,
+    /// Slots that a dispatch sorts for.
+    at_once: u32,
 }
 
 /// The elements of a dispatch.
@@ -54,13 +37,16 @@ struct Range {
     first_element: u32,
     element_count: u32,
     first_block: u32,
-    sort: DescriptorSet,
-    /// For the pipelines of all kinds.
-    form_factors: DescriptorSet,
+    lists: ReceiverLists,
+    fresh: Buffer,
+    sort: BoundCompute,
+    /// One a kind.
+    form_factors: Vec<BoundCompute>,
 }
 
-/// What the sets of a range bind, beside what decides what is seen.
-struct Bound<'a> {
+/// What a range binds, beside what decides what is seen.
+#[derive(Clone, Copy)]
+struct On<'a> {
     scene: &'a SceneBuffers,
     batch: &'a Batch,
     rows: &'a FreshRows,
@@ -102,44 +88,17 @@ macro_rules! found {
 }
 
 impl FormFactors {
-    pub fn new(device: &Arc<Device>, with_relief: bool, sorting: Sorting) -> Result<Self> {
-        let [sort, plain, meso] = match sorting.seen_by {
-            SeenBy::ItemBuffer => [
-                &sort_receivers::SHADER,
-                &form_factors::SHADER,
-                &form_factors_relief::SHADER,
-            ],
-            SeenBy::ShadowRays => [
-                &sort_receivers_rays::SHADER,
-                &form_factors_rays::SHADER,
-                &form_factors_relief_rays::SHADER,
-            ],
-        };
-        let kinds = |name, shader: &ComputeShader<'_>| {
-            (0..RECEIVE_KINDS)
-                .map(|kind| ComputePipeline::in_subgroups(device, name, shader, &[kind]))
-                .collect::<Result<Vec<_>>>()
-        };
-        let culls = [sorting.culls.into()];
-        Ok(Self {
-            sort: ComputePipeline::in_subgroups(device, "sort receivers", sort, &culls)?,
-            plain: kinds("form factors", plain)?,
-            meso: match with_relief {
-                true => kinds("form factors to relief", meso)?,
-                false => Vec::new(),
-            },
-        })
-    }
-
-    /// `meso`: the elements with a relief.
-    pub fn bind(
-        &self,
+    /// `meso`: the elements with a relief. `culls`: whether blocks of elements that see nothing of
+    /// a source are passed over as a whole, which leaves the lists the same.
+    pub fn new(
+        device: &Arc<Device>,
         scene: &SceneBuffers,
         batch: &Batch,
         rows: &FreshRows,
         meso: Option<&Buffer>,
-    ) -> Result<Sets> {
-        let plain = Bound {
+        culls: bool,
+    ) -> Result<Self> {
+        let plain = On {
             scene,
             batch,
             rows,
@@ -147,131 +106,133 @@ impl FormFactors {
             fresh: &rows.plain,
             meso: None,
         };
-        let plain = Range {
-            first_element: 0,
-            element_count: rows.shape.plain_count,
-            first_block: 0,
-            sort: self.bind_sort(&plain)?,
-            form_factors: bind_form_factors(&self.plain, &plain)?,
-        };
-        if meso.is_none() {
-            return Ok(Sets { plain, meso: None });
+        let mut ranges = vec![Range::new(device, &plain, culls)?];
+        if meso.is_some() {
+            let with_relief = On {
+                lists: &rows.meso_lists,
+                fresh: &rows.meso,
+                meso,
+                ..plain
+            };
+            ranges.push(Range::new(device, &with_relief, culls)?);
         }
-        let meso = Bound {
-            scene,
-            batch,
-            rows,
-            lists: &rows.meso_lists,
-            fresh: &rows.meso,
-            meso,
+        // Rays of one slot at a time.
+        let (face_size, at_once) = match &batch.sight {
+            Sight::Hemicubes(hemicubes) => (hemicubes.face_size, SORT_SLOTS),
+            Sight::Rays(_) => (0, 1),
         };
-        let meso = Range {
-            first_element: rows.shape.plain_count,
-            element_count: rows.shape.meso_count,
-            first_block: rows.shape.plain_blocks(),
-            sort: self.bind_sort(&meso)?,
-            form_factors: bind_form_factors(&self.meso, &meso)?,
-        };
-        Ok(Sets {
-            plain,
-            meso: Some(meso),
+        Ok(Self {
+            ranges,
+            rows: rows.clone(),
+            face_size,
+            at_once,
         })
     }
 
-    fn bind_sort(&self, on: &Bound<'_>) -> Result<DescriptorSet> {
-        let (away_count, blocks) = (&on.rows.facing_away, &on.scene.receiver_blocks);
-        match &on.batch.sight {
-            Sight::Hemicubes(hemicubes) => {
-                let items = hemicubes.sampled_items();
-                let bindings = receivers!(sort_receivers, on, items, away_count, blocks);
-                self.sort.bind("sort receivers", &bindings)
-            }
-            Sight::Rays(tree) => {
-                let (shadow_nodes, shadow_occluders) = (&tree.nodes, &tree.occluders);
-                let bindings = receivers!(
-                    sort_receivers_rays,
-                    on,
-                    shadow_nodes,
-                    away_count,
-                    blocks,
-                    shadow_occluders
-                );
-                self.sort.bind("sort receivers", &bindings)
-            }
-        }
-    }
-
     /// After a barrier between earlier readers of the rows and transfers.
-    pub fn record(&self, cmd: &Commands, sets: &Sets, batch: &Batch, rows: &FreshRows) {
-        let meso = sets.meso.as_ref();
-        let of_meso = meso.map(|m| (m, &self.meso, &rows.meso_lists, &rows.meso));
-        let of_plain = (&sets.plain, &self.plain, &rows.plain_lists, &rows.plain);
-        let ranges = || std::iter::once(of_plain).chain(of_meso);
-        for (.., lists, fresh) in ranges() {
+    pub fn record(&self, cmd: &Commands) {
+        let rows = &self.rows;
+        for Range { lists, fresh, .. } in &self.ranges {
             cmd.copy(&lists.empty, 0, &lists.counts, 0, lists.empty.bytes());
             cmd.fill(fresh, 0);
         }
         cmd.fill(&rows.occupied, 0);
         cmd.fill(&rows.facing_away, 0);
         cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
-        // Rays of one slot at a time.
-        let (face_size, at_once) = match &batch.sight {
-            Sight::Hemicubes(hemicubes) => (hemicubes.face_size, SORT_SLOTS),
-            Sight::Rays(_) => (0, 1),
-        };
         // All of these shaders have the same.
         let parameters = |range: &Range, slots: std::ops::Range<u32>| sort_receivers::Parameters {
             first_element: range.first_element,
             element_count: range.element_count,
-            face_size,
+            face_size: self.face_size,
             first_slot: slots.start,
             end_slot: slots.end,
             first_block: range.first_block,
             block_count: rows.shape.blocks(),
         };
-        for first in (0..batch.slot_count).step_by(at_once as usize) {
-            for (range, ..) in ranges() {
-                let slots = first..(first + at_once).min(batch.slot_count);
+        for first in (0..rows.slot_count).step_by(self.at_once as usize) {
+            for range in &self.ranges {
+                let slots = first..(first + self.at_once).min(rows.slot_count);
                 let size = [groups(range.element_count.div_ceil(SORT_ELEMENTS)), 1, 1];
-                if range.element_count > 0 {
-                    cmd.dispatch(&self.sort, &range.sort, &parameters(range, slots), size);
-                }
+                cmd.dispatch(&range.sort, &parameters(range, slots), size);
             }
         }
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         // Every element is in one list of a slot at most.
-        for (range, pipelines, lists, _) in ranges() {
-            for slot in 0..batch.slot_count {
-                for (kind, pipeline) in pipelines.iter().enumerate() {
-                    let set = &range.form_factors;
+        for range in &self.ranges {
+            for slot in 0..rows.slot_count {
+                for (kind, form_factors) in range.form_factors.iter().enumerate() {
                     let push = parameters(range, slot..slot + 1);
                     let list = u64::from(slot * RECEIVE_KINDS) + kind as u64;
                     let at = size_of::<ReceiverList>() as u64 * list;
-                    cmd.dispatch_indirect(pipeline, set, &push, &lists.counts, at);
+                    cmd.dispatch_indirect(form_factors, &push, &range.lists.counts, at);
                 }
             }
         }
     }
 }
 
-/// A set for the pipelines of all kinds.
-fn bind_form_factors(pipelines: &[ComputePipeline], on: &Bound<'_>) -> Result<DescriptorSet> {
-    let pipeline = pipelines.first().expect("a pipeline for each kind");
-    let name = "form factors";
+impl Range {
+    fn new(device: &Arc<Device>, on: &On<'_>, culls: bool) -> Result<Self> {
+        let shape = on.rows.shape;
+        let [first_element, element_count, first_block] = match on.meso {
+            None => [0, shape.plain_count, 0],
+            Some(_) => [shape.plain_count, shape.meso_count, shape.plain_blocks()],
+        };
+        Ok(Self {
+            first_element,
+            element_count,
+            first_block,
+            lists: on.lists.clone(),
+            fresh: on.fresh.clone(),
+            sort: sort(device, on, culls)?,
+            form_factors: form_factors(device, on)?,
+        })
+    }
+}
+
+fn sort(device: &Arc<Device>, on: &On<'_>, culls: bool) -> Result<BoundCompute> {
+    let pipeline = |shader: &ComputeShader<'_>| {
+        ComputePipeline::in_subgroups(device, "sort receivers", shader, &[culls.into()])
+    };
+    let (away_count, blocks) = (&on.rows.facing_away, &on.scene.receiver_blocks);
+    match &on.batch.sight {
+        Sight::Hemicubes(hemicubes) => {
+            let items = hemicubes.sampled_items();
+            let bindings = receivers!(sort_receivers, on, items, away_count, blocks);
+            pipeline(&sort_receivers::SHADER)?.bind(&bindings)
+        }
+        Sight::Rays(tree) => {
+            let (shadow_nodes, shadow_occluders) = (&tree.nodes, &tree.occluders);
+            let bindings = receivers!(
+                sort_receivers_rays,
+                on,
+                shadow_nodes,
+                away_count,
+                blocks,
+                shadow_occluders
+            );
+            pipeline(&sort_receivers_rays::SHADER)?.bind(&bindings)
+        }
+    }
+}
+
+/// One a kind.
+fn form_factors(device: &Arc<Device>, on: &On<'_>) -> Result<Vec<BoundCompute>> {
     match (&on.batch.sight, on.meso) {
         (Sight::Hemicubes(hemicubes), None) => {
             let items = hemicubes.sampled_items();
-            pipeline.bind(name, &found!(form_factors, on, items))
+            let bindings = found!(form_factors, on, items);
+            kinds(device, &form_factors::SHADER, &bindings)
         }
         (Sight::Hemicubes(hemicubes), Some(meso_elements)) => {
             let items = hemicubes.sampled_items();
             let bindings = found!(form_factors_relief, on, items, meso_elements);
-            pipeline.bind(name, &bindings)
+            kinds(device, &form_factors_relief::SHADER, &bindings)
         }
         (Sight::Rays(tree), None) => {
             let (shadow_nodes, shadow_occluders) = (&tree.nodes, &tree.occluders);
             let bindings = found!(form_factors_rays, on, shadow_nodes, shadow_occluders);
-            pipeline.bind(name, &bindings)
+            kinds(device, &form_factors_rays::SHADER, &bindings)
         }
         (Sight::Rays(tree), Some(meso_elements)) => {
             let (shadow_nodes, shadow_occluders) = (&tree.nodes, &tree.occluders);
@@ -282,7 +243,19 @@ fn bind_form_factors(pipelines: &[ComputePipeline], on: &Bound<'_>) -> Result<De
                 meso_elements,
                 shadow_occluders
             );
-            pipeline.bind(name, &bindings)
+            kinds(device, &form_factors_relief_rays::SHADER, &bindings)
         }
     }
+}
+
+fn kinds(
+    device: &Arc<Device>,
+    shader: &ComputeShader<'_>,
+    bindings: &impl ShaderBindings,
+) -> Result<Vec<BoundCompute>> {
+    (0..RECEIVE_KINDS)
+        .map(|kind| {
+            ComputePipeline::in_subgroups(device, "form factors", shader, &[kind])?.bind(bindings)
+        })
+        .collect()
 }

@@ -39,7 +39,8 @@ impl RowShape {
     }
 }
 
-/// The form factors of a batch in f32.
+/// The form factors of a batch in f32. A clone is another handle to the same buffers.
+#[derive(Clone)]
 pub struct FreshRows {
     pub shape: RowShape,
     pub slot_count: u32,
@@ -57,6 +58,7 @@ pub struct FreshRows {
 }
 
 /// Lists of elements, `[slot][kind]`.
+#[derive(Clone)]
 pub struct ReceiverLists {
     /// [`ReceiverList`], `[slot][kind]`.
     pub counts: Buffer,

@@ -6,6 +6,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::buffers::{SceneBuffers, State, write};
+use super::fresh_rows::RowShape;
 use super::groups;
 use super::kept_rows::KeptRows;
 use super::relief_buffers::ReliefBuffers;
@@ -13,7 +14,7 @@ use super::shaders::{gather, gather_from_relief, gather_to_relief};
 use super::types::{KeptRow, Slot};
 use crate::error::Result;
 use crate::vk::{
-    Buffer, BufferUse, Commands, ComputePipeline, DescriptorSet, Device, Stage, TEXEL_BYTES,
+    BoundCompute, Buffer, BufferUse, Commands, ComputePipeline, Device, Stage, TEXEL_BYTES,
 };
 
 /// Rows and the light that their sources send; the rows of one chunk behind one another.
@@ -65,17 +66,17 @@ pub enum Part {
 
 /// Gathering to the elements without relief, and to those with one.
 pub struct Gather {
-    plain: ComputePipeline,
-    meso: Option<ComputePipeline>,
+    shape: RowShape,
+    /// For the elements without relief, and what is the same for all.
+    parameters: gather::Parameters,
+    /// For each chunk of rows.
+    chunks: Vec<OfChunk>,
 }
 
-/// For each chunk of rows.
-pub struct Sets(Vec<ChunkSets>);
-
-/// For emitted and for reflected light.
-struct ChunkSets {
-    plain: [DescriptorSet; 2],
-    meso: Option<[DescriptorSet; 2]>,
+/// Bound to a chunk, for emitted and for reflected light.
+struct OfChunk {
+    plain: [BoundCompute; 2],
+    meso: Option<[BoundCompute; 2]>,
 }
 
 /// Slots whose rows lie in one chunk.
@@ -85,9 +86,9 @@ pub struct ChunkSlots {
     pub slots: Range<u32>,
 }
 
-/// What the sets of a chunk bind for one part of the light.
+/// What is bound for one part of the light.
 #[derive(Clone, Copy)]
-struct Bound<'a> {
+struct On<'a> {
     list: &'a GatherList,
     scene: &'a SceneBuffers,
     /// The chunk.
@@ -100,135 +101,109 @@ struct Bound<'a> {
 const MOST_SLOTS: u32 = 1024;
 
 impl Gather {
-    pub fn new(device: &Arc<Device>, with_relief: bool) -> Result<Self> {
-        let lanes = [device.limits().subgroup_size];
-        let make = |name, shader| ComputePipeline::in_subgroups(device, name, shader, &lanes);
-        Ok(match with_relief {
-            false => Self {
-                plain: make("gather", &gather::SHADER)?,
-                meso: None,
-            },
-            true => Self {
-                plain: make("gather from relief", &gather_from_relief::SHADER)?,
-                meso: Some(make("gather to relief", &gather_to_relief::SHADER)?),
-            },
-        })
-    }
-
-    pub fn bind(
-        &self,
+    pub fn new(
+        device: &Arc<Device>,
         scene: &SceneBuffers,
         state: &State,
         kept: &KeptRows,
         list: &GatherList,
         relief: Option<&ReliefBuffers>,
-    ) -> Result<Sets> {
-        let sets = |words: &Buffer| {
-            let emitted = Bound {
+    ) -> Result<Self> {
+        let lanes = [device.limits().subgroup_size];
+        let make = |name, shader| ComputePipeline::in_subgroups(device, name, shader, &lanes);
+        let plain = match relief {
+            None => make("gather", &gather::SHADER)?,
+            Some(_) => make("gather from relief", &gather_from_relief::SHADER)?,
+        };
+        let meso = match relief {
+            None => None,
+            Some(relief) => Some((make("gather to relief", &gather_to_relief::SHADER)?, relief)),
+        };
+        let bind = |words: &Buffer| {
+            let emitted = On {
                 list,
                 scene,
                 words,
                 irradiance: &state.direct,
                 irradiance_error: &state.direct_error,
             };
-            let reflected = Bound {
+            let reflected = On {
                 irradiance: &state.indirect,
                 irradiance_error: &state.indirect_error,
                 ..emitted
             };
-            let meso = match (&self.meso, relief) {
-                (Some(pipeline), Some(relief)) => Some([
+            let meso = match &meso {
+                Some((pipeline, relief)) => Some([
                     bind_meso(pipeline, &emitted, relief, &relief.moments_direct)?,
                     bind_meso(pipeline, &reflected, relief, &relief.moments_indirect)?,
                 ]),
-                _ => None,
+                None => None,
             };
             let plain = [
-                bind_plain(&self.plain, &emitted, relief)?,
-                bind_plain(&self.plain, &reflected, relief)?,
+                bind_plain(&plain, &emitted, relief)?,
+                bind_plain(&plain, &reflected, relief)?,
             ];
-            Ok(ChunkSets { plain, meso })
+            Ok(OfChunk { plain, meso })
         };
-        Ok(Sets(kept.chunks.iter().map(sets).collect::<Result<_>>()?))
-    }
-
-    /// One part of the light of `slots` of the list, in steps that software devices finish.
-    pub fn record(
-        &self,
-        cmd: &Commands,
-        sets: &Sets,
-        kept: &KeptRows,
-        of: &ChunkSlots,
-        part: Part,
-    ) {
+        let none = (0, 0, [0; 2]);
+        let (first_relief_source, relief_source_count, cells) =
+            relief.map_or(none, |r| (r.first_source, r.source_count, r.cells()));
         let shape = kept.shape;
-        let slots = &of.slots;
-        let set = &sets.0[of.chunk as usize].plain[part as usize];
-        for first in slots.clone().step_by(MOST_SLOTS as usize) {
-            let parameters = gather::Parameters {
+        Ok(Self {
+            shape,
+            parameters: gather::Parameters {
                 first_element: 0,
                 element_count: shape.plain_count,
-                first_slot: first,
-                end_slot: slots.end.min(first + MOST_SLOTS),
+                first_slot: 0,
+                end_slot: 0,
                 first_block: 0,
-                reflected: (part == Part::Reflected).into(),
-            };
-            let size = [groups(shape.plain_count), 1, 1];
-            cmd.dispatch(&self.plain, set, &parameters, size);
-            cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-        }
+                reflected: 0,
+                first_relief_source,
+                relief_source_count,
+                cells,
+            },
+            chunks: kept.chunks.iter().map(bind).collect::<Result<_>>()?,
+        })
     }
 
-    /// As [`Self::record`] in a scene with relief, for [`ReliefBuffers::slots`] slots at most, of
-    /// which [`super::send_relief`] has found what they send by direction.
-    pub fn record_relief(
-        &self,
-        cmd: &Commands,
-        sets: &Sets,
-        kept: &KeptRows,
-        relief: &ReliefBuffers,
-        of: &ChunkSlots,
-        part: Part,
-    ) {
-        let shape = kept.shape;
-        let slots = &of.slots;
-        let sets = &sets.0[of.chunk as usize];
-        // Both shaders have the same.
-        let plain = gather_from_relief::Parameters {
-            first_element: 0,
-            element_count: shape.plain_count,
-            first_slot: slots.start,
-            end_slot: slots.end,
-            first_block: 0,
-            reflected: (part == Part::Reflected).into(),
-            first_relief_source: relief.first_source,
-            relief_source_count: relief.source_count,
-            cells: relief.cells(),
-        };
-        let meso = gather_from_relief::Parameters {
-            first_element: shape.plain_count,
-            element_count: shape.meso_count,
-            first_block: shape.plain_blocks(),
-            ..plain
-        };
+    /// One part of the light of these slots of the list, in steps that software devices finish.
+    /// With relief no more than [`ReliefBuffers::slots`], of which [`super::send_relief`] has found
+    /// what they send by direction.
+    pub fn record(&self, cmd: &Commands, of: &ChunkSlots, part: Part) {
+        let shape = self.shape;
         let light = part as usize;
-        if shape.plain_count > 0 {
-            let size = [groups(shape.plain_count), 1, 1];
-            cmd.dispatch(&self.plain, &sets.plain[light], &plain, size);
+        let bound = &self.chunks[of.chunk as usize];
+        for first_slot in of.slots.clone().step_by(MOST_SLOTS as usize) {
+            let plain = gather::Parameters {
+                first_slot,
+                end_slot: of.slots.end.min(first_slot + MOST_SLOTS),
+                reflected: (part == Part::Reflected).into(),
+                ..self.parameters
+            };
+            cmd.dispatch(
+                &bound.plain[light],
+                &plain,
+                [groups(shape.plain_count), 1, 1],
+            );
+            if let Some(bound) = &bound.meso {
+                let meso = gather::Parameters {
+                    first_element: shape.plain_count,
+                    element_count: shape.meso_count,
+                    first_block: shape.plain_blocks(),
+                    ..plain
+                };
+                cmd.dispatch(&bound[light], &meso, [groups(shape.meso_count), 1, 1]);
+            }
+            cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         }
-        if let (Some(pipeline), Some(sets)) = (&self.meso, &sets.meso) {
-            let size = [groups(shape.meso_count), 1, 1];
-            cmd.dispatch(pipeline, &sets[light], &meso, size);
-        }
-        cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
     }
 }
 
 fn bind_plain(
     pipeline: &ComputePipeline,
-    on: &Bound<'_>,
+    on: &On<'_>,
     relief: Option<&ReliefBuffers>,
-) -> Result<DescriptorSet> {
+) -> Result<BoundCompute> {
     let Some(relief) = relief else {
         let bindings = gather::Bindings {
             lit_rows: &on.list.lit,
@@ -236,7 +211,7 @@ fn bind_plain(
             irradiance_error: on.irradiance_error,
             words: on.words,
         };
-        return pipeline.bind("gather", &bindings);
+        return pipeline.bind(&bindings);
     };
     let bindings = gather_from_relief::Bindings {
         lit_rows: &on.list.lit,
@@ -248,15 +223,15 @@ fn bind_plain(
         sources: &on.scene.sources,
         balls: &on.scene.balls,
     };
-    pipeline.bind("gather from relief", &bindings)
+    pipeline.bind(&bindings)
 }
 
 fn bind_meso(
     pipeline: &ComputePipeline,
-    on: &Bound<'_>,
+    on: &On<'_>,
     relief: &ReliefBuffers,
     moments: &Buffer,
-) -> Result<DescriptorSet> {
+) -> Result<BoundCompute> {
     let bindings = gather_to_relief::Bindings {
         lit_rows: &on.list.lit,
         irradiance: on.irradiance,
@@ -271,5 +246,5 @@ fn bind_meso(
         moments,
         meso_reflected: &relief.reflected,
     };
-    pipeline.bind("gather to relief", &bindings)
+    pipeline.bind(&bindings)
 }

@@ -25,12 +25,6 @@ pub struct ItemBuffer {
     pipeline: GraphicsPipeline,
 }
 
-/// What lists the triangles of each face.
-pub struct Lists<'a> {
-    pub cull: &'a Cull,
-    pub set: &'a DescriptorSet,
-}
-
 /// Distance of the near plane, internal units: nearer than any two surfaces that are not one.
 const NEAR: f32 = 1e-6;
 
@@ -70,28 +64,24 @@ impl ItemBuffer {
         )
     }
 
-    /// Culls and draws the hemicubes of a batch, in as many parts as their lists need. `listed` is
-    /// recorded when the first are full.
+    /// Culls and draws the hemicubes of a batch, in as many parts as the lists of `cull` need.
+    /// `listed` is recorded when the first are full.
     pub fn record(
         &self,
         cmd: &Commands,
         set: &DescriptorSet,
-        lists: &Lists<'_>,
+        cull: &Cull,
         scene: &SceneBuffers,
         batch: &Batch,
         listed: impl FnOnce(),
     ) {
-        let Lists {
-            cull,
-            set: cull_set,
-        } = lists;
-        cull.record(cmd, cull_set, scene, batch, 0);
+        cull.record(cmd, 0);
         cmd.barrier(&[Stage::Compute], &[Stage::Draw]);
         listed();
         self.draw(cmd, set, scene, batch, &self.pass);
         for part in 1..batch.hemicubes().parts(scene) {
             cmd.barrier(&[Stage::Draw], &[Stage::Compute]);
-            cull.record(cmd, cull_set, scene, batch, part);
+            cull.record(cmd, part);
             cmd.barrier(&[Stage::Compute], &[Stage::Draw]);
             self.draw(cmd, set, scene, batch, &self.further);
         }

@@ -9,83 +9,71 @@ use super::shaders::{allocate, keep};
 use super::types::KeptRow;
 use crate::constants::KEEP_BLOCKS;
 use crate::error::Result;
-use crate::vk::{Buffer, BufferUse, Commands, ComputePipeline, DescriptorSet, Device, Stage};
+use crate::vk::{BoundCompute, Buffer, BufferUse, Commands, ComputePipeline, Device, Stage};
 
 pub struct Keep {
-    allocate: ComputePipeline,
-    keep: ComputePipeline,
-}
-
-/// Where the rows of a batch have been put.
-pub struct Bound {
-    allocate: DescriptorSet,
-    keep: DescriptorSet,
-    /// [`KeptRow`], `[slot]`.
+    allocate: BoundCompute,
+    keep: BoundCompute,
+    first: allocate::Parameters,
+    then: keep::Parameters,
+    /// Where the rows of a batch have been put: [`KeptRow`], `[slot]`.
     pub rows: Buffer,
-    slot_count: u32,
 }
 
 impl Keep {
-    pub fn new(device: &Arc<Device>) -> Result<Self> {
-        let lanes = [device.limits().subgroup_size];
-        Ok(Self {
-            allocate: ComputePipeline::new(device, "allocate", &allocate::SHADER)?,
-            keep: ComputePipeline::in_subgroups(device, "keep", &keep::SHADER, &lanes)?,
-        })
-    }
-
-    pub fn bind(
-        &self,
+    /// For the rows of as many `slots` as there are fresh ones.
+    pub fn new(
         device: &Arc<Device>,
         slots: &Buffer,
-        slot_count: u32,
         fresh: &FreshRows,
         kept: &KeptRows,
-    ) -> Result<Bound> {
-        let bytes = u64::from(slot_count) * size_of::<KeptRow>() as u64;
+    ) -> Result<Self> {
+        let bytes = u64::from(fresh.slot_count) * size_of::<KeptRow>() as u64;
         let rows = Buffer::new(device, "rows of a batch", bytes, BufferUse::Storage)?;
-        let allocate = allocate::Bindings {
-            slots,
-            occupied: &fresh.occupied,
-            rows: &rows,
-            chunks: &kept.table,
-            state: &kept.state,
-        };
-        let keep = keep::Bindings {
-            slots,
-            rows: &rows,
-            chunks: &kept.table,
-            fresh: &fresh.plain,
-            fresh_meso: &fresh.meso,
-        };
-        Ok(Bound {
-            allocate: self.allocate.bind("allocate", &allocate)?,
-            keep: self.keep.bind("keep", &keep)?,
+        let lanes = [device.limits().subgroup_size];
+        let allocate = ComputePipeline::new(device, "allocate", &allocate::SHADER)?;
+        let keep = ComputePipeline::in_subgroups(device, "keep", &keep::SHADER, &lanes)?;
+        let shape = kept.shape;
+        Ok(Self {
+            allocate: allocate.bind(&allocate::Bindings {
+                slots,
+                occupied: &fresh.occupied,
+                rows: &rows,
+                chunks: &kept.table,
+                state: &kept.state,
+            })?,
+            keep: keep.bind(&keep::Bindings {
+                slots,
+                rows: &rows,
+                chunks: &kept.table,
+                fresh: &fresh.plain,
+                fresh_meso: &fresh.meso,
+            })?,
+            first: allocate::Parameters {
+                slot_count: fresh.slot_count,
+                block_count: shape.blocks(),
+                meso_blocks: shape.meso_blocks(),
+                chunk_count: kept.chunk_count(),
+                chunk_words: kept.chunk_words,
+                scratch_chunk: kept.chunk_count(),
+            },
+            then: keep::Parameters {
+                plain_count: shape.plain_count,
+                plain_blocks: shape.plain_blocks(),
+                meso_count: shape.meso_count,
+                block_count: shape.blocks(),
+            },
             rows,
-            slot_count,
         })
     }
 
     /// `scratch`: which of the [`super::kept_rows::SCRATCH`] chunks takes the rows without room.
-    pub fn record(&self, cmd: &Commands, bound: &Bound, kept: &KeptRows, scratch: u32) {
-        let shape = kept.shape;
-        let allocate = allocate::Parameters {
-            slot_count: bound.slot_count,
-            block_count: shape.blocks(),
-            meso_blocks: shape.meso_blocks(),
-            chunk_count: kept.chunk_count(),
-            chunk_words: kept.chunk_words,
-            scratch_chunk: kept.chunk_count() + scratch,
-        };
-        cmd.dispatch(&self.allocate, &bound.allocate, &allocate, [1, 1, 1]);
+    pub fn record(&self, cmd: &Commands, scratch: u32) {
+        let mut first = self.first;
+        first.scratch_chunk += scratch;
+        cmd.dispatch(&self.allocate, &first, [1, 1, 1]);
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-        let keep = keep::Parameters {
-            plain_count: shape.plain_count,
-            plain_blocks: shape.plain_blocks(),
-            meso_count: shape.meso_count,
-            block_count: shape.blocks(),
-        };
-        let size = [shape.blocks().div_ceil(KEEP_BLOCKS), bound.slot_count, 1];
-        cmd.dispatch(&self.keep, &bound.keep, &keep, size);
+        let groups = self.then.block_count.div_ceil(KEEP_BLOCKS);
+        cmd.dispatch(&self.keep, &self.then, [groups, first.slot_count, 1]);
     }
 }

@@ -7,39 +7,33 @@ use super::buffers::{SceneBuffers, State};
 use super::groups;
 use super::shaders::measure::{Bindings, Parameters, SHADER};
 use crate::error::Result;
-use crate::vk::{Commands, ComputePipeline, DescriptorSet, Device};
+use crate::vk::{BoundCompute, Commands, ComputePipeline, Device};
 
 pub struct Measure {
-    pipeline: ComputePipeline,
+    bound: BoundCompute,
+    parameters: Parameters,
 }
 
 impl Measure {
-    pub fn new(device: &Arc<Device>) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, scene: &SceneBuffers, state: &State) -> Result<Self> {
+        let bindings = Bindings {
+            sources: &scene.sources,
+            reflectance: &scene.reflectance,
+            element_area: &scene.areas,
+            direct: &state.direct,
+            indirect: &state.indirect,
+            source_reflected: &state.reflected,
+        };
         Ok(Self {
-            pipeline: ComputePipeline::new(device, "measure", &SHADER)?,
+            bound: ComputePipeline::new(device, "measure", &SHADER)?.bind(&bindings)?,
+            parameters: Parameters {
+                source_count: scene.source_count,
+            },
         })
     }
 
-    pub fn bind(&self, scene: &SceneBuffers, state: &State) -> Result<DescriptorSet> {
-        self.pipeline.bind(
-            "measure",
-            &Bindings {
-                sources: &scene.sources,
-                reflectance: &scene.reflectance,
-                element_area: &scene.areas,
-                direct: &state.direct,
-                indirect: &state.indirect,
-                source_reflected: &state.reflected,
-            },
-        )
-    }
-
-    pub fn record(&self, cmd: &Commands, set: &DescriptorSet, source_count: u32) {
-        cmd.dispatch(
-            &self.pipeline,
-            set,
-            &Parameters { source_count },
-            [groups(source_count), 1, 1],
-        );
+    pub fn record(&self, cmd: &Commands) {
+        let size = [groups(self.parameters.source_count), 1, 1];
+        cmd.dispatch(&self.bound, &self.parameters, size);
     }
 }

@@ -9,47 +9,38 @@ use super::groups;
 use super::relief_buffers::ReliefBuffers;
 use super::shaders::measure_relief::{Bindings, Parameters, SHADER};
 use crate::error::Result;
-use crate::vk::{Commands, ComputePipeline, DescriptorSet, Device};
+use crate::vk::{BoundCompute, Commands, ComputePipeline, Device};
 
 pub struct MeasureRelief {
-    pipeline: ComputePipeline,
+    bound: BoundCompute,
+    parameters: Parameters,
 }
 
 impl MeasureRelief {
-    pub fn new(device: &Arc<Device>) -> Result<Self> {
-        Ok(Self {
-            pipeline: ComputePipeline::new(device, "measure relief", &SHADER)?,
-        })
-    }
-
-    pub fn bind(
-        &self,
+    pub fn new(
+        device: &Arc<Device>,
         scene: &SceneBuffers,
         state: &State,
         relief: &ReliefBuffers,
-    ) -> Result<DescriptorSet> {
-        self.pipeline.bind(
-            "measure relief",
-            &Bindings {
-                sources: &scene.sources,
-                element_area: &scene.areas,
-                meso_reflected: &relief.reflected,
-                source_reflected: &state.reflected,
+    ) -> Result<Self> {
+        let bindings = Bindings {
+            sources: &scene.sources,
+            element_area: &scene.areas,
+            meso_reflected: &relief.reflected,
+            source_reflected: &state.reflected,
+        };
+        Ok(Self {
+            bound: ComputePipeline::new(device, "measure relief", &SHADER)?.bind(&bindings)?,
+            parameters: Parameters {
+                first_source: relief.first_source,
+                source_count: relief.source_count,
+                first_element: relief.first_element,
             },
-        )
+        })
     }
 
-    pub fn record(&self, cmd: &Commands, set: &DescriptorSet, relief: &ReliefBuffers) {
-        let parameters = Parameters {
-            first_source: relief.first_source,
-            source_count: relief.source_count,
-            first_element: relief.first_element,
-        };
-        cmd.dispatch(
-            &self.pipeline,
-            set,
-            &parameters,
-            [groups(relief.source_count), 1, 1],
-        );
+    pub fn record(&self, cmd: &Commands) {
+        let size = [groups(self.parameters.source_count), 1, 1];
+        cmd.dispatch(&self.bound, &self.parameters, size);
     }
 }

@@ -8,43 +8,39 @@ use super::buffers::SceneBuffers;
 use super::fresh_rows::FreshRows;
 use super::shaders::normalise::{Bindings, Parameters, SHADER};
 use crate::error::Result;
-use crate::vk::{Commands, ComputePipeline, DescriptorSet, Device};
+use crate::vk::{BoundCompute, Commands, ComputePipeline, Device};
 
 pub struct Normalise {
-    pipeline: ComputePipeline,
+    bound: BoundCompute,
+    parameters: Parameters,
+    slot_count: u32,
 }
 
 impl Normalise {
-    pub fn new(device: &Arc<Device>) -> Result<Self> {
-        Ok(Self {
-            pipeline: ComputePipeline::new(device, "normalise", &SHADER)?,
-        })
-    }
-
-    pub fn bind(
-        &self,
+    pub fn new(
+        device: &Arc<Device>,
         scene: &SceneBuffers,
         batch: &Batch,
         rows: &FreshRows,
-    ) -> Result<DescriptorSet> {
-        self.pipeline.bind(
-            "normalise",
-            &Bindings {
-                slots: &batch.slots,
-                sources: &scene.sources,
-                element_area: &scene.areas,
-                fresh: &rows.plain,
-                fresh_meso: &rows.meso,
+    ) -> Result<Self> {
+        let bindings = Bindings {
+            slots: &batch.slots,
+            sources: &scene.sources,
+            element_area: &scene.areas,
+            fresh: &rows.plain,
+            fresh_meso: &rows.meso,
+        };
+        Ok(Self {
+            bound: ComputePipeline::new(device, "normalise", &SHADER)?.bind(&bindings)?,
+            parameters: Parameters {
+                plain_count: rows.shape.plain_count,
+                meso_count: rows.shape.meso_count,
             },
-        )
+            slot_count: batch.slot_count,
+        })
     }
 
-    pub fn record(&self, cmd: &Commands, set: &DescriptorSet, batch: &Batch, rows: &FreshRows) {
-        let parameters = Parameters {
-            plain_count: rows.shape.plain_count,
-            meso_count: rows.shape.meso_count,
-        };
-        let size = [batch.slot_count, 1, 1];
-        cmd.dispatch(&self.pipeline, set, &parameters, size);
+    pub fn record(&self, cmd: &Commands) {
+        cmd.dispatch(&self.bound, &self.parameters, [self.slot_count, 1, 1]);
     }
 }

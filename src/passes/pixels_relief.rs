@@ -11,18 +11,12 @@ use super::relief_buffers::ReliefBuffers;
 use super::shaders::{pixels_from_relief, pixels_to_relief};
 use crate::error::Result;
 use crate::math::hemicube::pixel_form_factors;
-use crate::vk::{BufferUse, Commands, ComputePipeline, DescriptorSet, Device, Stage};
+use crate::vk::{BoundCompute, BufferUse, Commands, ComputePipeline, Device, Stage};
 
 /// First the elements without relief, then those with one.
 pub struct PixelsRelief {
-    from: ComputePipeline,
-    to: ComputePipeline,
-}
-
-/// Sets of [`PixelsRelief`].
-pub struct Bound {
-    from: DescriptorSet,
-    to: DescriptorSet,
+    from: BoundCompute,
+    to: BoundCompute,
 }
 
 /// Pixels that one invocation may look at: half of the turns after which lavapipe ends a shader's
@@ -30,22 +24,13 @@ pub struct Bound {
 const MOST_PIXELS: u32 = 1 << 15;
 
 impl PixelsRelief {
-    pub fn new(device: &Arc<Device>) -> Result<Self> {
-        let (from, to) = (&pixels_from_relief::SHADER, &pixels_to_relief::SHADER);
-        Ok(Self {
-            from: ComputePipeline::new(device, "pixels from relief", from)?,
-            to: ComputePipeline::new(device, "pixels to relief", to)?,
-        })
-    }
-
-    pub fn bind(
-        &self,
+    pub fn new(
         device: &Arc<Device>,
         scene: &SceneBuffers,
         state: &State,
         batch: &Batch,
         relief: &ReliefBuffers,
-    ) -> Result<Bound> {
+    ) -> Result<Self> {
         let hemicubes = batch.hemicubes();
         let table = pixel_form_factors(hemicubes.face_size);
         let deltas = upload(device, "pixel form factors", &table, BufferUse::Storage)?;
@@ -88,28 +73,24 @@ impl PixelsRelief {
             texture_facets: &relief.facets,
             outgoing: &relief.outgoing,
         };
-        Ok(Bound {
-            from: self.from.bind("pixels from relief", &from)?,
-            to: self.to.bind("pixels to relief", &to)?,
+        let shaders = (&pixels_from_relief::SHADER, &pixels_to_relief::SHADER);
+        Ok(Self {
+            from: ComputePipeline::new(device, "pixels from relief", shaders.0)?.bind(&from)?,
+            to: ComputePipeline::new(device, "pixels to relief", shaders.1)?.bind(&to)?,
         })
     }
 
     /// Slot after slot, some rows at a time; elements without relief and those with one are
     /// different elements.
-    pub fn record(&self, cmd: &Commands, bound: &Bound, relief: &ReliefBuffers, batch: &Batch) {
+    pub fn record(&self, cmd: &Commands, relief: &ReliefBuffers, batch: &Batch) {
         let hemicubes = batch.hemicubes();
         let rows = 3 * hemicubes.face_size;
         let band = (MOST_PIXELS / hemicubes.face_size).max(1);
         for slot in 0..batch.slot_count {
             for first_row in (0..rows).step_by(band as usize) {
-                for (pipeline, set, first_element, element_count) in [
-                    (&self.from, &bound.from, 0, relief.first_element),
-                    (
-                        &self.to,
-                        &bound.to,
-                        relief.first_element,
-                        relief.element_count,
-                    ),
+                for (bound, first_element, element_count) in [
+                    (&self.from, 0, relief.first_element),
+                    (&self.to, relief.first_element, relief.element_count),
                 ] {
                     // Both shaders have the same.
                     let parameters = pixels_from_relief::Parameters {
@@ -125,7 +106,7 @@ impl PixelsRelief {
                         end_row: (first_row + band).min(rows),
                     };
                     if element_count > 0 {
-                        cmd.dispatch(pipeline, set, &parameters, [groups(element_count), 1, 1]);
+                        cmd.dispatch(bound, &parameters, [groups(element_count), 1, 1]);
                     }
                 }
                 // The next rows add to the same sums.

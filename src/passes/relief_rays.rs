@@ -43,27 +43,19 @@ impl ReliefRays {
         let rays = upload(&self.device, "height rays", rays, BufferUse::Storage)?;
         let bytes = u64::from(count) * size_of::<HeightHit>() as u64;
         let hits = Buffer::new(&self.device, "height hits", bytes, BufferUse::Storage)?;
-        let set = self.pipeline.bind(
-            "relief rays",
-            &Bindings {
-                tiles: &tiles,
-                pyramid: &pyramids,
-                rays: &rays,
-                hits: &hits,
-            },
-        )?;
+        let bound = self.pipeline.bind(&Bindings {
+            tiles: &tiles,
+            pyramid: &pyramids,
+            rays: &rays,
+            hits: &hits,
+        })?;
         for first in (0..count).step_by(SUBMISSION as usize) {
             let parameters = Parameters {
                 first,
                 count: SUBMISSION.min(count - first),
             };
             Commands::run(&self.device, "relief rays", |cmd| {
-                cmd.dispatch(
-                    &self.pipeline,
-                    &set,
-                    &parameters,
-                    [groups(parameters.count), 1, 1],
-                );
+                cmd.dispatch(&bound, &parameters, [groups(parameters.count), 1, 1]);
                 Ok(())
             })?;
         }

@@ -10,7 +10,7 @@ use super::shaders::{relief_exchange, relief_horizon};
 use crate::constants::{AZIMUTHS, RAY_STRATA};
 use crate::error::Result;
 use crate::meso::{HeightField, Visibility};
-use crate::vk::{Buffer, BufferUse, Commands, ComputePipeline, DescriptorSet, Device};
+use crate::vk::{BoundCompute, Buffer, BufferUse, Commands, ComputePipeline, Device};
 
 pub struct ReliefVisibility {
     horizon: ComputePipeline,
@@ -39,18 +39,16 @@ impl ReliefVisibility {
             Buffer::new(&self.device, name, 4 * u64::from(words), BufferUse::Storage)
         };
         let (horizons, hits) = (buffer("horizons", lines)?, buffer("hits", rays)?);
-        let horizon = relief_horizon::Bindings {
+        let horizon = self.horizon.bind(&relief_horizon::Bindings {
             heights: &heights,
             horizons: &horizons,
-        };
-        let exchange = relief_exchange::Bindings {
+        })?;
+        let exchange = self.exchange.bind(&relief_exchange::Bindings {
             heights: &heights,
             hits: &hits,
-        };
-        let horizon = self.horizon.bind("horizons", &horizon)?;
-        let exchange = self.exchange.bind("hits", &exchange)?;
-        self.march(&self.horizon, &horizon, field, lines)?;
-        self.march(&self.exchange, &exchange, field, rays)?;
+        })?;
+        self.march(&horizon, field, lines)?;
+        self.march(&exchange, field, rays)?;
         Ok(Visibility {
             horizons: download(&self.device, &horizons, lines as usize)?,
             hits: download(&self.device, &hits, rays as usize)?,
@@ -58,13 +56,7 @@ impl ReliefVisibility {
     }
 
     /// Marches so many lines, in submissions.
-    fn march(
-        &self,
-        pipeline: &ComputePipeline,
-        set: &DescriptorSet,
-        field: &HeightField,
-        lines: u32,
-    ) -> Result<()> {
+    fn march(&self, bound: &BoundCompute, field: &HeightField, lines: u32) -> Result<()> {
         for first in (0..lines).step_by(SUBMISSION as usize) {
             // Both shaders have these.
             let parameters = relief_horizon::Parameters {
@@ -77,7 +69,7 @@ impl ReliefVisibility {
             };
             let size = [groups(parameters.count), 1, 1];
             Commands::run(&self.device, "relief visibility", |cmd| {
-                cmd.dispatch(pipeline, set, &parameters, size);
+                cmd.dispatch(bound, &parameters, size);
                 Ok(())
             })?;
         }

@@ -198,18 +198,15 @@ impl ShadowRays {
         let rays = upload(&self.device, "shadow rays", rays, BufferUse::Storage)?;
         let bytes = u64::from(count) * 4;
         let hits = Buffer::new(&self.device, "shadow hits", bytes, BufferUse::Storage)?;
-        let set = self.pipeline.bind(
-            "shadow rays",
-            &Bindings {
-                shadow_nodes: &scene.nodes,
-                shadow_triangles: &scene.triangles,
-                rays: &rays,
-                hits: &hits,
-            },
-        )?;
+        let bound = self.pipeline.bind(&Bindings {
+            shadow_nodes: &scene.nodes,
+            shadow_triangles: &scene.triangles,
+            rays: &rays,
+            hits: &hits,
+        })?;
         Commands::run(&self.device, "shadow rays", |cmd| {
             let size = [groups(count), 1, 1];
-            cmd.dispatch(&self.pipeline, &set, &Parameters { count }, size);
+            cmd.dispatch(&bound, &Parameters { count }, size);
             Ok(())
         })?;
         let hits: Vec<u32> = download(&self.device, &hits, count as usize)?;

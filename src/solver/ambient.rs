@@ -41,9 +41,9 @@ impl Solver {
     pub fn ambient(&self) -> Result<Ambient> {
         let unshot = match &self.method {
             Method::Rows(spine) => spine.ledger.unshot_by_colour(),
-            Method::Shots(shots) => shots.unshot_by_colour(&self.state)?,
+            Method::Shots(shots) => shots.unshot_by_colour(&self.problem.state)?,
         };
-        Ok(Ambient::new(unshot, &self.elements))
+        Ok(Ambient::new(unshot, &self.problem.elements))
     }
 }
 

@@ -2,14 +2,12 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
-
 use super::Settings;
 use crate::error::Result;
 use crate::passes::batch::{Batch, BatchSize, Hemicubes};
 use crate::passes::buffers::{SceneBuffers, write};
 use crate::passes::cull::{Cull, Culling};
-use crate::passes::item_buffer::{ItemBuffer, Lists};
+use crate::passes::item_buffer::ItemBuffer;
 use crate::passes::types::Slot;
 use crate::vk::{Buffer, BufferUse, Commands, DescriptorSet, Device, Stage};
 
@@ -17,7 +15,6 @@ use crate::vk::{Buffer, BufferUse, Commands, DescriptorSet, Device, Stage};
 pub(super) struct Drawing {
     cull: Cull,
     item_buffer: ItemBuffer,
-    cull_set: DescriptorSet,
     item_set: DescriptorSet,
 }
 
@@ -31,11 +28,9 @@ impl Drawing {
     ) -> Result<(Self, Batch)> {
         let item_buffer = ItemBuffer::new(device)?;
         let batch = Batch::drawing(device, &item_buffer.pass, scene, size)?;
-        let cull = Cull::new(device, culling)?;
         let drawing = Self {
-            cull_set: cull.bind(scene, &batch)?,
+            cull: Cull::new(device, culling, scene, &batch)?,
             item_set: item_buffer.bind(&batch)?,
-            cull,
             item_buffer,
         };
         Ok((drawing, batch))
@@ -64,11 +59,7 @@ impl Drawing {
         batch: &Batch,
         listed: impl FnOnce(),
     ) {
-        let lists = Lists {
-            cull: &self.cull,
-            set: &self.cull_set,
-        };
-        (self.item_buffer).record(cmd, &self.item_set, &lists, scene, batch, listed);
+        (self.item_buffer).record(cmd, &self.item_set, &self.cull, scene, batch, listed);
     }
 }
 
@@ -81,13 +72,7 @@ impl Drawing {
         batch: &Batch,
         source: u32,
     ) -> Result<Vec<u32>> {
-        let slot = Slot {
-            emitted: Vec3::ZERO,
-            source,
-            reflected: Vec3::ZERO,
-            scale: 1.0,
-        };
-        write(device, &batch.slots, &[slot])?;
+        write(device, &batch.slots, &[Slot::of(source)])?;
         Commands::run(device, "item buffer", |cmd| {
             self.record(cmd, scene, batch, || {});
             Ok(())

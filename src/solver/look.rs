@@ -1,7 +1,7 @@
 //! Pictures of what single sources see.
 
-use super::Solver;
 use super::drawing::Drawing;
+use super::{Problem, Solver};
 use crate::constants::{KIND_POINT, NONE};
 use crate::error::Result;
 use crate::passes::batch::BatchSize;
@@ -21,14 +21,14 @@ impl Solver {
     /// The source of each triangle, by its place in the input; of one that is cut into several the
     /// first, and [`NONE`] of one that never shoots.
     pub fn source_of_triangles(&self) -> Vec<u32> {
-        let mut of_element = vec![NONE; self.elements.len()];
-        for (s, source) in self.sources.list.iter().enumerate().rev() {
+        let mut of_element = vec![NONE; self.problem.elements.len()];
+        for (s, source) in self.problem.sources.list.iter().enumerate().rev() {
             if source.kind != KIND_POINT {
                 let first = source.first_element as usize;
                 of_element[first..first + source.element_count as usize].fill(s as u32);
             }
         }
-        self.elements.to_input_order(&of_element)
+        self.problem.elements.to_input_order(&of_element)
     }
 
     /// Draws the item buffer of a source.
@@ -37,19 +37,21 @@ impl Solver {
     /// A device that lacks the memory or fails.
     pub fn item_picture(&self, source: u32) -> Result<ItemPicture> {
         assert!(
-            (source as usize) < self.sources.list.len(),
+            (source as usize) < self.problem.sources.list.len(),
             "a source of this scene"
         );
-        let (device, scene) = (&self.device, &self.scene);
-        let face = self.settings.hemicube;
+        let Problem {
+            settings, scene, ..
+        } = &self.problem;
+        let (device, face) = (&self.device, settings.hemicube);
         let size = BatchSize {
             slots: 1,
             face,
             list_room: None,
         };
-        let (drawing, batch) = Drawing::new(device, scene, self.settings.culling, &size)?;
+        let (drawing, batch) = Drawing::new(device, scene, settings.culling, &size)?;
         let drawn = drawing.draw(device, scene, &batch, source)?;
-        let input = &self.elements.input_index;
+        let input = &self.problem.elements.input_index;
         let of_input = |item: u32| input.get(item as usize).copied().unwrap_or(NONE);
         Ok(ItemPicture {
             source,

@@ -15,11 +15,11 @@ mod estimate;
 mod gather;
 mod ledger;
 mod look;
+mod problem;
 mod progress;
 mod relief_light;
 mod report;
 mod rows;
-mod scene_parts;
 mod self_test;
 mod settings;
 mod several;
@@ -35,13 +35,9 @@ use std::time::Instant;
 use glam::Vec3;
 
 use crate::error::Result;
-use crate::mesh::charts::Connections;
 use crate::mesh::elements::Elements;
-use crate::mesh::occluders::Occluders;
-use crate::mesh::sources::{self, Sources};
-use crate::passes::batch::Hemicubes;
-use crate::passes::buffers::{SceneBuffers, State, download};
-use crate::passes::relief_buffers::ReliefBuffers;
+use crate::mesh::sources;
+use crate::passes::buffers::download;
 use crate::passes::types::{CouplingTarget, Reflected, Slot};
 use crate::scene::{PointLight, Scene};
 use crate::vk::Device;
@@ -49,19 +45,19 @@ use crate::vk::Device;
 pub use ambient::Ambient;
 pub use devices::{check_devices, open_devices};
 pub use look::ItemPicture;
+pub use problem::Problem;
 pub use progress::Update;
 use progress::{Bound, Watch};
 pub use relief_light::ReliefLight;
 pub use report::{Report, Seconds, Skipped, StopReason};
 pub use rows::Stages;
-use scene_parts::SceneParts;
 pub use self_test::{choose_device, ids_come_back_right, open_device};
 pub use settings::{
     COUPLING_MEMORY, EMITTER_SCALE, EmitterShadows, Estimator, HEMICUBE_RANGE, Settings,
     VISIBILITY_MEMORY,
 };
 use shots::Shots;
-use spine::{On, Spine, SpineSize};
+use spine::Spine;
 pub use visibility::Visibility;
 
 /// Irradiance and radiosity, `[element]` in internal order, W·m⁻², RGB.
@@ -76,15 +72,8 @@ pub struct Light {
 /// A scene on the device with its solution under way.
 pub struct Solver {
     device: Arc<Device>,
-    settings: Settings,
-    pub elements: Elements,
-    pub sources: Sources,
-    pub connections: Connections,
-    pub occluders: Occluders,
+    pub problem: Problem,
     method: Method,
-    scene: SceneBuffers,
-    state: State,
-    relief: Option<ReliefBuffers>,
     report: Report,
     bound: Bound,
 }
@@ -94,30 +83,6 @@ pub struct Solver {
 enum Method {
     Rows(Spine),
     Shots(Shots),
-}
-
-/// What a solver's method needs of it, borrowed beside the method.
-macro_rules! parts {
-    ($solver:ident) => {
-        SceneParts {
-            elements: &$solver.elements,
-            sources: &$solver.sources,
-            connections: &$solver.connections,
-            occluders: &$solver.occluders,
-        }
-    };
-}
-
-macro_rules! on {
-    ($solver:ident, $parts:expr) => {
-        On {
-            settings: &$solver.settings,
-            parts: $parts,
-            scene: &$solver.scene,
-            state: &$solver.state,
-            relief: $solver.relief.as_ref(),
-        }
-    };
 }
 
 impl Solver {
@@ -156,7 +121,7 @@ impl Solver {
     /// No device, or several for what one alone can do; see [`check_devices`].
     pub fn on_devices(
         devices: &[Arc<Device>],
-        mut elements: Elements,
+        elements: Elements,
         lights: &[PointLight],
         settings: &Settings,
         kept: Option<&Visibility>,
@@ -164,77 +129,22 @@ impl Solver {
         settings.check()?;
         let device = check_devices(devices, settings)?;
         let start = Instant::now();
-        let (sources, connections) = group(&mut elements, lights, settings, kept)?;
-        let occluders = match settings.estimator {
-            Estimator::Receiver if settings.merging => Occluders::merged(&elements, &connections),
-            _ => Occluders::elements(&elements),
-        };
-        let parts = SceneParts {
-            elements: &elements,
-            sources: &sources,
-            connections: &connections,
-            occluders: &occluders,
-        };
-        let scene = parts.buffers(device)?;
-        let state = State::new(device, &scene)?;
-        let wanted = settings.batch.clamp(1, scene.source_count.max(1));
-        let slots = Hemicubes::fitting_slots(device, &scene, settings.hemicube, wanted);
-        let shoots = settings.estimator == Estimator::Pixel && elements.relief.is_some();
-        let relief = elements
-            .relief
-            .as_ref()
-            .map(|relief| {
-                let by_pixel = shoots && relief.texels.is_some();
-                let slots = shoots.then_some(slots);
-                ReliefBuffers::new(device, &elements, relief, &sources, slots, by_pixel)
-            })
-            .transpose()?;
-        let emitted = sources
-            .list
-            .iter()
-            .map(sources::Source::emitted_power)
-            .sum();
-        let bound = Bound::new(&elements, emitted);
-        let on = On {
-            settings,
-            parts: &parts,
-            scene: &scene,
-            state: &state,
-            relief: relief.as_ref(),
-        };
-        let method = match (&relief, shoots) {
-            (Some(relief), true) => Method::Shots(Shots::new(device, on, relief, bound)?),
-            _ => {
-                let most = VISIBILITY_MEMORY.min(device.limits().heap_bytes / 3);
-                let size = SpineSize {
-                    memory: settings.visibility_memory.unwrap_or(most),
-                    slots,
-                    most_missing: bound.most_missing(settings.residual),
-                    importance: bound.importance(),
-                };
-                Method::Rows(Spine::new(devices, on, size, kept)?)
+        let problem = Problem::new(device, elements, lights, settings, kept)?;
+        let list = problem.sources.list.iter();
+        let emitted = list.map(sources::Source::emitted_power).sum();
+        let bound = Bound::new(&problem.elements, emitted);
+        let method = match &problem.relief {
+            Some(relief) if settings.estimator == Estimator::Pixel => {
+                Method::Shots(Shots::new(device, &problem, relief, bound)?)
             }
+            _ => Method::Rows(Spine::new(devices, &problem, bound, kept)?),
         };
-        let mut report = Report::new(devices, settings, &elements, &sources, slots);
-        report.set_meshlets(scene.meshlet_count);
-        let least = sources::least_strong(&sources.list, &settings.grouping);
-        let power = sources::Source::emitted_power;
-        if least > 0.0 && sources.list.iter().any(|source| power(source) >= least) {
-            report.emitter_hemicube = rows::emitter_face(device, settings);
-        }
-        report.skipped.triangles_merged = (elements.len() - occluders.len()) as u64;
+        let mut report = Report::new(devices, &problem);
         report.seconds.setup = start.elapsed().as_secs_f64();
         Ok(Self {
             device: Arc::clone(device),
-            settings: settings.clone(),
-            elements,
-            sources,
-            connections,
-            occluders,
+            problem,
             method,
-            scene,
-            state,
-            relief,
             report,
             bound,
         })
@@ -250,10 +160,8 @@ impl Solver {
     /// Brings to the elements what has been solved by [`Self::turn`].
     pub fn gather(&mut self) -> Result<()> {
         let start = Instant::now();
-        let parts = parts!(self);
-        let on = on!(self, &parts);
         if let Method::Rows(spine) = &mut self.method {
-            spine.gather_solved(on, &mut self.report)?;
+            spine.gather_kept(false, &mut self.report)?;
         }
         self.report.seconds.solve_wall += start.elapsed().as_secs_f64();
         Ok(())
@@ -263,10 +171,8 @@ impl Solver {
     /// solved since the last time until [`Self::gather`].
     pub fn turn(&mut self, mut go_on: impl FnMut(&Update) -> bool) -> Result<()> {
         let start = Instant::now();
-        let sources = self.scene.source_count;
-        let mut watch = Watch::new(&self.settings, self.bound, sources, &mut go_on);
-        let parts = parts!(self);
-        let on = on!(self, &parts);
+        let on = &self.problem;
+        let mut watch = Watch::new(on, self.bound, &mut go_on);
         let report = &mut self.report;
         let (unshot, missing) = match &mut self.method {
             Method::Rows(spine) => {
@@ -283,7 +189,7 @@ impl Solver {
         report.unshot_share = self.bound.share(unshot);
         report.error_bound = self.bound.of(missing);
         report.seconds.solve_wall += start.elapsed().as_secs_f64();
-        if let Some(relief) = &self.relief {
+        if let Some(relief) = &on.relief {
             let sources = relief.source_count as usize;
             let dark: Vec<u32> = download(&self.device, &relief.dark_slots, sources)?;
             report.skipped.dark_slots = dark.iter().map(|&d| u64::from(d)).sum();
@@ -293,20 +199,23 @@ impl Solver {
 
     /// What has been solved so far.
     pub fn light(&self) -> Result<Light> {
-        let count = self.elements.len();
-        let direct: Vec<Vec3> = download(&self.device, &self.state.direct, count)?;
-        let indirect: Vec<Vec3> = download(&self.device, &self.state.indirect, count)?;
+        let Problem {
+            elements, state, ..
+        } = &self.problem;
+        let count = elements.len();
+        let direct: Vec<Vec3> = download(&self.device, &state.direct, count)?;
+        let indirect: Vec<Vec3> = download(&self.device, &state.indirect, count)?;
         let irradiance: Vec<Vec3> = direct.iter().zip(&indirect).map(|(d, i)| d + i).collect();
         let mut radiosity: Vec<Vec3> = (0..count)
-            .map(|e| self.elements.emitted[e] + self.elements.reflectance[e] * irradiance[e])
+            .map(|e| elements.emitted[e] + elements.reflectance[e] * irradiance[e])
             .collect();
-        let relief = match (&self.relief, &self.elements.relief) {
+        let relief = match (&self.problem.relief, &elements.relief) {
             (Some(buffers), Some(relief)) => {
-                let light = ReliefLight::download(&self.device, &self.elements, relief, buffers)?;
+                let light = ReliefLight::download(&self.device, elements, relief, buffers)?;
                 let reflected: Vec<Reflected> =
                     download(&self.device, &buffers.reflected, light.elements.len())?;
                 for (&e, reflected) in light.elements.iter().zip(&reflected) {
-                    radiosity[e as usize] = self.elements.emitted[e as usize] + reflected.sum;
+                    radiosity[e as usize] = elements.emitted[e as usize] + reflected.sum;
                 }
                 Some(light)
             }
@@ -337,7 +246,7 @@ impl Solver {
             chunks,
             chunk_words: spine.kept.chunk_words,
         };
-        Ok(Some(Visibility::new(scene, &self.settings, kept)))
+        Ok(Some(Visibility::new(scene, &self.problem.settings, kept)))
     }
 
     /// Draws sources, no more than fit a batch, without taking them into the solution: for
@@ -346,8 +255,7 @@ impl Solver {
     /// # Panics
     /// Of the `pixel` estimator in a scene with relief, which makes no rows.
     pub fn draw(&mut self, sources: &[u32]) -> Result<DrawnBatch> {
-        let parts = parts!(self);
-        let on = on!(self, &parts);
+        let on = &self.problem;
         match &mut self.method {
             Method::Rows(spine) => spine.draw_alone(on, sources),
             Method::Shots(_) => panic!("the pixel estimator makes no rows in a scene with relief"),
@@ -378,7 +286,7 @@ impl Solver {
     /// The last sources that were gathered and what each sent, with what those with a relief sent
     /// by direction; for comparison with the pass's twin. None without relief.
     pub fn relief_exits(&self, count: usize) -> Result<Option<ReliefExits>> {
-        let Some(relief) = &self.relief else {
+        let Some(relief) = &self.problem.relief else {
             return Ok(None);
         };
         let k = relief.directions.count();
@@ -413,24 +321,6 @@ pub struct DrawnBatch {
     pub facing_away: Vec<u32>,
     /// `[source][word]`; see [`Solver::coupling_targets`].
     pub coupling: Vec<Vec<f32>>,
-}
-
-/// Groups the elements into sources: as they were when `kept` was made, if it is given.
-fn group(
-    elements: &mut Elements,
-    lights: &[PointLight],
-    settings: &Settings,
-    kept: Option<&Visibility>,
-) -> Result<(Sources, Connections)> {
-    let (grouping, seed) = (&settings.grouping, settings.seed);
-    let Some(kept) = kept else {
-        return Ok(sources::build(elements, lights, grouping, seed));
-    };
-    let now = elements.emitted_by_material(&kept.emitted());
-    let (mut sources, connections) = sources::build(elements, &kept.lights(), grouping, seed);
-    elements.emitted_by_material(&now);
-    sources.relight(elements, lights, seed)?;
-    Ok((sources, connections))
 }
 
 /// See [`Solver::relief_exits`]; radiosity πL, RGB, W·m⁻².

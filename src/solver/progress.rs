@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::{Settings, StopReason};
+use super::{Problem, StopReason};
 use crate::mesh::elements::Elements;
 
 /// How far a solution has come.
@@ -82,18 +82,13 @@ pub(super) struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    pub fn new(
-        settings: &Settings,
-        bound: Bound,
-        sources: u32,
-        go_on: &'a mut dyn FnMut(&Update) -> bool,
-    ) -> Self {
+    pub fn new(problem: &Problem, bound: Bound, go_on: &'a mut dyn FnMut(&Update) -> bool) -> Self {
         Self {
             start: Instant::now(),
-            budget: settings.budget.unwrap_or(Duration::MAX),
+            budget: problem.settings.budget.unwrap_or(Duration::MAX),
             bound,
-            residual: settings.residual,
-            sources,
+            residual: problem.settings.residual,
+            sources: problem.scene.source_count,
             history: Vec::new(),
             go_on,
             stop: None,

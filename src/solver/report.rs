@@ -4,10 +4,8 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::rows::{Row, Stages};
-use super::{Estimator, Settings};
-use crate::mesh::elements::Elements;
-use crate::mesh::sources::Sources;
+use super::rows::{Row, Stages, emitter_face};
+use super::{Estimator, Problem};
 use crate::meso::{Class, Relief, Transport};
 use crate::passes::cull::Culling;
 use crate::vk::Device;
@@ -134,13 +132,14 @@ impl ReliefReport {
 }
 
 impl Report {
-    pub(super) fn new(
-        devices: &[Arc<Device>],
-        settings: &Settings,
-        elements: &Elements,
-        sources: &Sources,
-        batch: u32,
-    ) -> Self {
+    pub(super) fn new(devices: &[Arc<Device>], problem: &Problem) -> Self {
+        let Problem {
+            settings,
+            elements,
+            sources,
+            ..
+        } = problem;
+        let strong = problem.strong().contains(&true);
         let mut names = devices.iter().map(|device| device.name().to_owned());
         Self {
             device: names.next().unwrap_or_default(),
@@ -150,10 +149,13 @@ impl Report {
                 Estimator::Pixel => "pixel",
             },
             hemicube: settings.hemicube,
-            emitter_hemicube: settings.hemicube,
+            emitter_hemicube: match strong {
+                true => emitter_face(&devices[0], settings),
+                false => settings.hemicube,
+            },
             elements: elements.len() as u64,
             sources: sources.list.len() as u64,
-            batch,
+            batch: problem.slots,
             hemicubes: 0,
             emitter_hemicubes: 0,
             emitters_by_rays: 0,
@@ -170,16 +172,13 @@ impl Report {
             seconds: Seconds::default(),
             skipped: Skipped {
                 black_sources: sources.black as u64,
+                triangles_merged: (elements.len() - problem.occluders.len()) as u64,
                 ..Skipped::default()
             },
             relief: elements.relief.as_ref().map(ReliefReport::new),
-            meshlets: 0,
+            meshlets: problem.scene.meshlet_count.into(),
             culls: settings.culling != Culling::Off,
         }
-    }
-
-    pub(super) fn set_meshlets(&mut self, meshlets: u32) {
-        self.meshlets = u64::from(meshlets);
     }
 
     pub(super) fn add_stages(&mut self, stages: Stages) {

@@ -5,16 +5,14 @@ use std::collections::VecDeque;
 use std::ops::AddAssign;
 use std::sync::Arc;
 
-use glam::Vec3;
-
 use super::drawing::{Drawing, read_items};
 use super::estimate::Evaluate;
 use super::{EmitterShadows, Settings};
-use crate::constants::{FACES, NONE};
+use crate::constants::FACES;
 use crate::error::Result;
 use crate::passes::batch::{Batch, Sight};
 use crate::passes::buffers::SceneBuffers;
-use crate::passes::couple::{self, Couple};
+use crate::passes::couple::Couple;
 use crate::passes::fresh_rows::FreshRows;
 use crate::passes::keep::Keep;
 use crate::passes::kept_rows::KeptRows;
@@ -141,19 +139,12 @@ impl RowMaker {
                 )
             }
         };
-        let evaluate = Evaluate::new(device, settings, scene, parts.meso, &batch)?;
-        let evaluated = evaluate.bind(device, scene, &batch, fresh, parts.meso)?;
-        let couple = Couple::new(device)?;
-        let coupled = couple.bind(device, scene, &batch, fresh, parts.targets)?;
-        let keep = match parts.kept {
-            Some(kept) => {
-                let keep = Keep::new(device)?;
-                let bound = keep.bind(device, &batch.slots, batch.slot_count, fresh, kept)?;
-                Some((keep, bound))
-            }
-            None => None,
-        };
-        let layout = Layout::new(&batch, &coupled, parts);
+        let evaluate = Evaluate::new(device, settings, scene, parts.meso, &batch, fresh)?;
+        let couple = Couple::new(device, scene, &batch, fresh, parts.targets)?;
+        let keep = (parts.kept)
+            .map(|kept| Keep::new(device, &batch.slots, fresh, kept))
+            .transpose()?;
+        let layout = Layout::new(&batch, couple.word_count(), parts);
         let make = |name, bytes, usage| {
             let buffer = || Buffer::new(device, name, bytes, usage);
             Ok::<_, crate::error::Error>([buffer()?, buffer()?])
@@ -179,16 +170,16 @@ impl RowMaker {
                     None => cmd.timestamp(stamps, 1),
                 }
                 cmd.timestamp(stamps, 2);
-                evaluate.record(cmd, &evaluated, &batch, fresh);
+                evaluate.record(cmd);
                 cmd.timestamp(stamps, 3);
-                couple.record(cmd, &coupled, &batch, fresh);
-                if let (Some((keep, bound)), Some(kept)) = (&keep, parts.kept) {
-                    keep.record(cmd, bound, kept, i as u32);
+                couple.record(cmd);
+                if let Some(keep) = &keep {
+                    keep.record(cmd, i as u32);
                 }
                 cmd.timestamp(stamps, 4);
                 cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
-                let rows = keep.as_ref().map(|(_, bound)| &bound.rows);
-                layout.record(cmd, &batch, fresh, &coupled, rows, &readback[i]);
+                let rows = keep.as_ref().map(|keep| &keep.rows);
+                layout.record(cmd, &batch, fresh, &couple.coupling, rows, &readback[i]);
                 cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
                 Ok(())
             })
@@ -214,13 +205,10 @@ impl RowMaker {
     /// Begins a batch; two may be under way.
     pub fn submit(&mut self, sources: &[u32]) -> Result<()> {
         assert!(sources.len() <= self.slots() && self.asked.len() < SETS);
-        let slot = |i: usize| Slot {
-            emitted: Vec3::ZERO,
-            source: sources.get(i).copied().unwrap_or(NONE),
-            reflected: Vec3::ZERO,
-            scale: 1.0,
-        };
-        let slots: Vec<Slot> = (0..self.slots()).map(slot).collect();
+        let mut slots = vec![Slot::EMPTY; self.slots()];
+        for (slot, &source) in slots.iter_mut().zip(sources) {
+            *slot = Slot::of(source);
+        }
         self.wanted[self.next].write(0, &slots);
         self.commands[self.next].submit()?;
         self.asked.push_back(sources.to_vec());
@@ -305,7 +293,7 @@ const MESO: usize = 6;
 const OCCUPIED: usize = 7;
 
 impl Layout {
-    fn new(batch: &Batch, coupled: &couple::Bound, parts: &RowParts<'_>) -> Self {
+    fn new(batch: &Batch, coupling_words: u32, parts: &RowParts<'_>) -> Self {
         let kept = parts.kept.is_some();
         let drawn = matches!(batch.sight, Sight::Hemicubes(_));
         let shape = parts.fresh.shape;
@@ -313,7 +301,7 @@ impl Layout {
         let sizes = [
             size_of::<Slot>() as u64,
             only(kept, size_of::<KeptRow>() as u64),
-            4 * u64::from(coupled.word_count),
+            4 * u64::from(coupling_words),
             only(drawn, u64::from(FACES) * size_of::<[u32; 3]>() as u64),
             4,
             only(!kept, 4 * u64::from(shape.plain_count)),
@@ -339,7 +327,7 @@ impl Layout {
         cmd: &Commands,
         batch: &Batch,
         fresh: &FreshRows,
-        coupled: &couple::Bound,
+        coupling: &Buffer,
         rows: Option<&Buffer>,
         to: &Buffer,
     ) {
@@ -351,7 +339,7 @@ impl Layout {
         if let Some(rows) = rows {
             copy(ROW, rows);
         }
-        copy(COUPLING, &coupled.coupling);
+        copy(COUPLING, coupling);
         if let Sight::Hemicubes(hemicubes) = &batch.sight {
             copy(COUNTS, &hemicubes.counts);
         }

@@ -13,7 +13,8 @@ use crate::mesh::occluders::Occluders;
 use crate::mesh::sources;
 use crate::passes::batch::BatchSize;
 use crate::passes::buffers::SceneBuffers;
-use crate::scene::{Material, Scene, Triangle};
+use crate::scene::Scene;
+use crate::scene::shapes::Shapes;
 use crate::vk::{Candidate, Device, Instance};
 
 /// Opens the device asked for, by index or part of its name, or else the best one that can run this
@@ -103,44 +104,27 @@ pub fn ids_come_back_right(device: &Arc<Device>) -> Result<bool> {
     .is_empty())
 }
 
-/// Five walls of a box, an emitter in the floor, and a triangle afloat.
+/// Five walls of a box, an emitter in the floor, and a triangle afloat. Walls are wound to face
+/// inward or outward alike: both sides block light.
 fn open_box() -> Scene {
-    let mut scene = Scene {
-        materials: vec![
-            Material {
-                name: "wall".into(),
-                kd: [0.5; 3],
-                ..Material::default()
-            },
-            Material {
-                name: "light".into(),
-                ke: [1.0; 3],
-                ..Material::default()
-            },
-        ],
-        ..Scene::default()
-    };
-    let mut add = |corners: [[f64; 3]; 3], material| {
-        let first = scene.vertices.len() as u32;
-        scene.vertices.extend(corners.map(DVec3::from_array));
-        scene.triangles.push(Triangle {
-            vertices: [first, first + 1, first + 2],
-            uv: [[0.0; 2]; 3],
-            material,
-        });
-    };
-    add([[0.3, 0.3, 0.0], [0.7, 0.35, 0.0], [0.5, 0.6, 0.0]], 1);
-    add([[0.2, 0.3, 0.6], [0.5, 0.8, 0.7], [0.6, 0.2, 0.5]], 0);
-    // Walls as two triangles each, wound to face inward or outward alike: both sides block light.
-    for (a, b, c, d) in [
-        ([0., 0., 1.], [1., 0., 1.], [1., 1., 1.], [0., 1., 1.]),
-        ([0., 0., 0.], [1., 0., 0.], [1., 0., 1.], [0., 0., 1.]),
-        ([0., 1., 0.], [0., 1., 1.], [1., 1., 1.], [1., 1., 0.]),
-        ([0., 0., 0.], [0., 0., 1.], [0., 1., 1.], [0., 1., 0.]),
-        ([1., 0., 0.], [1., 1., 0.], [1., 1., 1.], [1., 0., 1.]),
+    let mut shapes = Shapes::new();
+    let (wall, light) = (shapes.material(0.5, 0.0), shapes.material(0.0, 1.0));
+    for (corners, material) in [
+        ([[0.3, 0.3, 0.0], [0.7, 0.35, 0.0], [0.5, 0.6, 0.0]], light),
+        ([[0.2, 0.3, 0.6], [0.5, 0.8, 0.7], [0.6, 0.2, 0.5]], wall),
     ] {
-        add([a, b, c], 0);
-        add([a, c, d], 0);
+        let corners = corners.map(|corner| shapes.vertex(DVec3::from_array(corner)));
+        shapes.triangle(corners, material);
     }
-    scene
+    let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+    for (origin, u, v) in [
+        (z, x, y),
+        (y, z, x),
+        (DVec3::ZERO, x, z),
+        (DVec3::ZERO, z, y),
+        (x, y, z),
+    ] {
+        shapes.quad(origin, u, v, (1, 1), wall);
+    }
+    shapes.scene
 }

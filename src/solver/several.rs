@@ -5,14 +5,11 @@ use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::thread::{self, JoinHandle};
 
-use glam::Vec3;
-
 use super::rows::{FactorWords, Factors, Made, Row, Stages};
 use super::team::{Batch, Makers, TeamParts};
 use crate::error::{Error, Result};
-use crate::passes::buffers::SceneBuffers;
 use crate::passes::fresh_rows::FreshRows;
-use crate::passes::keep::{self, Keep};
+use crate::passes::keep::Keep;
 use crate::passes::kept_rows::{KeptRows, SCRATCH};
 use crate::passes::types::{KeptRow, Slot};
 use crate::vk::{Buffer, BufferUse, Commands, Device, Stage};
@@ -27,13 +24,8 @@ pub(super) struct Several {
 }
 
 impl Several {
-    /// `scene`: the buffers of the first device, which also keeps the rows.
-    pub fn new(
-        devices: &[Arc<Device>],
-        parts: TeamParts<'_>,
-        scene: &SceneBuffers,
-        kept: &KeptRows,
-    ) -> Result<Self> {
+    pub fn new(devices: &[Arc<Device>], parts: TeamParts<'_>, kept: &KeptRows) -> Result<Self> {
+        let problem = parts.problem;
         let board = Arc::new(Board::default());
         let workers = thread::scope(|scope| {
             let make = |(i, device): (usize, &Arc<Device>)| {
@@ -41,10 +33,10 @@ impl Several {
                 let board = Arc::clone(&board);
                 scope.spawn(move || {
                     if i == 0 {
-                        let makers = Makers::new(&device, parts, scene, None)?;
+                        let makers = Makers::new(&device, parts, &problem.scene, None)?;
                         return Ok(Worker::start(board, makers));
                     }
-                    let scene = parts.scene.buffers(&device)?;
+                    let scene = problem.buffers(&device)?;
                     let makers = Makers::new(&device, parts, &scene, None)?;
                     Ok::<_, Error>(Worker::start(board, makers))
                 })
@@ -57,13 +49,13 @@ impl Several {
                 })
                 .collect::<Result<Vec<_>>>()
         })?;
-        let share = (parts.slots as usize).div_ceil(2 * devices.len());
+        let share = (problem.slots as usize).div_ceil(2 * devices.len());
         board.notes().share = share.max(1);
         Ok(Self {
             board,
             _workers: workers,
             under_way: VecDeque::new(),
-            keeper: Keeper::new(&devices[0], kept, parts.slots)?,
+            keeper: Keeper::new(&devices[0], kept, problem.slots)?,
             turn: 0,
         })
     }
@@ -110,7 +102,6 @@ impl Drop for Several {
 struct Keeper {
     device: Arc<Device>,
     keep: Keep,
-    bound: keep::Bound,
     fresh: FreshRows,
     slots_buffer: Buffer,
     upload: Buffer,
@@ -123,8 +114,7 @@ impl Keeper {
         let fresh = FreshRows::new(device, kept.shape, slots, false)?;
         let slot_bytes = u64::from(slots) * size_of::<Slot>() as u64;
         let slots_buffer = Buffer::new(device, "slots", slot_bytes, BufferUse::Storage)?;
-        let keep = Keep::new(device)?;
-        let bound = keep.bind(device, &slots_buffer, slots, &fresh, kept)?;
+        let keep = Keep::new(device, &slots_buffer, &fresh, kept)?;
         let row_bytes = u64::from(slots) * size_of::<KeptRow>() as u64;
         let parts = [&fresh.plain, &fresh.meso, &fresh.occupied];
         let bytes = slot_bytes + parts.iter().map(|part| part.bytes()).sum::<u64>();
@@ -133,7 +123,6 @@ impl Keeper {
             readback: Buffer::new(device, "rows of a batch", row_bytes, BufferUse::Readback)?,
             device: Arc::clone(device),
             keep,
-            bound,
             fresh,
             slots_buffer,
             slots: slots as usize,
@@ -143,13 +132,11 @@ impl Keeper {
     /// Brings rows to the device and keeps them, in their order.
     fn keep(&mut self, kept: &KeptRows, rows: &mut [Row], scratch: u32) -> Result<()> {
         let shape = kept.shape;
-        let slot = |i: usize| Slot {
-            emitted: Vec3::ZERO,
-            source: rows.get(i).map_or(crate::constants::NONE, |row| row.source),
-            reflected: Vec3::ZERO,
-            scale: rows.get(i).map_or(1.0, |row| row.scale),
-        };
-        let slots: Vec<Slot> = (0..self.slots).map(slot).collect();
+        let mut slots = vec![Slot::EMPTY; self.slots];
+        for (slot, row) in slots.iter_mut().zip(rows.iter()) {
+            *slot = Slot::of(row.source);
+            slot.scale = row.scale;
+        }
         self.upload.write(0, &slots);
         let plain_at = size_of_val(&slots[..]) as u64;
         let meso_at = plain_at + self.fresh.plain.bytes();
@@ -180,10 +167,10 @@ impl Keeper {
                 cmd.copy(&self.upload, at, to, 0, 4 * count * size);
             }
             cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
-            self.keep.record(cmd, &self.bound, kept, scratch);
+            self.keep.record(cmd, scratch);
             cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
-            let bytes = self.readback.bytes().min(self.bound.rows.bytes());
-            cmd.copy(&self.bound.rows, 0, &self.readback, 0, bytes);
+            let bytes = self.readback.bytes().min(self.keep.rows.bytes());
+            cmd.copy(&self.keep.rows, 0, &self.readback, 0, bytes);
             cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
             Ok(())
         })?;

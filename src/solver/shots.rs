@@ -9,11 +9,10 @@ use glam::{DVec3, Vec3};
 use super::drawing::{Drawing, read_items};
 use super::progress::{Bound, Watch};
 use super::rows::{Looks, Stages, emitter_looks};
-use super::spine::On;
-use super::{Report, StopReason};
-use crate::constants::{FACES, KIND_POINT, NONE};
+use super::{Problem, Report, StopReason};
+use crate::constants::{FACES, KIND_POINT};
 use crate::error::Result;
-use crate::mesh::sources::least_strong;
+use crate::mesh::sources::Source;
 use crate::passes::batch::Batch;
 use crate::passes::buffers::{State, download};
 use crate::passes::measure::Measure;
@@ -57,25 +56,21 @@ impl Shots {
     /// In a scene with `relief`.
     pub fn new(
         device: &Arc<Device>,
-        on: On<'_>,
+        on: &Problem,
         relief: &ReliefBuffers,
         bound: Bound,
     ) -> Result<Self> {
-        let measure = Measure::new(device)?;
-        let measure_relief = MeasureRelief::new(device)?;
-        let set = measure.bind(on.scene, on.state)?;
-        let relief_set = measure_relief.bind(on.scene, on.state, relief)?;
+        let measure = Measure::new(device, &on.scene, &on.state)?;
+        let measure_relief = MeasureRelief::new(device, &on.scene, &on.state, relief)?;
         let measuring = Commands::record(device, "measure", |cmd| {
             cmd.barrier(&[Stage::Compute, Stage::Transfer], &[Stage::Compute]);
-            measure.record(cmd, &set, on.scene.source_count);
+            measure.record(cmd);
             cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-            measure_relief.record(cmd, &relief_set, relief);
+            measure_relief.record(cmd);
             Ok(())
         })?;
-        let list = &on.parts.sources.list;
-        let least = least_strong(list, &on.settings.grouping);
-        let shot = |source: &crate::mesh::sources::Source| Shot {
-            strong: least > 0.0 && source.emitted_power() >= least,
+        let shot = |(source, strong): (&Source, bool)| Shot {
+            strong,
             emitted: source.emitted.as_dvec3(),
             area: match source.kind {
                 KIND_POINT => std::f64::consts::TAU,
@@ -84,10 +79,11 @@ impl Shots {
             emission_shot: false,
             reflected: DVec3::ZERO,
         };
-        let sources: Vec<Shot> = list.iter().map(shot).collect();
+        let list = on.sources.list.iter().zip(on.strong());
+        let sources: Vec<Shot> = list.map(shot).collect();
         let any_strong = sources.iter().any(|s| s.strong);
         let looks = match any_strong {
-            true => emitter_looks(device, on.settings, || on.parts.shadow_occluders()),
+            true => emitter_looks(device, &on.settings, || on.shadow_occluders()),
             false => None,
         };
         let emitters = match looks {
@@ -110,7 +106,7 @@ impl Shots {
     }
 
     /// Shoots until little is left or the watch says stop.
-    pub fn run(&mut self, on: On<'_>, report: &mut Report, watch: &mut Watch<'_>) -> Result<()> {
+    pub fn run(&mut self, on: &Problem, report: &mut Report, watch: &mut Watch<'_>) -> Result<()> {
         let limit = on.settings.shots.unwrap_or(u32::MAX);
         loop {
             let reflected = self.measure(on)?;
@@ -144,7 +140,7 @@ impl Shots {
     }
 
     /// Radiosity that each source reflects by now.
-    fn measure(&mut self, on: On<'_>) -> Result<Vec<DVec3>> {
+    fn measure(&mut self, on: &Problem) -> Result<Vec<DVec3>> {
         self.measuring.submit()?;
         self.measuring.wait()?;
         let count = self.sources.len();
@@ -181,7 +177,7 @@ impl Shots {
     }
 
     /// Unshot power after the last run.
-    pub fn left(&mut self, on: On<'_>) -> Result<f64> {
+    pub fn left(&mut self, on: &Problem) -> Result<f64> {
         let reflected = self.measure(on)?;
         Ok(self.unshot(&reflected))
     }
@@ -252,17 +248,15 @@ struct ShotPass {
 impl ShotPass {
     fn new(
         device: &Arc<Device>,
-        on: On<'_>,
+        on: &Problem,
         relief: &ReliefBuffers,
         slots: u32,
         face: u32,
     ) -> Result<Self> {
-        let size = Drawing::fitting(device, on.scene, on.settings, slots, face);
-        let (drawing, batch) = Drawing::new(device, on.scene, on.settings.culling, &size)?;
-        let send = SendRelief::new(device)?;
-        let send_set = send.bind(on.scene, &batch.slots, relief)?;
-        let pixels = PixelsRelief::new(device)?;
-        let bound = pixels.bind(device, on.scene, on.state, &batch, relief)?;
+        let size = Drawing::fitting(device, &on.scene, &on.settings, slots, face);
+        let (drawing, batch) = Drawing::new(device, &on.scene, on.settings.culling, &size)?;
+        let send = SendRelief::new(device, &on.scene, &batch.slots, relief)?;
+        let pixels = PixelsRelief::new(device, &on.scene, &on.state, &batch, relief)?;
         let counts = &batch.hemicubes().counts;
         let bytes = u64::from(batch.slot_count) * size_of::<Slot>() as u64;
         let wanted = Buffer::new(device, "shots", bytes, BufferUse::Upload)?;
@@ -275,11 +269,11 @@ impl ShotPass {
             cmd.copy(&wanted, 0, &batch.slots, 0, bytes);
             cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
             cmd.timestamp(&timestamps, 0);
-            send.record(cmd, &send_set, relief, 0..batch.slot_count);
+            send.record(cmd, 0..batch.slot_count);
             cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-            drawing.record(cmd, on.scene, &batch, || cmd.timestamp(&timestamps, 1));
+            drawing.record(cmd, &on.scene, &batch, || cmd.timestamp(&timestamps, 1));
             cmd.timestamp(&timestamps, 2);
-            pixels.record(cmd, &bound, relief, &batch);
+            pixels.record(cmd, relief, &batch);
             cmd.timestamp(&timestamps, 3);
             cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
             cmd.copy(counts, 0, &readback, 0, counts.bytes());
@@ -301,13 +295,7 @@ impl ShotPass {
 
     /// How long it took, and the counts of each face.
     fn run(&mut self, slots: &[Slot]) -> Result<(Stages, Vec<[u32; 3]>)> {
-        let none = Slot {
-            emitted: Vec3::ZERO,
-            source: NONE,
-            reflected: Vec3::ZERO,
-            scale: 1.0,
-        };
-        let mut all = vec![none; self.slots()];
+        let mut all = vec![Slot::EMPTY; self.slots()];
         all[..slots.len()].copy_from_slice(slots);
         self.wanted.write(0, &all);
         self.commands.submit()?;

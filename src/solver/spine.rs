@@ -10,22 +10,19 @@ use std::time::Instant;
 use glam::DVec3;
 
 use super::coupling::{CouplingRow, Targets};
-use super::gather::{Gathering, Lit, LitRow};
+use super::gather::{Gathering, LitRow};
 use super::ledger::{Candidates, Drawn, Ledger};
-use super::progress::Watch;
+use super::progress::{Bound, Watch};
 use super::rows::{Factors, Made, looks_closer};
-use super::scene_parts::SceneParts;
 use super::system::System;
 use super::team::{Batch, Team, TeamParts};
 use super::visibility::Visibility;
-use super::{DrawnBatch, Report, Settings, StopReason};
+use super::{DrawnBatch, Problem, Report, StopReason, VISIBILITY_MEMORY};
 use crate::constants::KIND_POINT;
 use crate::error::Result;
-use crate::mesh::sources::least_strong;
-use crate::passes::buffers::{SceneBuffers, State};
 use crate::passes::fresh_rows::RowShape;
 use crate::passes::kept_rows::{KeptRows, KeptSize};
-use crate::passes::relief_buffers::{ReliefBuffers, meso_elements};
+use crate::passes::relief_buffers::meso_elements;
 use crate::vk::Device;
 
 /// A solution under way.
@@ -36,31 +33,6 @@ pub(super) struct Spine {
     pub ledger: Ledger,
     pub kept: KeptRows,
     gathering: Gathering,
-    /// Sources of a batch.
-    slots: u32,
-}
-
-/// What a solution is made for.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct SpineSize {
-    /// Bytes for kept rows, at most.
-    pub memory: u64,
-    /// Sources of a batch.
-    pub slots: u32,
-    /// Missing power at which the solution is done, internal units.
-    pub most_missing: f64,
-    /// What a unit of unshot power can turn into at most.
-    pub importance: f64,
-}
-
-/// What a solution is of, and where its light lies.
-#[derive(Clone, Copy)]
-pub(super) struct On<'a> {
-    pub settings: &'a Settings,
-    pub parts: &'a SceneParts<'a>,
-    pub scene: &'a SceneBuffers,
-    pub state: &'a State,
-    pub relief: Option<&'a ReliefBuffers>,
 }
 
 /// What is drawn.
@@ -96,30 +68,31 @@ impl Spine {
     /// With the rows of `restored`, which lie behind one another in the order of the sources.
     pub fn new(
         devices: &[Arc<Device>],
-        on: On<'_>,
-        size: SpineSize,
+        on: &Problem,
+        bound: Bound,
         restored: Option<&Visibility>,
     ) -> Result<Self> {
         let device = &devices[0];
-        let shape = RowShape::new(on.scene, on.relief.map_or(0, |r| r.element_count));
+        let relief = on.relief.as_ref();
+        let shape = RowShape::new(&on.scene, relief.map_or(0, |r| r.element_count));
+        let most = VISIBILITY_MEMORY.min(device.limits().heap_bytes / 3);
         let kept_size = KeptSize {
-            memory: size.memory,
+            memory: on.settings.visibility_memory.unwrap_or(most),
             sources: on.scene.source_count,
-            slots: size.slots,
+            slots: on.slots,
         };
         let kept = KeptRows::new(device, shape, kept_size, restored.map(Visibility::size))?;
-        let list = &on.parts.sources.list;
-        let targets = Targets::new(on.parts.elements, list);
-        let mut system = System::new(targets, list, on.settings.coupling_memory, size.importance);
-        let least = least_strong(list, &on.settings.grouping);
-        let of_relief = &on.parts.sources.relief;
-        let looks = looks_closer(device, on.settings);
-        let drawn = |(s, source): (usize, &crate::mesh::sources::Source)| Drawn {
-            strong: looks && least > 0.0 && source.emitted_power() >= least,
-            relief: of_relief.contains(&s),
+        let list = &on.sources.list;
+        let targets = Targets::new(&on.elements, list);
+        let memory = on.settings.coupling_memory;
+        let mut system = System::new(targets, list, memory, bound.importance());
+        let looks = looks_closer(device, &on.settings);
+        let drawn = |(s, strong): (usize, bool)| Drawn {
+            strong: looks && strong,
+            relief: on.sources.relief.contains(&s),
             ..Drawn::default()
         };
-        let mut sources: Vec<Drawn> = list.iter().enumerate().map(drawn).collect();
+        let mut sources: Vec<Drawn> = on.strong().into_iter().enumerate().map(drawn).collect();
         if let Some(restored) = restored {
             kept.restore(device, restored.state(), &restored.chunks)?;
             for (s, (source, drawn)) in list.iter().zip(&mut sources).enumerate() {
@@ -129,36 +102,28 @@ impl Spine {
                 }
             }
         }
-        let lit = Lit {
-            scene: on.scene,
-            state: on.state,
-            kept: &kept,
-            relief: on.relief,
-        };
-        let most = on.scene.source_count.max(size.slots);
         Ok(Self {
-            gathering: Gathering::new(device, lit, most)?,
+            gathering: Gathering::new(device, on, &kept)?,
             devices: devices.to_vec(),
             team: None,
             ledger: Ledger {
                 system,
                 sources,
-                most_missing: size.most_missing,
-                importance: size.importance,
+                most_missing: bound.most_missing(on.settings.residual),
+                importance: bound.importance(),
             },
             kept,
-            slots: size.slots,
         })
     }
 
     /// Goes on until the solution is done, which the elements have then, or the watch says stop.
-    pub fn run(&mut self, on: On<'_>, report: &mut Report, watch: &mut Watch<'_>) -> Result<()> {
+    pub fn run(&mut self, on: &Problem, report: &mut Report, watch: &mut Watch<'_>) -> Result<()> {
         // Of rows that are restored.
         (0..RESTORED_WEIGHINGS).for_each(|_| self.ledger.system.weigh());
         let mut corrections = 0;
         while self.draw(on, Phase::First, report, watch)? {
             self.solve(UNSOLVED * self.ledger.stop_power(), MOST_SWEEPS, report);
-            self.gather_kept(on, corrections > 0, report)?;
+            self.gather_kept(corrections > 0, report)?;
             if !self.draw(on, Phase::Again, report, watch)? {
                 break;
             }
@@ -167,7 +132,7 @@ impl Spine {
             if on.relief.is_none() && self.ledger.system.is_whole() {
                 break;
             }
-            self.measure(on)?;
+            self.measure()?;
             let left = self.ledger.missing();
             if corrections > u32::from(on.relief.is_some()) && left <= self.ledger.most_missing {
                 break;
@@ -203,15 +168,10 @@ impl Spine {
         Ok(())
     }
 
-    /// Brings to the elements what has been solved and has a row.
-    pub fn gather_solved(&mut self, on: On<'_>, report: &mut Report) -> Result<()> {
-        self.gather_kept(on, false, report)
-    }
-
     /// Draws what the phase asks for. Whether nothing stopped it.
     fn draw(
         &mut self,
-        on: On<'_>,
+        on: &Problem,
         phase: Phase,
         report: &mut Report,
         watch: &mut Watch<'_>,
@@ -225,26 +185,26 @@ impl Spine {
                     team.submit(batch)?;
                 }
             }
-            if !self.take(on, phase, report)? {
+            if !self.take(phase, report)? {
                 return Ok(watch.stop.is_none());
             }
             let (unshot, missing) = (self.ledger.unshot(), self.ledger.missing());
             if !watch.look(report.shots, unshot, missing) {
-                while self.take(on, phase, report)? {}
+                while self.take(phase, report)? {}
                 return Ok(false);
             }
         }
     }
 
     /// Takes in the oldest batch under way. Whether there was one.
-    fn take(&mut self, on: On<'_>, phase: Phase, report: &mut Report) -> Result<bool> {
+    fn take(&mut self, phase: Phase, report: &mut Report) -> Result<bool> {
         let Some(team) = &mut self.team else {
             return Ok(false);
         };
         let Some(made) = team.take(&self.kept)? else {
             return Ok(false);
         };
-        self.take_in(on, made, report)?;
+        self.take_in(made, report)?;
         if phase == Phase::First {
             let undrawn = self.ledger.system.unshot().undrawn;
             let most = ORDERED * undrawn.max(self.ledger.stop_power());
@@ -258,7 +218,7 @@ impl Spine {
     }
 
     /// The sources of the next batch, if one is to be drawn and can begin.
-    fn choose(&mut self, on: On<'_>, phase: Phase, report: &Report) -> Result<Option<Batch>> {
+    fn choose(&mut self, on: &Problem, phase: Phase, report: &Report) -> Result<Option<Batch>> {
         let under_way = self.ledger.sources.iter().filter(|d| d.under_way).count() as u32;
         let limit = on.settings.shots.unwrap_or(u32::MAX);
         let left = limit.saturating_sub(report.shots + under_way) as usize;
@@ -283,7 +243,7 @@ impl Spine {
     }
 
     /// Solves the system, keeps the rows of a batch, and gathers by those that find no room.
-    fn take_in(&mut self, on: On<'_>, made: Made, report: &mut Report) -> Result<()> {
+    fn take_in(&mut self, made: Made, report: &mut Report) -> Result<()> {
         report.add_stages(made.stages);
         let mut loose = Vec::new();
         for row in made.rows {
@@ -308,36 +268,27 @@ impl Spine {
                 false => loose.extend(self.ledger.send(s, place, true)),
             }
         }
-        self.gather(on, &loose, report)
+        self.gather(&loose, report)
     }
 
     /// Sends what all sources owe through the rows that are kept; of those with a relief,
     /// `by_direction`, also what changes its direction alone.
-    fn gather_kept(&mut self, on: On<'_>, by_direction: bool, report: &mut Report) -> Result<()> {
+    pub fn gather_kept(&mut self, by_direction: bool, report: &mut Report) -> Result<()> {
         let rows: Vec<LitRow> = (0..self.ledger.sources.len())
             .filter_map(|s| {
                 let row = self.ledger.sources[s].row?;
                 self.ledger.send(s, row, by_direction)
             })
             .collect();
-        self.gather(on, &rows, report)
+        self.gather(&rows, report)
     }
 
-    fn gather(&self, on: On<'_>, rows: &[LitRow], report: &mut Report) -> Result<()> {
+    fn gather(&self, rows: &[LitRow], report: &mut Report) -> Result<()> {
         let start = Instant::now();
-        self.gathering.run(self.lit(on), rows)?;
+        self.gathering.run(rows)?;
         report.gathered_rows += rows.len() as u64;
         report.seconds.gather += start.elapsed().as_secs_f64();
         Ok(())
-    }
-
-    fn lit<'a>(&'a self, on: On<'a>) -> Lit<'a> {
-        Lit {
-            scene: on.scene,
-            state: on.state,
-            kept: &self.kept,
-            relief: on.relief,
-        }
     }
 
     fn solve(&mut self, most: f64, sweeps: usize, report: &mut Report) {
@@ -347,8 +298,8 @@ impl Spine {
     }
 
     /// Goes on from the light that the elements have.
-    fn measure(&mut self, on: On<'_>) -> Result<()> {
-        let reflected = self.gathering.measure(self.lit(on))?;
+    fn measure(&mut self) -> Result<()> {
+        let reflected = self.gathering.measure()?;
         let sent: Vec<DVec3> = self
             .ledger
             .sources
@@ -360,7 +311,7 @@ impl Spine {
     }
 
     /// See [`super::Solver::draw`].
-    pub fn draw_alone(&mut self, on: On<'_>, sources: &[u32]) -> Result<DrawnBatch> {
+    pub fn draw_alone(&mut self, on: &Problem, sources: &[u32]) -> Result<DrawnBatch> {
         self.team(on)?.submit(Batch {
             sources: sources.to_vec(),
             strong: false,
@@ -382,23 +333,21 @@ impl Spine {
     }
 
     /// The team, which is made when it is first asked for.
-    fn team(&mut self, on: On<'_>) -> Result<&mut Team> {
+    fn team(&mut self, on: &Problem) -> Result<&mut Team> {
         let team = match self.team.take() {
             Some(team) => team,
             None => {
-                let meso = match &on.parts.elements.relief {
-                    Some(relief) => meso_elements(on.parts.elements, relief),
+                let meso = match &on.elements.relief {
+                    Some(relief) => meso_elements(&on.elements, relief),
                     None => Vec::new(),
                 };
                 let parts = TeamParts {
-                    settings: on.settings,
-                    scene: on.parts,
+                    problem: on,
                     targets: &self.ledger.system.targets.list,
                     meso: &meso,
                     strong: (self.ledger.sources.iter()).any(|d| d.strong && d.row.is_none()),
-                    slots: self.slots,
                 };
-                Team::new(&self.devices, parts, on.scene, &self.kept)?
+                Team::new(&self.devices, parts, &self.kept)?
             }
         };
         Ok(self.team.insert(team))

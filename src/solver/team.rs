@@ -8,9 +8,8 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::rows::{Looks, Made, RowMaker, RowParts, emitter_looks};
-use super::scene_parts::SceneParts;
 use super::several::Several;
-use super::{Estimator, Settings};
+use super::{Estimator, Problem};
 use crate::error::Result;
 use crate::passes::buffers::SceneBuffers;
 use crate::passes::fresh_rows::{FreshRows, RowShape};
@@ -46,15 +45,12 @@ pub(super) struct Makers {
 /// What the makers of every device are made from.
 #[derive(Clone, Copy)]
 pub(super) struct TeamParts<'a> {
-    pub settings: &'a Settings,
-    pub scene: &'a SceneParts<'a>,
+    pub problem: &'a Problem,
     pub targets: &'a [CouplingTarget],
     /// Elements with a relief.
     pub meso: &'a [MesoElement],
     /// Whether strong emitters are to be drawn.
     pub strong: bool,
-    /// Sources of a batch.
-    pub slots: u32,
 }
 
 impl Makers {
@@ -64,10 +60,10 @@ impl Makers {
         scene: &SceneBuffers,
         kept: Option<&KeptRows>,
     ) -> Result<Self> {
-        let settings = parts.settings;
+        let settings = &parts.problem.settings;
         let shape = RowShape::new(scene, parts.meso.len() as u32);
         let sorts = settings.estimator == Estimator::Receiver;
-        let fresh = FreshRows::new(device, shape, parts.slots, sorts)?;
+        let fresh = FreshRows::new(device, shape, parts.problem.slots, sorts)?;
         let meso = match parts.meso {
             [] => None,
             meso => {
@@ -89,7 +85,7 @@ impl Makers {
             kept,
         };
         let looks = match parts.strong {
-            true => emitter_looks(device, settings, || parts.scene.shadow_occluders()),
+            true => emitter_looks(device, settings, || parts.problem.shadow_occluders()),
             false => None,
         };
         let emitters = looks.map(|looks| RowMaker::new(device, &row_parts, looks));
@@ -109,20 +105,15 @@ impl Makers {
 }
 
 impl Team {
-    /// `first`: the device that holds the scene's buffers and keeps the rows.
-    pub fn new(
-        devices: &[Arc<Device>],
-        parts: TeamParts<'_>,
-        scene: &SceneBuffers,
-        kept: &KeptRows,
-    ) -> Result<Self> {
+    /// The first device holds the problem and keeps the rows.
+    pub fn new(devices: &[Arc<Device>], parts: TeamParts<'_>, kept: &KeptRows) -> Result<Self> {
         if let [device] = devices {
             return Ok(Self::Alone {
-                makers: Makers::new(device, parts, scene, Some(kept))?,
+                makers: Makers::new(device, parts, &parts.problem.scene, Some(kept))?,
                 strong: VecDeque::new(),
             });
         }
-        Ok(Self::Several(Several::new(devices, parts, scene, kept)?))
+        Ok(Self::Several(Several::new(devices, parts, kept)?))
     }
 
     /// Sources of a batch of one kind, at most.

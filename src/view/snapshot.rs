@@ -82,7 +82,7 @@ impl Snapshot {
             irradiance_direct,
             relief,
             ..
-        } = Solution::new(scene, &solver.elements, &solver.light()?, report);
+        } = Solution::new(scene, &solver.problem.elements, &solver.light()?, report);
         let light = (irradiance, irradiance_direct);
         Ok(Self::new(epoch, scene, light, relief, ambient, progress))
     }

@@ -87,11 +87,21 @@ impl ComputePipeline {
         })
     }
 
-    /// A descriptor set for this pipeline.
+    /// The pipeline with a descriptor set of its own.
     ///
     /// # Errors
     /// A device that fails.
-    pub fn bind(&self, name: &str, bindings: &impl ShaderBindings) -> Result<DescriptorSet> {
-        self.owner.descriptors.bind(name, bindings)
+    pub fn bind(&self, bindings: &impl ShaderBindings) -> Result<BoundCompute> {
+        Ok(BoundCompute {
+            set: (self.owner.descriptors).bind(&self.owner.name, bindings)?,
+            pipeline: self.clone(),
+        })
     }
+}
+
+/// A compute pipeline and what it is bound to. A clone is another handle to the same.
+#[derive(Clone)]
+pub struct BoundCompute {
+    pub(super) pipeline: ComputePipeline,
+    pub(super) set: DescriptorSet,
 }

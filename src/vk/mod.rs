@@ -32,7 +32,7 @@ use std::sync::{Mutex, MutexGuard};
 pub use barrier::Stage;
 pub use buffer::{Buffer, BufferUse, TEXEL_BYTES};
 pub use commands::Commands;
-pub use compute::ComputePipeline;
+pub use compute::{BoundCompute, ComputePipeline};
 pub use descriptors::{Bind, Binding, DescriptorSet, Sampled};
 pub use device::{Device, Left, Limits, left};
 pub use graphics::{GraphicsPipeline, GraphicsState, VertexAttribute};

@@ -13,6 +13,7 @@ pub(super) struct PipelineOwner {
     /// Null until the pipeline itself is created.
     pub(super) raw: vk::Pipeline,
     pub(super) layout: vk::PipelineLayout,
+    pub(super) name: String,
     interface: Interface,
     pub(super) descriptors: DescriptorLayout,
     device: Arc<Device>,
@@ -43,6 +44,7 @@ impl PipelineOwner {
         Ok(Self {
             raw: vk::Pipeline::null(),
             layout,
+            name: name.to_owned(),
             interface,
             descriptors,
             device: Arc::clone(device),

@@ -157,7 +157,7 @@ pub fn solve(elements: Elements, lights: &[PointLight], settings: &Settings) -> 
         radiosity,
         relief,
     } = solver.light().expect("the device gives the solution");
-    let e = &solver.elements;
+    let e = &solver.problem.elements;
     let solved = Solved {
         area: e.to_input_order(&e.area),
         irradiance: e.to_input_order(&irradiance),

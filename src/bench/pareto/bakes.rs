@@ -156,8 +156,11 @@ impl Try {
             let report = solver.report();
             let finished = report.stop != StopReason::Interrupted;
             let light = solver.light()?;
-            done.irradiance = solver.elements.to_input_order(&light.irradiance);
-            done.direct = solver.elements.to_input_order(&light.irradiance_direct);
+            done.irradiance = solver.problem.elements.to_input_order(&light.irradiance);
+            done.direct = solver
+                .problem
+                .elements
+                .to_input_order(&light.irradiance_direct);
             done.rows.push(Row {
                 method: match self.estimator {
                     Estimator::Receiver => Method::Receiver,
@@ -167,6 +170,7 @@ impl Try {
                 emitter_hemicube: settings.emitter_shadows().face(),
                 source_scale: Some(self.scale),
                 directions: solver
+                    .problem
                     .elements
                     .relief
                     .as_ref()

@@ -289,7 +289,7 @@ impl Context {
                 });
             }
         }
-        let elements = &solver.elements;
+        let elements = &solver.problem.elements;
         Ok(Solved {
             area: elements.to_input_order(&elements.area),
             irradiance: elements.to_input_order(&light.irradiance),

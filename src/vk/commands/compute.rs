@@ -3,21 +3,15 @@
 use ash::vk;
 
 use super::Commands;
-use crate::vk::{Buffer, ComputePipeline, DescriptorSet, ShaderParameters};
+use crate::vk::{BoundCompute, Buffer, ShaderParameters};
 
 impl Commands {
     /// Dispatches `groups` workgroups; nothing is recorded where there are none.
-    pub fn dispatch<P: ShaderParameters>(
-        &self,
-        pipeline: &ComputePipeline,
-        set: &DescriptorSet,
-        push: &P,
-        groups: [u32; 3],
-    ) {
+    pub fn dispatch<P: ShaderParameters>(&self, bound: &BoundCompute, push: &P, groups: [u32; 3]) {
         if groups.contains(&0) {
             return;
         }
-        self.bind_compute(pipeline, set, push);
+        self.bind_compute(bound, push);
         // SAFETY: a pipeline with its set and constants is bound.
         unsafe {
             self.device
@@ -29,13 +23,12 @@ impl Commands {
     /// Dispatches as many workgroups as the device has written at byte `offset` of `counts`.
     pub fn dispatch_indirect<P: ShaderParameters>(
         &self,
-        pipeline: &ComputePipeline,
-        set: &DescriptorSet,
+        bound: &BoundCompute,
         push: &P,
         counts: &Buffer,
         offset: u64,
     ) {
-        self.bind_compute(pipeline, set, push);
+        self.bind_compute(bound, push);
         self.hold(&counts.owner);
         // SAFETY: as above; the command lies within the buffer and was written by a pass.
         unsafe {
@@ -45,12 +38,8 @@ impl Commands {
         }
     }
 
-    fn bind_compute<P: ShaderParameters>(
-        &self,
-        pipeline: &ComputePipeline,
-        set: &DescriptorSet,
-        push: &P,
-    ) {
+    fn bind_compute<P: ShaderParameters>(&self, bound: &BoundCompute, push: &P) {
+        let BoundCompute { pipeline, set } = bound;
         let pipeline = &pipeline.owner;
         let bytes = pipeline.push_constants(push);
         pipeline.check_set(&set.owner);

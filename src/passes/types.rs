@@ -1,39 +1,11 @@
-//! A scene without relief.
+//! How the structs that shaders read are made.
 
-use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use crate::constants::KIND_SURFACE;
-use crate::mesh::meshlets;
-use crate::mesh::sources;
-
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub struct Source {
-    pub eye: Vec3,
-    pub area: f32,
-    pub normal: Vec3,
-    pub radius: f32,
-    pub tangent: Vec3,
-    pub cone_sin: f32,
-    pub bitangent: Vec3,
-    pub cone_cos: f32,
-    pub emitted: Vec3,
-    pub kind: u32,
-    pub first_element: u32,
-    pub element_count: u32,
-    pub first_contour: u32,
-    pub contour_count: u32,
-    pub component: u32,
-    /// Centroid of the area.
-    pub middle: Vec3,
-    /// Area that a far place in the direction of `normal` sees.
-    pub facing: f32,
-    /// Of the largest part's ball; parts are counted in the buffer of all.
-    pub part_radius: f32,
-    pub first_part: u32,
-    pub part_count: u32,
-}
+use crate::constants::{KIND_SURFACE, LEAF_TRIANGLES, NONE};
+use crate::mesh::{meshlets, sources};
+use crate::meso::HeightPyramid;
+pub use crate::structs::*;
 
 impl Source {
     /// `first_contour` and `contour_count` count the corners of [`contour_corners`].
@@ -85,33 +57,6 @@ pub fn contour_corners(source: &sources::Source) -> Vec<[f32; 4]> {
     corners
 }
 
-/// An element as it is gathered from, for loading by fours.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub struct Triangle {
-    pub a: Vec3,
-    pub area: f32,
-    pub b: Vec3,
-    /// normal · x on its plane.
-    pub height: f32,
-    pub c: Vec3,
-    pub unused_c: f32,
-    pub normal: Vec3,
-    pub unused: f32,
-}
-
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub struct Meshlet {
-    pub centre: Vec3,
-    pub radius: f32,
-    pub axis: Vec3,
-    pub cutoff: f32,
-    pub first: u32,
-    pub count: u32,
-    pub component: u32,
-}
-
 impl From<&meshlets::Meshlet> for Meshlet {
     fn from(m: &meshlets::Meshlet) -> Self {
         Self {
@@ -126,25 +71,38 @@ impl From<&meshlets::Meshlet> for Meshlet {
     }
 }
 
-/// Consecutive elements as receivers: bounds of their centroids and normals.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub struct ReceiverBlock {
-    pub centre: Vec3,
-    pub radius: f32,
-    pub axis: Vec3,
-    /// Of the cylinder about the axis.
-    pub half_height: f32,
-    pub cone_sin: f32,
-    pub cone_cos: f32,
-    /// Radius of an element.
-    pub largest: f32,
+impl Slot {
+    /// Without a source.
+    pub const EMPTY: Self = Self::of(NONE);
+
+    /// Of a source that is to be drawn, and sends nothing yet.
+    pub const fn of(source: u32) -> Self {
+        Self {
+            emitted: Vec3::ZERO,
+            source,
+            reflected: Vec3::ZERO,
+            scale: 1.0,
+        }
+    }
 }
 
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub struct Component {
-    pub low: Vec3,
-    pub closed: u32,
-    pub high: Vec3,
+impl HeightTile {
+    /// `first` counts the values before this pyramid's in the buffer.
+    pub fn new(pyramid: &HeightPyramid, first: u32) -> Self {
+        Self {
+            first,
+            width: pyramid.width,
+            height: pyramid.height,
+            top: pyramid.top(),
+            highest: pyramid.highest(),
+        }
+    }
+}
+
+impl ShadowNode {
+    /// Of a leaf.
+    pub fn triangles(&self) -> std::ops::Range<usize> {
+        let first = self.leaf / LEAF_TRIANGLES;
+        first as usize..(first + self.leaf % LEAF_TRIANGLES) as usize
+    }
 }

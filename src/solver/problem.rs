@@ -1,0 +1,110 @@
+//! What is solved: a scene on the host, and on the device that holds its light.
+
+use std::sync::Arc;
+
+use super::{Estimator, Settings, Visibility};
+use crate::error::Result;
+use crate::mesh::charts::Connections;
+use crate::mesh::elements::Elements;
+use crate::mesh::occluders::Occluders;
+use crate::mesh::sources::{self, Sources};
+use crate::passes::batch::Hemicubes;
+use crate::passes::buffers::{SceneBuffers, State};
+use crate::passes::occluder_tree::shadow_occluders;
+use crate::passes::relief_buffers::ReliefBuffers;
+use crate::passes::types::ShadowOccluder;
+use crate::scene::PointLight;
+use crate::vk::Device;
+
+/// A scene to be lit.
+pub struct Problem {
+    pub settings: Settings,
+    pub elements: Elements,
+    pub sources: Sources,
+    pub connections: Connections,
+    pub occluders: Occluders,
+    pub(super) scene: SceneBuffers,
+    pub(super) state: State,
+    pub(super) relief: Option<ReliefBuffers>,
+    /// Sources of a batch.
+    pub(super) slots: u32,
+}
+
+impl Problem {
+    pub(super) fn new(
+        device: &Arc<Device>,
+        mut elements: Elements,
+        lights: &[PointLight],
+        settings: &Settings,
+        kept: Option<&Visibility>,
+    ) -> Result<Self> {
+        let (sources, connections) = group(&mut elements, lights, settings, kept)?;
+        let occluders = match settings.estimator {
+            Estimator::Receiver if settings.merging => Occluders::merged(&elements, &connections),
+            _ => Occluders::elements(&elements),
+        };
+        let scene = SceneBuffers::new(device, &elements, &sources, &connections, &occluders)?;
+        let state = State::new(device, &scene)?;
+        let wanted = settings.batch.clamp(1, scene.source_count.max(1));
+        let slots = Hemicubes::fitting_slots(device, &scene, settings.hemicube, wanted);
+        let shoots = settings.estimator == Estimator::Pixel;
+        let relief = |relief: &crate::meso::Relief| {
+            let by_pixel = shoots && relief.texels.is_some();
+            let slots = shoots.then_some(slots);
+            ReliefBuffers::new(device, &elements, relief, &sources, slots, by_pixel)
+        };
+        let relief = elements.relief.as_ref().map(relief).transpose()?;
+        Ok(Self {
+            settings: settings.clone(),
+            elements,
+            sources,
+            connections,
+            occluders,
+            scene,
+            state,
+            relief,
+            slots,
+        })
+    }
+
+    /// The scene's buffers on another device.
+    pub(super) fn buffers(&self, device: &Arc<Device>) -> Result<SceneBuffers> {
+        SceneBuffers::new(
+            device,
+            &self.elements,
+            &self.sources,
+            &self.connections,
+            &self.occluders,
+        )
+    }
+
+    pub(super) fn shadow_occluders(&self) -> Vec<ShadowOccluder> {
+        shadow_occluders(&self.elements, &self.connections, &self.occluders)
+    }
+
+    /// Whether a source emits so strongly that it is looked at with more care, `[source]`.
+    pub(super) fn strong(&self) -> Vec<bool> {
+        let list = &self.sources.list;
+        let least = sources::least_strong(list, &self.settings.grouping);
+        let strong = |source: &sources::Source| least > 0.0 && source.emitted_power() >= least;
+        list.iter().map(strong).collect()
+    }
+}
+
+/// Groups the elements into sources: as they were when `kept` was made, if it is given.
+fn group(
+    elements: &mut Elements,
+    lights: &[PointLight],
+    settings: &Settings,
+    kept: Option<&Visibility>,
+) -> Result<(Sources, Connections)> {
+    let (grouping, seed) = (&settings.grouping, settings.seed);
+    let Some(kept) = kept else {
+        return Ok(sources::build(elements, lights, grouping, seed));
+    };
+    let now = elements.emitted_by_material(&kept.emitted());
+    let (mut sources, connections) = sources::build(elements, &kept.lights(), grouping, seed);
+    elements.emitted_by_material(&now);
+    sources.relight(elements, lights, seed)?;
+    Ok((sources, connections))
+}
