@@ -19,7 +19,7 @@
 //! | the same by reciprocity and Lambert's formula | `shaders/form_factors.comp`, [`math::form_factor`] |
 //! | equation (3), light sent by direction | [`meso`], `shaders/send_relief.comp` |
 //! | equation (4), light received by direction | [`math::directions`], `shaders/gather_to_relief.comp` |
-//! | Figure 1, from elements to vertices | [`meso::MesoVertices`] |
+//! | Figure 1, from elements to vertices | [`mesh::meso_vertices`] |
 //! | drawing by relief mapping | [`render`], `shaders/relief.frag` |
 //! | hemicubes | [`math::hemicube`], [`passes::item_buffer`] |
 //!
@@ -40,6 +40,7 @@ pub mod mesh;
 pub mod meso;
 pub mod passes;
 pub mod path_tracer;
+pub mod picture;
 pub mod reference;
 pub mod render;
 pub mod scene;

@@ -440,11 +440,8 @@ fn draws_parts_of_the_light_and_compares() {
     );
     let beside = image::open(folder.path().join("beside.png")).expect("a picture");
     assert_eq!((beside.width(), beside.height()), (216, 20));
-    for wrong in [
-        ["--look-at", "1,2"],
-        ["--fov", "180"],
-        ["--look-from", "nan,0,0"],
-    ] {
+    for wrong in ["--look-at 1,2", "--fov 180", "--look-from nan,0,0"] {
+        let wrong: Vec<&str> = wrong.split(' ').collect();
         let done = run(&[&["render", "room.obj", "-o", "q.png"], &wrong[..]].concat());
         assert_eq!(done.status.code(), Some(2), "{wrong:?}");
     }

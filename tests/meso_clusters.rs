@@ -6,9 +6,10 @@ use common::sheet::{light_on, parallel, sheet};
 use glam::{DVec3, Vec3};
 use mesolux::constants::MOST_CLUSTERS;
 use mesolux::math::directions::Directions;
-use mesolux::meso::{
-    Cluster, CornerLight, Face, FaceClusters, MesoVertices, NEAR_PARALLEL_COS, clusters,
+use mesolux::mesh::clusters::{
+    Cluster, CornerLight, Face, FaceClusters, NEAR_PARALLEL_COS, clusters,
 };
+use mesolux::mesh::meso_vertices::MesoVertices;
 use mesolux::scene::Scene;
 
 /// What sums of some hundred f32 lose, thrice over.

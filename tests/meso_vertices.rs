@@ -6,7 +6,7 @@ use common::sheet::{light_on, parallel, sheet};
 use glam::{DVec3, Vec3};
 use mesolux::bake::solution::DirectionalLight;
 use mesolux::math::directions::Directions;
-use mesolux::meso::MesoVertices;
+use mesolux::mesh::meso_vertices::MesoVertices;
 use mesolux::scene::Scene;
 
 fn world(frame: [Vec3; 3], v: Vec3) -> Vec3 {

@@ -434,11 +434,9 @@ fn estimators_equal_their_twins() {
             "{estimator:?}: power {got} for {want}"
         );
         if solver.problem.connections.enclosed {
-            let sent: f64 = chosen
-                .iter()
-                .map(|&s| &solver.problem.sources.list[s as usize])
-                .map(|s| s.area * f64::from(s.emitted.x))
-                .sum();
+            let list = &solver.problem.sources.list;
+            let sent = |&s: &u32| list[s as usize].area * f64::from(list[s as usize].emitted.x);
+            let sent: f64 = chosen.iter().map(sent).sum();
             assert!(
                 (got / sent - 1.0).abs() < 1e-6,
                 "{got} of {sent} arrives in an enclosed scene"

@@ -6,9 +6,9 @@ use common::{Build, assert_silent, device};
 use glam::{DVec2, DVec3, Vec3};
 use mesolux::constants::NONE;
 use mesolux::math::directions::Directions;
-use mesolux::meso::{
-    Footprints, HeightField, MOST_FOOTPRINTS, Options, Response, Scattering, Transport, tiles,
-};
+use mesolux::mesh::relief::MOST_FOOTPRINTS;
+use mesolux::mesh::tiles::tiles;
+use mesolux::meso::{Footprints, HeightField, Options, Response, Scattering, Transport};
 use mesolux::passes::relief_visibility::ReliefVisibility;
 use mesolux::solver::Settings;
 

@@ -1,5 +1,5 @@
 // The paper's way of lighting relief: the light on a face comes as a few parallel lights,
-// src/meso/clusters.rs, and a march over the height map finds which of them a place sees. Including
+// src/mesh/clusters.rs, and a march over the height map finds which of them a place sees. Including
 // files have Prism, ReliefSurface, Place, facet_normal, LIFT, shared/height_march.glsl and a buffer
 // `ParallelLight parallel_lights[]`.
 

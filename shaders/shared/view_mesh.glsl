@@ -12,7 +12,7 @@ layout(binding = 0) uniform sampler2D albedo;
 
 const float PI = 3.14159265358979;
 
-// Khronos PBR Neutral, as src/render/tone.rs.
+// Khronos PBR Neutral, as src/picture/tone.rs.
 vec3 neutral(vec3 colour) {
     const float start = 0.8 - 0.04;
     const float desaturation = 0.15;

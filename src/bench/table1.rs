@@ -7,8 +7,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use serde::Serialize;
-
 use crate::bake;
 use crate::bake::solution::Solution;
 use crate::error::{Error, Result};
@@ -19,7 +17,7 @@ use crate::scene::{BuiltinOptions, Scene, displace, load};
 use crate::solver::{Settings, Solver, StopReason};
 use crate::vk::Device;
 
-use super::table1_output::{HEADER, KINDS, against_high_poly, line, write};
+use super::table1_output::{HEADER, KINDS, Rate, Row, against_high_poly, line, write};
 use super::{Difference, frame, plain_pairs};
 
 /// A scene of the paper with its minutes and its frames a second for K = 16, 32, 64 (on hardware of
@@ -46,39 +44,6 @@ pub struct Options {
     pub frame_rounds: usize,
     /// Folder that keeps the visibility of reliefs for the frames; bakes compute it anew.
     pub cache: Option<PathBuf>,
-}
-
-/// One bake.
-#[derive(Debug, Clone, Serialize)]
-pub struct Row {
-    pub scene: String,
-    /// `lambert`, `16`, `32`, `64` or `high-poly`.
-    pub kind: String,
-    pub elements: u64,
-    pub meso_elements: u64,
-    pub sources: u64,
-    pub hemicubes: u64,
-    pub error_bound: Option<f64>,
-    /// Visibility and response of the relief, nothing kept from earlier runs.
-    pub relief_seconds: f64,
-    /// All of the bake but reading the scene.
-    pub seconds: f64,
-    pub paper_minutes: Option<f64>,
-    /// Frames a second from the scene's first camera, [`FRAME`] pixels, for bakes in K directions.
-    pub fps_factored: Option<Rate>,
-    pub fps_clusters: Option<Rate>,
-    pub paper_fps: Option<f64>,
-    /// How far the triangles without relief are from those of the high-poly bake; none before that
-    /// is done.
-    pub plain: Option<Difference>,
-}
-
-/// Frames a second: median, and the 10 % and 90 % points.
-#[derive(Debug, Clone, Copy, Serialize)]
-pub struct Rate {
-    pub median: f64,
-    pub low: f64,
-    pub high: f64,
 }
 
 /// A bake that is done.

@@ -3,12 +3,45 @@
 use std::path::Path;
 
 use plotters::style::RGBColor;
+use serde::Serialize;
 
 use super::Difference;
 use super::bars::{Bar, Bars};
-use super::table1::{Rate, Row};
 use crate::atomic_file::write_atomically;
 use crate::error::{Error, Result};
+
+/// One bake.
+#[derive(Debug, Clone, Serialize)]
+pub struct Row {
+    pub scene: String,
+    /// `lambert`, `16`, `32`, `64` or `high-poly`.
+    pub kind: String,
+    pub elements: u64,
+    pub meso_elements: u64,
+    pub sources: u64,
+    pub hemicubes: u64,
+    pub error_bound: Option<f64>,
+    /// Visibility and response of the relief, nothing kept from earlier runs.
+    pub relief_seconds: f64,
+    /// All of the bake but reading the scene.
+    pub seconds: f64,
+    pub paper_minutes: Option<f64>,
+    /// Frames a second from the scene's first camera, [`super::table1::FRAME`] pixels, for bakes in K directions.
+    pub fps_factored: Option<Rate>,
+    pub fps_clusters: Option<Rate>,
+    pub paper_fps: Option<f64>,
+    /// How far the triangles without relief are from those of the high-poly bake; none before that
+    /// is done.
+    pub plain: Option<Difference>,
+}
+
+/// Frames a second: median, and the 10 % and 90 % points.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Rate {
+    pub median: f64,
+    pub low: f64,
+    pub high: f64,
+}
 
 /// What a bake of relief gains and loses against the same relief as geometry.
 pub(super) fn against_high_poly(row: &Row, high: &Row, difference: &Difference) -> String {

@@ -1,6 +1,6 @@
 //! Corners of a mesh's triangles that share a vertex of a smooth surface, and their weights there.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::scene::Scene;
@@ -79,4 +79,28 @@ impl Corners {
 fn angle(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     let (u, v) = (b - a, c - a);
     u.cross(v).length().atan2(u.dot(v))
+}
+
+/// Irradiance at each corner, `[triangle][corner]`, W·m⁻², RGB: the mean of [`Corners::smooth`].
+pub fn corner_irradiance(scene: &Scene, irradiance: &[Vec3]) -> Vec<[Vec3; 3]> {
+    let corners = Corners::new(scene);
+    scene
+        .triangles
+        .par_iter()
+        .enumerate()
+        .map(|(e, triangle)| {
+            triangle.vertices.map(|vertex| {
+                let (mut sum, mut weight) = (DVec3::ZERO, 0.0);
+                for (other, angle) in corners.smooth(e, vertex) {
+                    sum += irradiance[other].as_dvec3() * angle;
+                    weight += angle;
+                }
+                if weight > 0.0 {
+                    (sum / weight).as_vec3()
+                } else {
+                    irradiance[e]
+                }
+            })
+        })
+        .collect()
 }

@@ -2,9 +2,13 @@
 //! it.
 
 pub mod charts;
+pub mod clusters;
 pub mod contour;
 pub mod corners;
 pub mod elements;
 pub mod meshlets;
+pub mod meso_vertices;
 pub mod occluders;
+pub mod relief;
 pub mod sources;
+pub mod tiles;

@@ -12,10 +12,9 @@ use glam::{DMat3, DVec2, DVec3, Vec3, Vec4};
 use nalgebra::{DMatrix, SymmetricEigen};
 use rayon::prelude::*;
 
-use super::tiles::Shading;
 use super::transfer::{CELLS, Facets, Fit, Sight};
 use super::visibility::RAYS;
-use super::{HeightField, Visibility};
+use super::{HeightField, Shading, Visibility};
 use crate::constants::{MOST_RANK, NONE};
 use crate::math::directions::Directions;
 

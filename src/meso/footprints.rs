@@ -119,7 +119,7 @@ impl Footprints {
 
     /// The cell of the mesh's plane through which a facet is seen from a direction whose tangents
     /// to the normal, along u and v in widths of a cell, are `slope`.
-    pub(super) fn window(&self, facet: &Facet, slope: DVec2) -> usize {
+    pub(crate) fn window(&self, facet: &Facet, slope: DVec2) -> usize {
         let at = |place: f64, size: u32| {
             let cut = place as i32;
             (cut - i32::from(place < f64::from(cut))).rem_euclid(size as i32)
@@ -141,7 +141,7 @@ impl Footprints {
     }
 
     /// Mean over a footprint of the facets' `values`, `[facet]`.
-    pub(super) fn mean(&self, footprint: usize, of_facet: &[Vec3]) -> Vec3 {
+    pub(crate) fn mean(&self, footprint: usize, of_facet: &[Vec3]) -> Vec3 {
         self.cells[footprint]
             .iter()
             .map(|(&cell, &share)| {

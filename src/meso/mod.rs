@@ -5,7 +5,6 @@
 //! light by direction ─► vertices ─► clusters
 //! ```
 
-mod clusters;
 mod exchange;
 mod factors;
 mod footprints;
@@ -14,20 +13,17 @@ mod height_pyramid;
 mod relief;
 mod response;
 mod scattering;
-mod tiles;
+mod shading;
 mod transfer;
-mod vertices;
 mod visibility;
 
 pub use crate::structs::{MesoTexel, TextureFacet};
-pub use clusters::{Cluster, CornerLight, Face, FaceClusters, NEAR_PARALLEL_COS, clusters};
 pub use factors::{CORNERS, Factors, RANK_STEP};
 pub use footprints::Footprints;
 pub use height_field::{Facet, HeightField};
 pub use height_pyramid::HeightPyramid;
-pub use relief::{Class, MOST_FOOTPRINTS, March, Options, Relief, Transport, visibility};
+pub use relief::{Class, March, Options, Relief, Texels, Transport, visibility};
 pub use response::{Block, Response, slot_shares};
 pub use scattering::Scattering;
-pub use tiles::{Frame, Shading, Tile, tiles};
-pub use vertices::MesoVertices;
+pub use shading::Shading;
 pub use visibility::Visibility;

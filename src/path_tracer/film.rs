@@ -5,7 +5,7 @@ use std::time::Duration;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::render::Picture;
+use crate::picture::Picture;
 
 /// Standard errors on each side of a mean that hold 95 % of a normal distribution.
 pub(crate) const NORMAL_95: f64 = 1.959_964;

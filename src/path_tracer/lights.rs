@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3, Vec3};
 
 use super::geometry::{ABOVE, Geometry, Hit};
 use super::sampling::{Choice, on_triangle};
-use crate::render::tone::luminance;
+use crate::picture::tone::luminance;
 use crate::scene::Scene;
 
 /// Emitters by power and point lights by intensity.

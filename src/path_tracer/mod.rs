@@ -31,7 +31,7 @@ pub(crate) use film::NORMAL_95;
 pub use instant::VirtualLights;
 
 use crate::error::{Error, Result};
-use crate::render::{Light, Projection, View};
+use crate::picture::{Light, Projection, View};
 use crate::scene::Scene;
 use film::Batch;
 use geometry::Geometry;
@@ -117,7 +117,7 @@ impl<'a> PathTracer<'a> {
     /// when it returns false, the picture so far is the result.
     ///
     /// # Errors
-    /// Paths not in 2..=[`MOST_PATHS`]; a size of 0, above [`crate::render::MOST_PIXELS`] a side or
+    /// Paths not in 2..=[`MOST_PATHS`]; a size of 0, above [`crate::picture::MOST_PIXELS`] a side or
     /// above [`MOST_PIXELS`]; a camera that looks nowhere.
     pub fn render(
         &self,

@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3, Vec3};
 use super::PathTracer;
 use super::geometry::{ABOVE, Hit};
 use super::sampling::{Random, cosine_direction};
-use crate::render::Light;
+use crate::picture::Light;
 
 /// Bounces before Russian roulette: most of the light has been found by then.
 const SURE_BOUNCES: u32 = 3;

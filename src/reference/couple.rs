@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use crate::mesh::elements::Elements;
-use crate::passes::types::CouplingTarget;
+use crate::structs::CouplingTarget;
 
 /// The words of one row: Σ A_j F_js / A_t of a target of one reflectance, Σ ρ_j A_j F_js / A_t by
 /// colour of any other. `row`: form factor from each element to the source; `reflectance`: of even

@@ -6,7 +6,7 @@ use glam::DVec3;
 use super::item_buffer::intersect;
 use crate::constants::KIND_SURFACE;
 use crate::mesh::sources::Source;
-use crate::passes::types::ShadowOccluder;
+use crate::structs::ShadowOccluder;
 
 /// Rounding of a plane's height at a point, as in the shader.
 const HEIGHT_EPSILON: f64 = 1e-6;

@@ -4,7 +4,8 @@ use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3};
 
-use crate::render::{SAMPLES, View, corner_irradiance};
+use crate::mesh::corners::corner_irradiance;
+use crate::picture::{SAMPLES, View};
 use crate::scene::Scene;
 
 /// Distance, in pixels, that a rasteriser with 8 subpixel bits and the rounding of positions to f32

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::passes::types::{ShadowRay, ShadowTriangle};
+use crate::structs::{ShadowRay, ShadowTriangle};
 
 /// How clearly a segment is blocked: the maximum over all triangles of the margin of the crossing,
 /// which is the least of its barycentric coordinates and of its relative distances to the two ends

@@ -1,8 +1,8 @@
 //! Difference of two pictures of the same view.
 
 use super::Picture;
-use super::tone::luminance;
 use crate::error::{Error, Result};
+use crate::picture::tone::luminance;
 
 /// Of linear radiance, all pixels and colours together.
 #[derive(Debug, Clone, Copy, PartialEq)]

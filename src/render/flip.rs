@@ -14,9 +14,9 @@ use rayon::prelude::*;
 
 use super::Picture;
 use super::compare::same_size;
-use super::picture::{FileKind, write_png};
-use super::tone::{luminance, magma};
 use crate::error::Result;
+use crate::picture::tone::{luminance, magma};
+use crate::picture::{FileKind, write_png};
 
 /// Pixels to a degree of the visual angle: a screen 0.7 m wide of 3840 pixels, seen from 0.7 m, as
 /// in the papers.

@@ -2,9 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::picture::{self, Picture, SAMPLES, Samples};
-use super::projection::Tile;
-use super::tone;
+use crate::picture::{self, Picture, SAMPLES, Samples, Tile, tone};
 
 /// A pixel keeps its samples if a channel's lowest is below this share of its highest. Otherwise
 /// the tone curve is so nearly linear over them that their mean gives the same code.

@@ -10,38 +10,8 @@ use crate::constants::{
     SHADING_NORMAL, SHADING_PARALLAX, SHADING_RELIEF, VIEW_ALBEDO, VIEW_HEIGHT, VIEW_IRRADIANCE,
     VIEW_NORMAL, VIEW_OVERDRAW, VIEW_SHADED, VIEW_SLOTS,
 };
+use crate::picture::Light;
 use crate::scene::Scene;
-
-/// Which part of the light is drawn.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Light {
-    /// All of it.
-    #[default]
-    Global,
-    /// Emission, and light straight from emitters and point lights, reflected once.
-    Direct,
-    /// The rest: light reflected more than once.
-    Indirect,
-}
-
-impl Light {
-    pub(super) fn of<T: Copy + Sync + Send>(
-        self,
-        all: &[T],
-        direct: &[T],
-        less: impl Fn(T, T) -> T + Sync,
-    ) -> Vec<T> {
-        match self {
-            Self::Global => all.to_vec(),
-            Self::Direct => direct.to_vec(),
-            Self::Indirect => all
-                .par_iter()
-                .zip(direct)
-                .map(|(&all, &direct)| less(all, direct))
-                .collect(),
-        }
-    }
-}
 
 /// How triangles with a relief are drawn.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

@@ -6,14 +6,15 @@ use std::sync::Arc;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::Lighting;
 use super::seen_scene::SeenScene;
 use super::shafts::Shafts;
-use super::{Lighting, Projection};
 use crate::constants::{KIND_POINT, KIND_SURFACE, LIGHT_POINTS, LIGHT_SETS};
 use crate::error::Result;
 use crate::mesh::sources::triangle_area;
 use crate::passes::shadow_rays::{LightBuffers, ShadowTree};
 use crate::passes::types::{LightPoint, ShadowTriangle};
+use crate::picture::Projection;
 use crate::scene::Scene;
 use crate::vk::Device;
 

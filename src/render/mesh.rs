@@ -6,7 +6,6 @@ use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::flat_relief::FlatRelief;
-use super::projection::{self, Projection, Tile};
 use super::seen_scene::SeenScene;
 use super::shafts::Shafts;
 use super::textures::Bound;
@@ -16,6 +15,7 @@ use crate::mesh::corners::Corners;
 use crate::passes::buffers::upload;
 use crate::passes::shade::{Draw, Parameters, Vertex};
 use crate::passes::types::LitTriangle;
+use crate::picture::{NEAR, Projection, Tile};
 use crate::scene::{Material, Scene, Triangle};
 use crate::vk::{Buffer, BufferUse, Device};
 
@@ -222,7 +222,7 @@ pub fn parameters([x, y, w]: [Vec3; 3], material: Option<&Material>, part: Light
         x,
         y,
         w,
-        near: projection::NEAR,
+        near: NEAR,
         reflectance: reflectance.into(),
         emitted: Vec3::from(emitted) * shines,
         metered,

@@ -1,6 +1,6 @@
 //! Overdraw, as numbers and as a picture.
 
-use super::picture::Picture;
+use crate::picture::Picture;
 
 /// Fragments of prisms that are shaded and steps of their marches, `[row][column]`, means over a
 /// pixel's samples. Hidden ones count: each fragment computes its own depth, so that none is culled

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use super::ReliefShading;
 use super::mesh::parameters;
-use super::projection::Tile;
 use super::relief_mesh::ReliefMesh;
 use super::relief_scene::ReliefScene;
 use super::seen_scene::SeenScene;
@@ -12,6 +11,7 @@ use super::textures::Textures;
 use crate::error::Result;
 use crate::passes;
 use crate::passes::shadow_rays::LightBuffers;
+use crate::picture::Tile;
 use crate::vk::{Commands, DescriptorSet, Device, Sampler};
 
 /// The relief of a picture, ready to be drawn.

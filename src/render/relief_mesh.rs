@@ -16,7 +16,7 @@ use crate::bake::solution::DirectionalLight;
 use crate::constants::MOST_RANK;
 use crate::error::Result;
 use crate::math::directions::Directions;
-use crate::meso::{Cluster, Face, FaceClusters};
+use crate::mesh::clusters::{Cluster, Face, FaceClusters};
 use crate::passes::relief::{Buffers, Parts};
 use crate::passes::types::{ParallelLight, Prism};
 use crate::scene::{Triangle, relief_normals};

@@ -5,7 +5,8 @@ use std::collections::HashMap;
 use glam::{DVec2, Vec4};
 use rayon::prelude::*;
 
-use crate::meso::{Factors, HeightPyramid, Tile};
+use crate::mesh::tiles::Tile;
+use crate::meso::{Factors, HeightPyramid};
 use crate::passes::types::{HeightTile, ReliefSurface};
 use crate::scene::{HeightMap, Material, Scene};
 

@@ -5,8 +5,6 @@ use std::sync::Arc;
 use super::gathered::Gathered;
 use super::lights::light_buffers;
 use super::mesh::Mesh;
-use super::picture::{Picture, SAMPLES};
-use super::projection::{NEAR, Projection, Tile};
 use super::relief::Relief;
 use super::relief_scene::ReliefScene;
 use super::seen_scene::SeenScene;
@@ -15,6 +13,7 @@ use super::{Lighting, Overdraw, Show, View};
 use crate::error::Result;
 use crate::passes::shade::{self, Shade, Target};
 use crate::passes::shadow_rays::LightBuffers;
+use crate::picture::{NEAR, Picture, Projection, SAMPLES, Tile};
 use crate::scene::Scene;
 use crate::vk::{Commands, Device, Timestamps};
 

@@ -1,6 +1,7 @@
 //! A lit scene as one eye sees it: what every part of a picture is made from.
 
-use super::{Lighting, Projection};
+use super::Lighting;
+use crate::picture::Projection;
 use crate::scene::Scene;
 
 /// A lit scene as one eye sees it.

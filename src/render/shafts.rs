@@ -6,9 +6,9 @@
 
 use glam::{DVec3, Vec3};
 
-use super::Projection;
 use crate::passes::shadow_rays::ShadowTree;
 use crate::passes::types::{LitTriangle, ShadowTriangle};
+use crate::picture::Projection;
 use crate::scene::Scene;
 
 /// Most lamps, and so most shafts of a triangle; scenes with more lamps use no shafts.

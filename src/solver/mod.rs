@@ -15,6 +15,7 @@ mod estimate;
 mod gather;
 mod ledger;
 mod look;
+mod makers;
 mod problem;
 mod progress;
 mod relief_light;

@@ -5,8 +5,9 @@ use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::thread::{self, JoinHandle};
 
+use super::makers::{Batch, Makers, TeamParts};
 use super::rows::{FactorWords, Factors, Made, Row, Stages};
-use super::team::{Batch, Makers, TeamParts};
+
 use crate::error::{Error, Result};
 use crate::passes::fresh_rows::FreshRows;
 use crate::passes::keep::Keep;

@@ -12,10 +12,11 @@ use glam::DVec3;
 use super::coupling::{CouplingRow, Targets};
 use super::gather::{Gathering, LitRow};
 use super::ledger::{Candidates, Drawn, Ledger};
+use super::makers::{Batch, TeamParts};
 use super::progress::{Bound, Watch};
 use super::rows::{Factors, Made, looks_closer};
 use super::system::System;
-use super::team::{Batch, Team, TeamParts};
+use super::team::Team;
 use super::visibility::Visibility;
 use super::{DrawnBatch, Problem, Report, StopReason, VISIBILITY_MEMORY};
 use crate::constants::KIND_POINT;
@@ -94,7 +95,7 @@ impl Spine {
         };
         let mut sources: Vec<Drawn> = on.strong().into_iter().enumerate().map(drawn).collect();
         if let Some(restored) = restored {
-            kept.restore(device, restored.state(), &restored.chunks)?;
+            kept.restore(device, restored.state(), restored.chunks())?;
             for (s, (source, drawn)) in list.iter().zip(&mut sources).enumerate() {
                 if let Some(row) = restored.row(s).filter(|_| source.kind != KIND_POINT) {
                     drawn.row = Some(row);

@@ -7,23 +7,12 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::rows::{Looks, Made, RowMaker, RowParts, emitter_looks};
+use super::makers::{Batch, Makers, TeamParts};
+use super::rows::Made;
 use super::several::Several;
-use super::{Estimator, Problem};
 use crate::error::Result;
-use crate::passes::buffers::SceneBuffers;
-use crate::passes::fresh_rows::{FreshRows, RowShape};
 use crate::passes::kept_rows::{KeptRows, SCRATCH};
-use crate::passes::types::{CouplingTarget, MesoElement};
-use crate::vk::{BufferUse, Device};
-
-/// Rows of a batch, of sources of one kind.
-#[derive(Debug, Clone)]
-pub(super) struct Batch {
-    pub sources: Vec<u32>,
-    /// Whether they emit strongly, and are looked at with more care.
-    pub strong: bool,
-}
+use crate::vk::Device;
 
 /// What makes rows and keeps them.
 #[allow(clippy::large_enum_variant)] // one of them lives as long as the solver
@@ -34,74 +23,6 @@ pub(super) enum Team {
         strong: VecDeque<bool>,
     },
     Several(Several),
-}
-
-/// The row makers of a device.
-pub(super) struct Makers {
-    all: RowMaker,
-    emitters: Option<RowMaker>,
-}
-
-/// What the makers of every device are made from.
-#[derive(Clone, Copy)]
-pub(super) struct TeamParts<'a> {
-    pub problem: &'a Problem,
-    pub targets: &'a [CouplingTarget],
-    /// Elements with a relief.
-    pub meso: &'a [MesoElement],
-    /// Whether strong emitters are to be drawn.
-    pub strong: bool,
-}
-
-impl Makers {
-    pub fn new(
-        device: &Arc<Device>,
-        parts: TeamParts<'_>,
-        scene: &SceneBuffers,
-        kept: Option<&KeptRows>,
-    ) -> Result<Self> {
-        let settings = &parts.problem.settings;
-        let shape = RowShape::new(scene, parts.meso.len() as u32);
-        let sorts = settings.estimator == Estimator::Receiver;
-        let fresh = FreshRows::new(device, shape, parts.problem.slots, sorts)?;
-        let meso = match parts.meso {
-            [] => None,
-            meso => {
-                let storage = BufferUse::Storage;
-                Some(crate::passes::buffers::upload(
-                    device,
-                    "meso elements",
-                    meso,
-                    storage,
-                )?)
-            }
-        };
-        let row_parts = RowParts {
-            settings,
-            scene,
-            targets: parts.targets,
-            meso: meso.as_ref(),
-            fresh: &fresh,
-            kept,
-        };
-        let looks = match parts.strong {
-            true => emitter_looks(device, settings, || parts.problem.shadow_occluders()),
-            false => None,
-        };
-        let emitters = looks.map(|looks| RowMaker::new(device, &row_parts, looks));
-        let all = RowMaker::new(device, &row_parts, Looks::Hemicubes(settings.hemicube))?;
-        Ok(Self {
-            all,
-            emitters: emitters.transpose()?,
-        })
-    }
-
-    pub fn of(&mut self, strong: bool) -> &mut RowMaker {
-        match (&mut self.emitters, strong) {
-            (Some(emitters), true) => emitters,
-            _ => &mut self.all,
-        }
-    }
 }
 
 impl Team {

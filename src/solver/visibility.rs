@@ -21,15 +21,9 @@ use crate::scene::{PointLight, Scene};
 /// emission and point lights.
 pub struct Visibility {
     header: Header,
-    /// `[source]`; chunk `NONE` where a source has none.
-    rows: Vec<KeptRow>,
-    /// Runs and values of each source's coupling row, behind one another.
-    counts: Vec<[u32; 2]>,
-    runs: Vec<[u32; 2]>,
-    values: Vec<f32>,
+    lists: Lists,
     /// First run and value of each source.
     starts: Vec<[usize; 2]>,
-    pub(super) chunks: Vec<Vec<u32>>,
 }
 
 /// What a solver keeps.
@@ -82,33 +76,102 @@ fn key(scene: &Scene, settings: &Settings) -> String {
     hexadecimal(hash)
 }
 
+/// Lists of numbers as they lie in a file, one behind another.
+#[derive(Default)]
+struct Lists {
+    /// `[source]`; chunk `NONE` where a source has none.
+    rows: Vec<KeptRow>,
+    /// Runs and values of each source's coupling row.
+    counts: Vec<[u32; 2]>,
+    runs: Vec<[u32; 2]>,
+    values: Vec<f32>,
+    chunks: Vec<Vec<u32>>,
+}
+
+impl Lists {
+    /// Of the lengths that a header says, to be read.
+    fn of(header: &Header) -> Self {
+        Self {
+            rows: vec![KeptRow::default(); header.rows],
+            counts: vec![[0; 2]; header.rows],
+            runs: vec![[0; 2]; header.runs],
+            values: vec![0.0; header.values],
+            chunks: header.words.iter().map(|&count| vec![0; count]).collect(),
+        }
+    }
+
+    fn bytes(&self) -> impl Iterator<Item = &[u8]> {
+        let lists: [&[u8]; 4] = [
+            bytemuck::cast_slice(&self.rows),
+            bytemuck::cast_slice(&self.counts),
+            bytemuck::cast_slice(&self.runs),
+            bytemuck::cast_slice(&self.values),
+        ];
+        let chunks = self.chunks.iter().map(|chunk| bytemuck::cast_slice(chunk));
+        lists.into_iter().chain(chunks)
+    }
+
+    fn bytes_mut(&mut self) -> impl Iterator<Item = &mut [u8]> {
+        let lists: [&mut [u8]; 4] = [
+            bytemuck::cast_slice_mut(&mut self.rows),
+            bytemuck::cast_slice_mut(&mut self.counts),
+            bytemuck::cast_slice_mut(&mut self.runs),
+            bytemuck::cast_slice_mut(&mut self.values),
+        ];
+        let chunks = self.chunks.iter_mut();
+        lists
+            .into_iter()
+            .chain(chunks.map(|chunk| bytemuck::cast_slice_mut(chunk)))
+    }
+
+    fn digest(&self) -> String {
+        let mut hash = Sha256::new();
+        self.bytes().for_each(|bytes| hash.update(bytes));
+        hexadecimal(hash)
+    }
+
+    /// Where the runs and the values of each source begin.
+    fn starts(&self) -> Vec<[usize; 2]> {
+        let next = |at: &mut [usize; 2], &[runs, values]: &[u32; 2]| {
+            let start = *at;
+            *at = [start[0] + runs as usize, start[1] + values as usize];
+            Some(start)
+        };
+        self.counts.iter().scan([0, 0], next).collect()
+    }
+}
+
+impl Header {
+    /// Bytes of the lists; no more than `u64::MAX` of a damaged one.
+    fn list_bytes(&self) -> u64 {
+        let row_bytes = size_of::<KeptRow>() + size_of::<[u32; 2]>();
+        let words = self.words.iter().map(|&words| (words, 4));
+        let lists = [(self.rows, row_bytes), (self.runs, 8), (self.values, 4)];
+        (words.chain(lists))
+            .map(|(count, bytes)| (count as u64).saturating_mul(bytes as u64))
+            .fold(0, u64::saturating_add)
+    }
+}
+
 impl Visibility {
     pub(super) fn new(scene: &Scene, settings: &Settings, kept: Kept<'_>) -> Self {
-        let lights = scene.point_lights.iter();
         let none = KeptRow {
             chunk: NONE,
             first: 0,
             scale: 1.0,
         };
-        let rows: Vec<KeptRow> = kept.rows.iter().map(|row| row.unwrap_or(none)).collect();
-        let lists = || {
-            kept.coupling
-                .iter()
-                .map(|row| row.map(CouplingRow::lists).unwrap_or_default())
+        let mut lists = Lists {
+            rows: kept.rows.iter().map(|row| row.unwrap_or(none)).collect(),
+            chunks: kept.chunks,
+            ..Lists::default()
         };
-        let counts: Vec<[u32; 2]> = lists()
-            .map(|(runs, values)| [runs.len() as u32, values.len() as u32])
-            .collect();
-        let runs: Vec<[u32; 2]> = lists().flat_map(|(runs, _)| runs.iter().copied()).collect();
-        let values: Vec<f32> = lists()
-            .flat_map(|(_, values)| values.iter().copied())
-            .collect();
-        let Kept {
-            state,
-            chunks,
-            chunk_words,
-            ..
-        } = kept;
+        for row in &kept.coupling {
+            let (runs, values) = row.map(CouplingRow::lists).unwrap_or_default();
+            lists.counts.push([runs.len() as u32, values.len() as u32]);
+            lists.runs.extend(runs);
+            lists.values.extend(values);
+        }
+        let lights = scene.point_lights.iter();
         Self {
             header: Header {
                 key: key(scene, settings),
@@ -116,36 +179,29 @@ impl Visibility {
                 lights: lights
                     .map(|l| (l.position.to_array(), l.intensity))
                     .collect(),
-                chunk_words,
-                state: [state.chunk, state.used, state.rows],
-                rows: rows.len(),
-                runs: runs.len(),
-                values: values.len(),
-                words: chunks.iter().map(Vec::len).collect(),
-                sha256: digest(
-                    &[
-                        bytemuck::cast_slice(&rows),
-                        bytemuck::cast_slice(&counts),
-                        bytemuck::cast_slice(&runs),
-                        bytemuck::cast_slice(&values),
-                    ],
-                    &chunks,
-                ),
+                chunk_words: kept.chunk_words,
+                state: [kept.state.chunk, kept.state.used, kept.state.rows],
+                rows: lists.rows.len(),
+                runs: lists.runs.len(),
+                values: lists.values.len(),
+                words: lists.chunks.iter().map(Vec::len).collect(),
+                sha256: lists.digest(),
             },
-            starts: starts(&counts),
-            rows,
-            counts,
-            runs,
-            values,
-            chunks,
+            starts: lists.starts(),
+            lists,
         }
+    }
+
+    /// What the chunks of the device hold.
+    pub(super) fn chunks(&self) -> &[Vec<u32>] {
+        &self.lists.chunks
     }
 
     /// Of the chunks on the device.
     pub(super) fn size(&self) -> RestoredSize {
         RestoredSize {
             chunk_words: self.header.chunk_words,
-            chunks: self.chunks.len(),
+            chunks: self.lists.chunks.len(),
         }
     }
 
@@ -156,17 +212,19 @@ impl Visibility {
 
     /// Where the row of a source is kept, if it is.
     pub(super) fn row(&self, s: usize) -> Option<KeptRow> {
-        self.rows.get(s).copied().filter(|row| row.chunk != NONE)
+        self.lists
+            .rows
+            .get(s)
+            .copied()
+            .filter(|row| row.chunk != NONE)
     }
 
     /// The coupling row of a source, of so many words; none where it was not kept.
     pub(super) fn coupling(&self, s: usize, words: usize) -> Option<CouplingRow> {
-        let &[runs, values] = self.counts.get(s)?;
+        let &[runs, values] = self.lists.counts.get(s)?;
         let &[first_run, first_value] = self.starts.get(s)?;
-        let runs = self.runs.get(first_run..first_run + runs as usize)?;
-        let values = self
-            .values
-            .get(first_value..first_value + values as usize)?;
+        let runs = self.lists.runs.get(first_run..first_run + runs as usize)?;
+        let values = (self.lists.values).get(first_value..first_value + values as usize)?;
         // A row that sees nothing has no runs, as one that was not kept: both are measured.
         (!runs.is_empty())
             .then(|| CouplingRow::from_lists(runs.to_vec(), values.to_vec(), words))
@@ -213,14 +271,9 @@ impl Visibility {
             out.write_all(MAGIC)?;
             out.write_all(&(header.len() as u64).to_le_bytes())?;
             out.write_all(&header)?;
-            out.write_all(bytemuck::cast_slice(&self.rows))?;
-            out.write_all(bytemuck::cast_slice(&self.counts))?;
-            out.write_all(bytemuck::cast_slice(&self.runs))?;
-            out.write_all(bytemuck::cast_slice(&self.values))?;
-            for chunk in &self.chunks {
-                out.write_all(bytemuck::cast_slice(chunk))?;
-            }
-            Ok(())
+            self.lists
+                .bytes()
+                .try_for_each(|bytes| out.write_all(bytes))
         })
     }
 
@@ -250,79 +303,21 @@ impl Visibility {
         read(&mut header)?;
         let header: Header =
             serde_json::from_slice(&header).map_err(|_| bad("its header is damaged"))?;
-        let words: usize = header.words.iter().fold(0, |sum, &n| sum.saturating_add(n));
-        let row_bytes = size_of::<KeptRow>() + size_of::<[u32; 2]>();
-        let expected = [
-            words.saturating_mul(4),
-            header.rows.saturating_mul(row_bytes),
-            header.runs.saturating_mul(8),
-            header.values.saturating_mul(4),
-        ];
-        let expected = expected
-            .iter()
-            .fold(0, |sum: usize, &n| sum.saturating_add(n));
-        if expected as u64 != length - header_length - 24
-            || header
-                .words
-                .iter()
-                .any(|&n| n > header.chunk_words as usize)
-        {
+        let too_long = |&words: &usize| words > header.chunk_words as usize;
+        if header.list_bytes() != length - header_length - 24 || header.words.iter().any(too_long) {
             return Err(bad("its length is not what its header says"));
         }
-        let mut rows = vec![bytemuck::Zeroable::zeroed(); header.rows];
-        read(bytemuck::cast_slice_mut(&mut rows))?;
-        let mut counts = vec![[0_u32; 2]; header.rows];
-        read(bytemuck::cast_slice_mut(&mut counts))?;
-        let mut runs = vec![[0_u32; 2]; header.runs];
-        read(bytemuck::cast_slice_mut(&mut runs))?;
-        let mut values = vec![0_f32; header.values];
-        read(bytemuck::cast_slice_mut(&mut values))?;
-        let mut chunks = Vec::new();
-        for &count in &header.words {
-            let mut chunk = vec![0_u32; count];
-            read(bytemuck::cast_slice_mut(&mut chunk))?;
-            chunks.push(chunk);
-        }
-        let lists = [
-            bytemuck::cast_slice(&rows),
-            bytemuck::cast_slice(&counts),
-            bytemuck::cast_slice(&runs),
-            bytemuck::cast_slice(&values),
-        ];
-        if digest(&lists, &chunks) != header.sha256 {
+        let mut lists = Lists::of(&header);
+        lists.bytes_mut().try_for_each(&mut read)?;
+        if lists.digest() != header.sha256 {
             return Err(bad(
                 "damaged: its form factors are not those that were written",
             ));
         }
         Ok(Self {
             header,
-            starts: starts(&counts),
-            rows,
-            counts,
-            runs,
-            values,
-            chunks,
+            starts: lists.starts(),
+            lists,
         })
     }
-}
-
-/// Where the lists of each source begin.
-fn starts(counts: &[[u32; 2]]) -> Vec<[usize; 2]> {
-    let next = |at: &mut [usize; 2], &[runs, values]: &[u32; 2]| {
-        let start = *at;
-        *at = [start[0] + runs as usize, start[1] + values as usize];
-        Some(start)
-    };
-    counts.iter().scan([0, 0], next).collect()
-}
-
-fn digest(lists: &[&[u8]], chunks: &[Vec<u32>]) -> String {
-    let mut hash = Sha256::new();
-    for list in lists {
-        hash.update(list);
-    }
-    for chunk in chunks {
-        hash.update(bytemuck::cast_slice::<_, u8>(chunk));
-    }
-    hexadecimal(hash)
 }

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use super::Viewer;
 use crate::error::Result;
-use crate::render::{Light, write_png};
+use crate::picture::{Light, write_png};
 use crate::view::panel_pass::Prepared;
 use crate::view::screen::Captured;
 use crate::view::surface_pass::{self, Laid};

@@ -6,8 +6,8 @@ use std::collections::HashMap;
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::corners::Corners;
 use crate::math::directions::Directions;
-use crate::mesh::corners::Corners;
 use crate::scene::Scene;
 
 /// Cosine of 45°: between elements whose tangents are further apart there is a seam of the texture

@@ -5,7 +5,7 @@
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::MesoVertices;
+use super::meso_vertices::MesoVertices;
 use crate::constants::{MOST_CLUSTERS, MOST_DIRECTIONS};
 use crate::math::directions::Directions;
 

@@ -33,14 +33,14 @@ pub struct Picture {
     pub automatic_exposure: f32,
     /// Place in `radiance`, ascending, and samples of each pixel of strong contrast. The mean
     /// suffices for the others, so that a picture of 16384² fits in memory.
-    pub(super) contrasts: Vec<(u32, Samples)>,
+    pub(crate) contrasts: Vec<(u32, Samples)>,
 }
 
 /// Value of the 90th percentile of luminance after automatic exposure.
 const METER_TARGET: f32 = 0.6;
 
 /// The exposure, as a power of two, for pixels of these luminances.
-pub(super) fn automatic_exposure(metered: &mut [f32]) -> f32 {
+pub(crate) fn automatic_exposure(metered: &mut [f32]) -> f32 {
     if metered.is_empty() {
         return 0.0;
     }
@@ -229,6 +229,6 @@ pub(crate) fn write_png(path: &Path, (width, height): (u32, u32), codes: &[u8]) 
 }
 
 /// The mean of a pixel's samples.
-pub(super) fn mean(samples: &Samples) -> [f32; 3] {
+pub(crate) fn mean(samples: &Samples) -> [f32; 3] {
     std::array::from_fn(|c| samples.iter().map(|s| s[c]).sum::<f32>() / samples.len() as f32)
 }
