@@ -256,6 +256,47 @@ fn relights(emitter_hemicube: Option<u32>) {
     assert!(off <= TOLERANCE);
 }
 
+/// As by what a file keeps, and back to the first lights; with relief too. What cannot be relit is
+/// refused, and nothing of it stays.
+#[test]
+fn a_solver_is_relit_where_it_is() {
+    let (first, relit) = (scene(true).0.scene, relit_scene().0.scene);
+    let device = device();
+    let mut more = relit_scene();
+    more.point_light(DVec3::splat(0.5), 1.0);
+    for emitter_hemicube in [Some(settings().hemicube), None] {
+        let settings = Settings {
+            emitter_hemicube,
+            ..settings()
+        };
+        let solve = |scene, kept: Option<&Visibility>| {
+            bake::solve(&device, scene, &settings, kept, |_| true).expect("the scene is solved")
+        };
+        let mut solver = solve(&first, None);
+        let before = solver.light().expect("the light comes back");
+        let kept = solver.visibility(&first).expect("it comes back");
+        let by_file = solve(&relit, kept.as_ref());
+        let expected = by_file.light().expect("the light comes back");
+        assert!(solver.relight(&more.0.scene).is_err());
+        for (scene, expected, drawn) in [
+            (&relit, &expected, 2),
+            (&first, &before, 2),
+            (&first, &before, 0),
+        ] {
+            solver.relight(scene).expect("only lights differ");
+            solver.run(|_| true).expect("the device solves the scene");
+            let report = solver.report();
+            let rows = report.hemicubes + report.emitters_by_rays;
+            assert_eq!(rows, drawn, "only a point light that has moved is drawn");
+            let light = solver.light().expect("the light comes back");
+            let off = largest_difference(&light.irradiance, &expected.irradiance);
+            println!("relit in place, {drawn} rows: {off:.1e}");
+            assert!(off <= TOLERANCE);
+        }
+    }
+    assert_silent();
+}
+
 #[test]
 fn kept_form_factors_of_something_else_are_refused() {
     let device = device();

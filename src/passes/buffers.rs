@@ -101,6 +101,13 @@ impl SceneBuffers {
     }
 }
 
+impl SceneBuffers {
+    /// Other light of the same sources, and other places of point lights.
+    pub fn write_sources(&self, device: &Arc<Device>, sources: &[sources::Source]) -> Result<()> {
+        write(device, &self.sources, &Outlined::new(sources).list)
+    }
+}
+
 /// Normal n and n · x, `[element]`.
 fn planes(elements: &Elements) -> Vec<[f32; 4]> {
     (0..elements.len())
@@ -215,6 +222,15 @@ impl State {
             indirect_error: zeroed("indirect error", 12 * elements)?,
             reflected: zeroed("source reflected", 12 * sources)?,
         })
+    }
+}
+
+impl State {
+    /// All of them.
+    pub fn buffers(&self) -> impl Iterator<Item = &Buffer> {
+        let direct = [&self.direct, &self.direct_error];
+        let indirect = [&self.indirect, &self.indirect_error, &self.reflected];
+        direct.into_iter().chain(indirect)
     }
 }
 

@@ -146,6 +146,17 @@ impl ReliefBuffers {
         })
     }
 
+    /// What holds light, and the count of what was left out of it.
+    pub fn light(&self) -> impl Iterator<Item = &Buffer> {
+        let moments = [
+            &self.moments_direct,
+            &self.moments_indirect,
+            &self.reflected,
+        ];
+        let sent = [&self.shot_exits, &self.dark_slots, &self.outgoing];
+        moments.into_iter().chain(sent)
+    }
+
     /// Columns and rows of the directions' square.
     pub fn cells(&self) -> [u32; 2] {
         [self.directions.columns, self.directions.rows]

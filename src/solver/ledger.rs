@@ -13,6 +13,8 @@ pub(super) struct Ledger {
     pub sources: Vec<Drawn>,
     /// Missing power at which the solution is done, internal units.
     pub most_missing: f64,
+    /// See [`super::progress::Bound::most_squared`].
+    pub most_squared: f64,
     /// What a unit of unshot power can turn into at most.
     pub importance: f64,
 }
@@ -58,7 +60,7 @@ impl Ledger {
     pub fn undrawn(&self) -> Option<Candidates> {
         let mut strong = Vec::new();
         let mut others = Vec::new();
-        let (mut emitted_left, mut missing) = (0.0, 0.0);
+        let (mut emitted_left, mut missing, mut squared) = (0.0, 0.0, 0.0);
         for (s, drawn) in self.sources.iter().enumerate() {
             if self.system.is_drawn(s) || drawn.under_way {
                 continue;
@@ -67,6 +69,7 @@ impl Ledger {
             if power > 0.0 {
                 emitted_left += emitted;
                 missing += self.system.missing(s);
+                squared += self.system.unshot_squared(s);
                 let list = if drawn.strong {
                     &mut strong
                 } else {
@@ -81,7 +84,8 @@ impl Ledger {
                 strong: true,
             });
         }
-        let done = emitted_left == 0.0 && missing <= UNDRAWN * self.most_missing;
+        let little = missing <= UNDRAWN * self.most_missing && squared <= self.most_squared;
+        let done = emitted_left == 0.0 && little;
         (!done).then_some(Candidates {
             powers: others,
             strong: false,

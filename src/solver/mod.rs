@@ -35,9 +35,8 @@ use std::time::Instant;
 
 use glam::Vec3;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::mesh::elements::Elements;
-use crate::mesh::sources;
 use crate::passes::buffers::download;
 use crate::passes::types::{CouplingTarget, Reflected, Slot};
 use crate::scene::{PointLight, Scene};
@@ -131,9 +130,7 @@ impl Solver {
         let device = check_devices(devices, settings)?;
         let start = Instant::now();
         let problem = Problem::new(device, elements, lights, settings, kept)?;
-        let list = problem.sources.list.iter();
-        let emitted = list.map(sources::Source::emitted_power).sum();
-        let bound = Bound::new(&problem.elements, emitted);
+        let bound = Bound::new(&problem);
         let method = match &problem.relief {
             Some(relief) if settings.estimator == Estimator::Pixel => {
                 Method::Shots(Shots::new(device, &problem, relief, bound)?)
@@ -149,6 +146,27 @@ impl Solver {
             report,
             bound,
         })
+    }
+
+    /// Lights the scene anew by the emission and the point lights of `scene`, which is otherwise
+    /// the one that is solved: what has been drawn is not drawn again, but for point lights that
+    /// have moved. All light is gone until the next [`Self::run`].
+    ///
+    /// # Errors
+    /// Emission of elements that neither emitted nor reflected; another number of point lights; the
+    /// `pixel` estimator in a scene with relief. The solver is then as it was. A device that fails.
+    pub fn relight(&mut self, scene: &Scene) -> Result<()> {
+        let start = Instant::now();
+        let Method::Rows(spine) = &mut self.method else {
+            let what = "the pixel estimator keeps nothing in a scene with relief: bake again";
+            return Err(Error::Usage(what.into()));
+        };
+        let moved = self.problem.relight(&self.device, scene)?;
+        self.bound = Bound::new(&self.problem);
+        spine.relight(&self.problem, self.bound, &moved);
+        self.report = Report::new(&spine.devices, &self.problem);
+        self.report.seconds.setup = start.elapsed().as_secs_f64();
+        Ok(())
     }
 
     /// Solves until a stop rule holds, or `go_on` says no. What has been solved so far is always

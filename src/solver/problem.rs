@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{Estimator, Settings, Visibility};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::mesh::charts::Connections;
 use crate::mesh::elements::Elements;
 use crate::mesh::occluders::Occluders;
@@ -13,8 +13,8 @@ use crate::passes::buffers::{SceneBuffers, State};
 use crate::passes::occluder_tree::shadow_occluders;
 use crate::passes::relief_buffers::ReliefBuffers;
 use crate::passes::types::ShadowOccluder;
-use crate::scene::PointLight;
-use crate::vk::Device;
+use crate::scene::{PointLight, Scene};
+use crate::vk::{Commands, Device};
 
 /// A scene to be lit.
 pub struct Problem {
@@ -65,6 +65,35 @@ impl Problem {
             relief,
             slots,
         })
+    }
+
+    /// Takes the emission and the point lights of `scene`, which is otherwise this one, and forgets
+    /// all light. Which sources are lights that have moved, `[source]`.
+    ///
+    /// # Errors
+    /// Emission of elements that neither emitted nor reflected; another number of point lights. The
+    /// problem is then as it was.
+    pub(super) fn relight(&mut self, device: &Arc<Device>, scene: &Scene) -> Result<Vec<bool>> {
+        let before = self.elements.emitted.clone();
+        self.elements.set_emission(scene);
+        let mut sources = self.sources.clone();
+        let relit = sources.relight(&self.elements, &scene.point_lights, self.settings.seed);
+        if relit.is_err() || sources.list.len() != self.sources.list.len() {
+            self.elements.emitted = before;
+            let other = || Error::Usage("another number of point lights: bake again".into());
+            return Err(relit.err().unwrap_or_else(other));
+        }
+        let places = sources.list.iter().zip(&self.sources.list);
+        let moved = places.map(|(now, before)| now.eye != before.eye).collect();
+        self.sources = sources;
+        self.scene.write_sources(device, &self.sources.list)?;
+        Commands::run(device, "no light", |cmd| {
+            self.state.buffers().for_each(|buffer| cmd.fill(buffer, 0));
+            let relief = self.relief.iter().flat_map(ReliefBuffers::light);
+            relief.for_each(|buffer| cmd.fill(buffer, 0));
+            Ok(())
+        })?;
+        Ok(moved)
     }
 
     /// The scene's buffers on another device.

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::{Problem, StopReason};
-use crate::mesh::elements::Elements;
+use crate::mesh::sources::Source;
 
 /// How far a solution has come.
 #[derive(Debug, Clone, Copy, Default)]
@@ -29,14 +29,22 @@ pub(super) struct Bound {
     factor: Option<f64>,
     /// Emitted power, internal units.
     emitted: f64,
+    /// Of all elements, internal units.
+    area: f64,
 }
 
+/// The rms of the light that undrawn sources fail to bring, over the mean of what is emitted, for a
+/// residual of 1: they may stand close together.
+const LOCAL: f64 = 10.0;
+
 impl Bound {
-    pub fn new(elements: &Elements, emitted: f64) -> Self {
-        let rho = f64::from(elements.max_reflectance());
+    pub fn new(problem: &Problem) -> Self {
+        let rho = f64::from(problem.elements.max_reflectance());
+        let sources = problem.sources.list.iter();
         Self {
             factor: (rho < 1.0).then(|| 1.0 / (1.0 - rho)),
-            emitted,
+            emitted: sources.map(Source::emitted_power).sum(),
+            area: problem.elements.area.iter().sum(),
         }
     }
 
@@ -65,6 +73,13 @@ impl Bound {
     /// Missing power at which the bound is `residual`, rounding apart.
     pub fn most_missing(&self, residual: f64) -> f64 {
         residual * self.emitted
+    }
+
+    /// What undrawn sources may have of area times unshot radiosity squared, summed over the
+    /// colours. With form factors F_es from an element, ∫ (Σ_s F_es b_s)² ≤ Σ_s A_s b_s², since
+    /// Σ_s F_es ≤ 1 (Jensen) and A_e F_es = A_s F_se.
+    pub fn most_squared(&self, residual: f64) -> f64 {
+        (LOCAL * residual * self.emitted).powi(2) / (3.0 * self.area)
     }
 }
 

@@ -24,11 +24,12 @@ use crate::error::Result;
 use crate::passes::fresh_rows::RowShape;
 use crate::passes::kept_rows::{KeptRows, KeptSize};
 use crate::passes::relief_buffers::meso_elements;
+use crate::passes::types::KeptRow;
 use crate::vk::Device;
 
 /// A solution under way.
 pub(super) struct Spine {
-    devices: Vec<Arc<Device>>,
+    pub devices: Vec<Arc<Device>>,
     /// Made when a source is first to be drawn.
     team: Option<Team>,
     pub ledger: Ledger,
@@ -83,44 +84,40 @@ impl Spine {
             slots: on.slots,
         };
         let kept = KeptRows::new(device, shape, kept_size, restored.map(Visibility::size))?;
-        let list = &on.sources.list;
-        let targets = Targets::new(&on.elements, list);
-        let memory = on.settings.coupling_memory;
-        let mut system = System::new(targets, list, memory, bound.importance());
-        let looks = looks_closer(device, &on.settings);
-        let drawn = |(s, strong): (usize, bool)| Drawn {
-            strong: looks && strong,
-            relief: on.sources.relief.contains(&s),
-            ..Drawn::default()
-        };
-        let mut sources: Vec<Drawn> = on.strong().into_iter().enumerate().map(drawn).collect();
         if let Some(restored) = restored {
             kept.restore(device, restored.state(), restored.chunks())?;
-            for (s, (source, drawn)) in list.iter().zip(&mut sources).enumerate() {
-                if let Some(row) = restored.row(s).filter(|_| source.kind != KIND_POINT) {
-                    drawn.row = Some(row);
-                    system.draw(s, restored.coupling(s, system.targets.words()));
-                }
-            }
         }
+        let not_lights = |s: usize| on.sources.list[s].kind != KIND_POINT;
+        let rows = |s: usize| restored?.row(s).filter(|_| not_lights(s));
+        let coupling = |s, words| restored?.coupling(s, words);
         Ok(Self {
             gathering: Gathering::new(device, on, &kept)?,
             devices: devices.to_vec(),
             team: None,
-            ledger: Ledger {
-                system,
-                sources,
-                most_missing: bound.most_missing(on.settings.residual),
-                importance: bound.importance(),
-            },
+            ledger: ledger(device, on, bound, rows, coupling),
             kept,
         })
     }
 
+    /// Begins anew with the rows that there are, but for those of lights that have `moved`,
+    /// `[source]`.
+    pub fn relight(&mut self, on: &Problem, bound: Bound, moved: &[bool]) {
+        let before = &mut self.ledger;
+        let rows: Vec<_> = (before.sources.iter().zip(moved))
+            .map(|(drawn, moved)| drawn.row.filter(|_| !moved))
+            .collect();
+        let coupling = |s, _| before.system.take_row(s);
+        self.ledger = ledger(&self.devices[0], on, bound, |s| rows[s], coupling);
+        // Other devices hold lights where they were, and those that were drawn first may have been
+        // all that emitted strongly.
+        let to_draw = |drawn: &Drawn| drawn.strong && drawn.row.is_none();
+        if self.devices.len() > 1 || self.ledger.sources.iter().any(to_draw) {
+            self.team = None;
+        }
+    }
+
     /// Goes on until the solution is done, which the elements have then, or the watch says stop.
     pub fn run(&mut self, on: &Problem, report: &mut Report, watch: &mut Watch<'_>) -> Result<()> {
-        // Of rows that are restored.
-        (0..RESTORED_WEIGHINGS).for_each(|_| self.ledger.system.weigh());
         let mut corrections = 0;
         while self.draw(on, Phase::First, report, watch)? {
             self.solve(UNSOLVED * self.ledger.stop_power(), MOST_SWEEPS, report);
@@ -357,5 +354,42 @@ impl Spine {
     /// The last rows that were gathered with their light, for comparison with the twins.
     pub fn gathered_slots(&self, count: usize) -> Result<Vec<crate::passes::types::Slot>> {
         self.gathering.slots(count)
+    }
+}
+
+/// A solution that begins with the rows that there are, and with what is known of their coupling,
+/// by source and number of words.
+fn ledger(
+    device: &Device,
+    on: &Problem,
+    bound: Bound,
+    row: impl Fn(usize) -> Option<KeptRow>,
+    mut coupling: impl FnMut(usize, usize) -> Option<CouplingRow>,
+) -> Ledger {
+    let list = &on.sources.list;
+    let targets = Targets::new(&on.elements, list);
+    let words = targets.words();
+    let memory = on.settings.coupling_memory;
+    let mut system = System::new(targets, list, memory, bound.importance());
+    let looks = looks_closer(device, &on.settings);
+    let drawn = |(s, strong): (usize, bool)| Drawn {
+        strong: looks && strong,
+        relief: on.sources.relief.contains(&s),
+        row: row(s),
+        ..Drawn::default()
+    };
+    let sources: Vec<Drawn> = on.strong().into_iter().enumerate().map(drawn).collect();
+    for (s, drawn) in sources.iter().enumerate() {
+        if drawn.row.is_some() {
+            system.draw(s, coupling(s, words));
+        }
+    }
+    (0..RESTORED_WEIGHINGS).for_each(|_| system.weigh());
+    Ledger {
+        system,
+        sources,
+        most_missing: bound.most_missing(on.settings.residual),
+        most_squared: bound.most_squared(on.settings.residual),
+        importance: bound.importance(),
     }
 }

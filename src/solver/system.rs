@@ -157,15 +157,25 @@ impl System {
         }
     }
 
-    /// Power that is missing at the elements for what a source has not shot, at most.
-    pub fn missing(&self, s: usize) -> f64 {
+    /// Radiosity that a source has not shot.
+    fn unshot_radiosity(&self, s: usize) -> DVec3 {
         let source = &self.sources[s];
         let emitted = match source.emission_shot {
             true => DVec3::ZERO,
             false => source.emitted,
         };
-        let unshot = emitted + (self.reflected(s) - source.shot).abs();
-        source.area * unshot.dot(source.importance)
+        emitted + (self.reflected(s) - source.shot).abs()
+    }
+
+    /// Power that is missing at the elements for what a source has not shot, at most.
+    pub fn missing(&self, s: usize) -> f64 {
+        let source = &self.sources[s];
+        source.area * self.unshot_radiosity(s).dot(source.importance)
+    }
+
+    /// Area times unshot radiosity squared, summed over the colours.
+    pub fn unshot_squared(&self, s: usize) -> f64 {
+        self.sources[s].area * self.unshot_radiosity(s).length_squared()
     }
 
     /// What a unit of power from a source can turn into at the elements, at most, by colour.
@@ -190,6 +200,11 @@ impl System {
             self.bytes += row.bytes();
             self.sources[s].row = Some(row);
         }
+    }
+
+    /// The row of a source, which is not known any more.
+    pub fn take_row(&mut self, s: usize) -> Option<CouplingRow> {
+        self.sources[s].row.take()
     }
 
     /// Rows that are known, `[source]`.

@@ -52,7 +52,6 @@ impl Baker {
             shared: Arc::clone(&shared),
             choice: choice.clone(),
             wake,
-            kept_is_whole: kept.is_some(),
             kept,
             given,
             solving: None,
@@ -105,9 +104,8 @@ struct Work {
     shared: Arc<Shared>,
     choice: DeviceChoice,
     wake: Wake,
-    /// Form factors of the scene, and whether they are those of a bake that was done.
+    /// Form factors of the scene, of a bake from a file.
     kept: Option<Visibility>,
-    kept_is_whole: bool,
     /// The bake that was asked for last.
     given: Given,
     solving: Option<Solving>,
@@ -119,8 +117,6 @@ struct Work {
 struct Solving {
     scene: Arc<Scene>,
     solver: Solver,
-    /// Before the solver ordered them, with their relief.
-    elements: Elements,
     epoch: u64,
     start: Instant,
     slice: Duration,
@@ -174,7 +170,7 @@ impl Work {
                     scene: Arc::clone(&scene),
                     settings: (*settings).clone(),
                 };
-                (self.kept, self.kept_is_whole) = (None, false);
+                self.kept = None;
                 self.bake(scene, &settings, epoch)
             }
             Order::Relight { scene, epoch } => self.relight(scene, epoch),
@@ -227,8 +223,8 @@ impl Work {
         if raised && scene.materials.iter().any(Material::has_relief) {
             // What takes longest comes after the first light.
             let elements = Elements::new(&scene);
-            let solver = Solver::new(&device, elements.clone(), lights, &flat(settings))?;
-            self.start(scene, solver, elements, epoch);
+            let solver = Solver::new(&device, elements, lights, &flat(settings))?;
+            self.start(scene, solver, epoch);
             if let Some(solving) = &mut self.solving {
                 solving.flat = true;
             }
@@ -236,8 +232,8 @@ impl Work {
             return Ok(());
         }
         let elements = bake::elements(&device, &scene, settings)?;
-        let solver = Solver::new(&device, elements.clone(), lights, settings)?;
-        self.start(scene, solver, elements, epoch);
+        let solver = Solver::new(&device, elements, lights, settings)?;
+        self.start(scene, solver, epoch);
         Ok(())
     }
 
@@ -253,15 +249,15 @@ impl Work {
         let settings = self.given.settings.clone();
         let elements = bake::elements(&device, &scene, &settings)?;
         let lights = &scene.point_lights;
-        let solver = Solver::new(&device, elements.clone(), lights, &settings)?;
-        self.start(scene, solver, elements, epoch);
+        let solver = Solver::new(&device, elements, lights, &settings)?;
+        self.start(scene, solver, epoch);
         if let Some(solving) = &mut self.solving {
             solving.shown_from = unshot;
         }
         Ok(())
     }
 
-    fn start(&mut self, scene: Arc<Scene>, solver: Solver, elements: Elements, epoch: u64) {
+    fn start(&mut self, scene: Arc<Scene>, solver: Solver, epoch: u64) {
         self.shared.latest().sources = Some(solver.source_of_triangles());
         self.tell(epoch, None);
         self.looked_at = None;
@@ -271,7 +267,6 @@ impl Work {
             shown_from: f64::INFINITY,
             scene,
             solver,
-            elements,
             epoch,
             start: Instant::now(),
             slice: Duration::ZERO,
@@ -279,33 +274,32 @@ impl Work {
         });
     }
 
-    /// By what is kept; where nothing is, or another source emits than did, from nothing.
+    /// By what has been drawn, or what a file has kept; where there is nothing, or another source
+    /// emits than did, from nothing.
     fn relight(&mut self, scene: Arc<Scene>, epoch: u64) -> Result<()> {
+        if let Some(mut before) = self.solving.take() {
+            match before.solver.relight(&scene) {
+                Ok(()) => {
+                    self.start(scene, before.solver, epoch);
+                    if let Some(solving) = &mut self.solving {
+                        solving.flat = before.flat;
+                    }
+                    return Ok(());
+                }
+                // What was black and now emits has no source.
+                Err(Error::Usage(_)) => {}
+                Err(error) => return Err(error),
+            }
+        }
         let settings = self.given.settings.clone();
-        // What has been lit as if it were flat has kept nothing of use.
-        let before = self.solving.take().filter(|before| !before.flat);
+        let kept = self.kept.as_ref();
+        let Some(kept) = kept.filter(|kept| kept.check(&scene, &settings).is_ok()) else {
+            return self.bake(scene, &settings, epoch);
+        };
         let device = self.choice.open_baking()?;
-        if let Some(before) = &before
-            && !self.kept_is_whole
-        {
-            self.kept = before.solver.visibility(&before.scene)?;
-            self.kept_is_whole = before.done;
-        }
-        let Some(kept) = &self.kept else {
-            return self.bake(scene, &settings, epoch);
-        };
-        if kept.check(&scene, &settings).is_err() {
-            return self.bake(scene, &settings, epoch);
-        }
-        let mut elements = match before {
-            Some(before) => before.elements,
-            None => bake::elements(&device, &scene, &settings)?,
-        };
-        elements.set_emission(&scene);
-        let lights = &scene.point_lights;
-        match Solver::relit(&device, elements.clone(), lights, &settings, kept) {
-            Ok(solver) => self.start(scene, solver, elements, epoch),
-            // What was black and now emits has no source.
+        let elements = bake::elements(&device, &scene, &settings)?;
+        match Solver::relit(&device, elements, &scene.point_lights, &settings, kept) {
+            Ok(solver) => self.start(scene, solver, epoch),
             Err(Error::Usage(_)) => return self.bake(scene, &settings, epoch),
             Err(error) => return Err(error),
         }

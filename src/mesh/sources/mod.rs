@@ -119,6 +119,7 @@ impl Source {
 }
 
 /// Sources that can shoot; groups that are black are left out.
+#[derive(Clone)]
 pub struct Sources {
     pub list: Vec<Source>,
     /// Number of groups left out.
