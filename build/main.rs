@@ -1,5 +1,5 @@
-//! Turns GLSL into what the crate includes as `passes::shaders` and `structs`: SPIR-V, and bindings,
-//! push constants and the structs of buffers with the names of the GLSL.
+//! Turns GLSL into what the crate includes as `passes::shaders` and `structs`: SPIR-V,
+//! and the bindings, push constants and structs of buffers, with the names of the GLSL.
 
 mod emit;
 mod glsl;

@@ -14,11 +14,11 @@
 //!
 //! | of the paper | where |
 //! | --- | --- |
-//! | equation (1), F_ij = Σ ΔF_q | `shaders/bin_pixels.comp`, [`math::hemicube::delta_form_factor`] |
-//! | equation (2), ΔIrrad = ΔB ΔF A_i / A_j | `shaders/pixel_rows.comp`, [`reference::bin_pixels`] |
-//! | the same by reciprocity and Lambert's formula | `shaders/form_factors.comp`, [`math::form_factor`] |
+//! | equation (1), F_ij = Σ ΔF_q | `shaders/bin_pixels.comp`, [`math::hemicube`] |
+//! | equation (2), ΔE = ΔB F A_i / A_j | `shaders/pixel_rows.comp`, [`reference::bin_pixels`] |
+//! | the same by Lambert's formula | `shaders/form_factors.comp`, [`math::form_factor`] |
 //! | equation (3), light sent by direction | [`meso`], `shaders/send_relief.comp` |
-//! | equation (4), light received by direction | [`math::directions`], `shaders/gather_to_relief.comp` |
+//! | equation (4), light received by direction | `shaders/gather_to_relief.comp` |
 //! | Figure 1, from elements to vertices | [`mesh::meso_vertices`] |
 //! | drawing by relief mapping | [`render`], `shaders/relief.frag` |
 //! | hemicubes | [`math::hemicube`], [`passes::item_buffer`] |

@@ -117,8 +117,8 @@ impl<'a> PathTracer<'a> {
     /// when it returns false, the picture so far is the result.
     ///
     /// # Errors
-    /// Paths not in 2..=[`MOST_PATHS`]; a size of 0, above [`crate::picture::MOST_PIXELS`] a side or
-    /// above [`MOST_PIXELS`]; a camera that looks nowhere.
+    /// Paths not in 2..=[`MOST_PATHS`]; a size of 0, above [`crate::picture::MOST_PIXELS`] a
+    /// side or [`MOST_PIXELS`] in all; a camera that looks nowhere.
     pub fn render(
         &self,
         view: &View<'_>,

@@ -37,7 +37,7 @@ struct Unknown {
     shot: DVec3,
     /// Reflected radiosity that has not arrived by coupling, but was measured.
     measured: DVec3,
-    /// Power that arrives at elements in the end for a unit of power that is sent, by colour, at most.
+    /// Power that arrives at elements in the end for a unit of power that is sent, at most; RGB.
     importance: DVec3,
 }
 
@@ -125,10 +125,10 @@ impl System {
         sums
     }
 
-    /// Lowers the importance of each source to what its row says: v_s = 1 + Σ_t A_t G[s,t] v_t / A_s,
-    /// the adjoint of the system. Where the light of a source without a row goes follows from the
-    /// rows of others by reciprocity; the rest may go to whatever counts most. The iteration starts
-    /// from above and falls, so that it can stop at any time.
+    /// Lowers the importance of each source to what its row says, by the adjoint of the system:
+    /// v_s = 1 + Σ_t A_t G[s,t] v_t / A_s. Where the light of a source without a row goes follows
+    /// from the rows of others by reciprocity; the rest may go to whatever counts most. The
+    /// iteration starts from above and falls, so that it can stop at any time.
     pub fn weigh(&mut self) {
         let mut brought = Arrived::none(&self.targets);
         let mut shares = Arrived::none(&self.targets);
