@@ -269,3 +269,34 @@ fn form_factors_are_those_of_the_finer_size() {
     assert!(fine.irradiance == all.irradiance);
     assert_silent();
 }
+
+/// The widest image holds fewer slots of faces so large than a batch of other sources has.
+#[test]
+fn emitters_may_have_fewer_slots_than_others() {
+    let mut build = Build::new();
+    let (wall, lamp) = (build.material(0.5, 0.0), build.material(0.2, 3.0));
+    let sides = build.room(DVec3::ZERO, DVec3::ONE, 3, wall);
+    build.paint(sides[1].clone(), lamp);
+    let light = |batch: u32| {
+        let settings = Settings {
+            batch,
+            residual: 1e-7,
+            grouping: Grouping {
+                max_area: 1.0 / 60.0,
+                max_power: 0.1,
+                ..Grouping::default()
+            },
+            ..settings(Some(2048))
+        };
+        let solved = build.solve(&settings);
+        let sources = solved.report.emitter_hemicubes;
+        assert!((9..32).contains(&sources), "{sources} emitters");
+        solved.irradiance
+    };
+    let (many, few) = (light(16), light(3));
+    let apart = many.iter().zip(&few).map(|(a, b)| a.distance(*b));
+    let mean = few.iter().map(|e| e.length()).sum::<f32>() / few.len() as f32;
+    let apart = apart.fold(0.0, f32::max) / mean;
+    println!("batches of 16 and of 3: {apart:.1e} apart");
+    assert!(apart <= 1e-6);
+}

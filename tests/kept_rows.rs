@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use mesolux::bake;
 use mesolux::math::directions::Directions;
 use mesolux::meso::{Options, Transport};
-use mesolux::solver::{Light, Report, Settings, Visibility};
+use mesolux::solver::{Light, Report, Settings, Solver, Visibility};
 
 /// Unshot light that each solution leaves, as a share of all. It lands on elements as large as any
 /// other, and half of it and the rounding of sums in another order are what two solutions differ
@@ -293,6 +293,38 @@ fn a_solver_is_relit_where_it_is() {
             println!("relit in place, {drawn} rows: {off:.1e}");
             assert!(off <= TOLERANCE);
         }
+    }
+    assert_silent();
+}
+
+/// What is kept of a solver that was relit is of the groups of its first light.
+#[test]
+fn kept_rows_of_a_relit_solver_belong_to_the_first_groups() {
+    let device = device();
+    let solve = |scene, kept: Option<&Visibility>| {
+        bake::solve(&device, scene, &settings(), kept, |_| true).expect("the scene is solved")
+    };
+    let keep = |solver: &Solver, scene| {
+        let kept = solver.visibility(scene).expect("it comes back");
+        kept.expect("it is kept")
+    };
+    let first = scene(true).0.scene;
+    // So bright that its walls would be cut otherwise.
+    let mut bright = first.clone();
+    bright.materials[0].ke = [5.0; 3];
+    let mut solver = solve(&first, None);
+    let before = solver.light().expect("the light comes back");
+    let alone = solve(&bright, None).report().sources;
+    assert_ne!(alone, solver.report().sources);
+    let by_file = solve(&bright, Some(&keep(&solver, &first)));
+    solver.relight(&bright).expect("only lights differ");
+    solver.run(|_| true).expect("the device solves the scene");
+    for relit in [&by_file, &solver] {
+        let back = solve(&first, Some(&keep(relit, &bright)));
+        let back = back.light().expect("the light comes back");
+        let off = largest_difference(&back.irradiance, &before.irradiance);
+        println!("back by what a relit solver kept: {off:.1e}");
+        assert!(off <= TOLERANCE);
     }
     assert_silent();
 }

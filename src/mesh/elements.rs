@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use crate::meso::Relief;
+use crate::meso::{Relief, Response};
 use crate::scene::Scene;
 
 /// Steps of an internal coordinate in a unit: finer than f32, and coarser than the precision of f64
@@ -116,25 +116,43 @@ impl Elements {
         self.corners.len()
     }
 
-    /// Sets the emitted radiosity of the elements of each material, `[material]`, W·m⁻², RGB;
-    /// returns the values before.
-    pub fn emitted_by_material(&mut self, emitted: &[Vec3]) -> Vec<Vec3> {
-        let mut before = vec![Vec3::ZERO; emitted.len()];
-        for (mine, &material) in self.emitted.iter_mut().zip(&self.material) {
-            before[material as usize] = std::mem::replace(mine, emitted[material as usize]);
+    /// Emitted radiosity of each material, `[material]`, W·m⁻², RGB, if it were flat; 0 of one that
+    /// no element has.
+    pub fn emitted_by_material(&self) -> Vec<Vec3> {
+        let count = self.material.iter().max().map_or(0, |&last| last + 1);
+        let mut by_material = vec![Vec3::ZERO; count as usize];
+        for (e, &material) in self.material.iter().enumerate() {
+            by_material[material as usize] = match self.response(e) {
+                Some(response) => self.emitted[e] / response.mean_emission,
+                None => self.emitted[e],
+            };
         }
-        before
+        by_material
+    }
+
+    /// Sets the emission to that of [`Self::emitted_by_material`].
+    pub fn set_emitted(&mut self, by_material: &[Vec3]) {
+        for e in 0..self.len() {
+            let emitted = by_material[self.material[e] as usize];
+            self.emitted[e] = match self.response(e) {
+                Some(response) => emitted * response.mean_emission,
+                None => emitted,
+            };
+        }
     }
 
     /// Sets the emission to that of `scene`, which is otherwise the scene of these elements.
     pub fn set_emission(&mut self, scene: &Scene) {
-        for (e, emitted) in self.emitted.iter_mut().enumerate() {
-            let material = &scene.materials[self.material[e] as usize];
-            *emitted = Vec3::from_array(material.ke) * PI as f32;
-            if let Some(relief) = self.relief.as_ref().filter(|relief| relief.is_meso(e)) {
-                *emitted *= relief.response(e).mean_emission;
-            }
-        }
+        let materials = scene.materials.iter();
+        let emitted = |ke: [f32; 3]| Vec3::from_array(ke) * PI as f32;
+        let by_material: Vec<Vec3> = materials.map(|m| emitted(m.ke)).collect();
+        self.set_emitted(&by_material);
+    }
+
+    /// Of an element with a relief.
+    fn response(&self, element: usize) -> Option<&Response> {
+        let relief = self.relief.as_ref()?;
+        relief.is_meso(element).then(|| relief.response(element))
     }
 
     pub fn is_empty(&self) -> bool {

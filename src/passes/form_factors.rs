@@ -26,6 +26,7 @@ pub struct FormFactors {
     /// Elements without relief, and in scenes that have some those with it.
     ranges: Vec<Range>,
     rows: FreshRows,
+    slot_count: u32,
     /// Pixels a side of the batch's hemicubes; 0 where it has none.
     face_size: u32,
     /// Slots that a dispatch sorts for.
@@ -124,6 +125,7 @@ impl FormFactors {
         Ok(Self {
             ranges,
             rows: rows.clone(),
+            slot_count: batch.slot_count,
             face_size,
             at_once,
         })
@@ -149,9 +151,9 @@ impl FormFactors {
             first_block: range.first_block,
             block_count: rows.shape.blocks(),
         };
-        for first in (0..rows.slot_count).step_by(self.at_once as usize) {
+        for first in (0..self.slot_count).step_by(self.at_once as usize) {
             for range in &self.ranges {
-                let slots = first..(first + self.at_once).min(rows.slot_count);
+                let slots = first..(first + self.at_once).min(self.slot_count);
                 let size = [groups(range.element_count.div_ceil(SORT_ELEMENTS)), 1, 1];
                 cmd.dispatch(&range.sort, &parameters(range, slots), size);
             }
@@ -159,7 +161,7 @@ impl FormFactors {
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         // Every element is in one list of a slot at most.
         for range in &self.ranges {
-            for slot in 0..rows.slot_count {
+            for slot in 0..self.slot_count {
                 for (kind, form_factors) in range.form_factors.iter().enumerate() {
                     let push = parameters(range, slot..slot + 1);
                     let list = u64::from(slot * RECEIVE_KINDS) + kind as u64;

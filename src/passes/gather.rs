@@ -98,7 +98,7 @@ struct On<'a> {
 }
 
 /// Slots of a dispatch: a software device ends a shader's loops after 65,535 turns of all together.
-const MOST_SLOTS: u32 = 1024;
+pub const MOST_SLOTS: u32 = 1024;
 
 impl Gather {
     pub fn new(

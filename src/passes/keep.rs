@@ -21,14 +21,16 @@ pub struct Keep {
 }
 
 impl Keep {
-    /// For the rows of as many `slots` as there are fresh ones.
+    /// For the rows of the first `slot_count` slots.
     pub fn new(
         device: &Arc<Device>,
         slots: &Buffer,
+        slot_count: u32,
         fresh: &FreshRows,
         kept: &KeptRows,
     ) -> Result<Self> {
-        let bytes = u64::from(fresh.slot_count) * size_of::<KeptRow>() as u64;
+        assert!(slot_count <= fresh.slot_count, "a slot has a fresh row");
+        let bytes = u64::from(slot_count) * size_of::<KeptRow>() as u64;
         let rows = Buffer::new(device, "rows of a batch", bytes, BufferUse::Storage)?;
         let lanes = [device.limits().subgroup_size];
         let allocate = ComputePipeline::new(device, "allocate", &allocate::SHADER)?;
@@ -50,7 +52,7 @@ impl Keep {
                 fresh_meso: &fresh.meso,
             })?,
             first: allocate::Parameters {
-                slot_count: fresh.slot_count,
+                slot_count,
                 block_count: shape.blocks(),
                 meso_blocks: shape.meso_blocks(),
                 chunk_count: kept.chunk_count(),

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::buffers::{download, filled, upload, write};
 use super::fresh_rows::RowShape;
-use super::types::KeptState;
+use super::types::{KeptRow, KeptState};
 use crate::constants::GROUP;
 use crate::error::Result;
 use crate::vk::{Buffer, BufferUse, Device, TEXEL_BYTES};
@@ -144,6 +144,23 @@ impl KeptRows {
             write(device, buffer, words)?;
         }
         Ok(())
+    }
+
+    /// Forgets rows that were kept, and gives back the room of those behind all others.
+    pub fn forget(
+        &self,
+        device: &Arc<Device>,
+        dropped: &[KeptRow],
+        kept: &[KeptRow],
+    ) -> Result<()> {
+        let place = |row: &KeptRow| (row.chunk, row.first);
+        let last = kept.iter().map(place).max();
+        let behind = |place: &(u32, u32)| last.is_none_or(|last| *place > last);
+        let Some((chunk, used)) = dropped.iter().map(place).filter(behind).min() else {
+            return Ok(());
+        };
+        let rows = kept.len() as u32;
+        write(device, &self.state, &[KeptState { chunk, used, rows }])
     }
 
     /// Whether anything can be kept.

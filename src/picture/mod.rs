@@ -1,4 +1,4 @@
-//! Pictures in linear light, whoever makes them: their views, their files and their tones.
+//! Pictures in linear light, of every renderer: their views, their files and their tones.
 
 mod file;
 mod projection;

@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use super::Problem;
 use crate::error::Result;
 use crate::passes::buffers::download;
-use crate::passes::gather::{ChunkSlots, Gather, GatherList, Part};
+use crate::passes::gather::{ChunkSlots, Gather, GatherList, MOST_SLOTS, Part};
 use crate::passes::kept_rows::KeptRows;
 use crate::passes::measure::Measure;
 use crate::passes::measure_relief::MeasureRelief;
@@ -65,7 +65,7 @@ impl Gathering {
                 send: SendRelief::new(device, scene, &list.slots, relief)?,
                 measure: MeasureRelief::new(device, scene, state, relief)?,
                 sources: relief.first_source..relief.first_source + relief.source_count,
-                slots: relief.slots as usize,
+                slots: relief.slots.min(MOST_SLOTS) as usize,
             })
         };
         Ok(Self {

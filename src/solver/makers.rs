@@ -22,7 +22,7 @@ pub(super) struct Batch {
 /// The row makers of a device.
 pub(super) struct Makers {
     pub all: RowMaker,
-    emitters: Option<RowMaker>,
+    pub emitters: Option<RowMaker>,
 }
 
 /// What the makers of every device are made from.

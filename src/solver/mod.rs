@@ -148,7 +148,7 @@ impl Solver {
         })
     }
 
-    /// Lights the scene anew by the emission and the point lights of `scene`, which is otherwise
+    /// Lights the scene again by the emission and the point lights of `scene`, which is otherwise
     /// the one that is solved: what has been drawn is not drawn again, but for point lights that
     /// have moved. All light is gone until the next [`Self::run`].
     ///
@@ -163,7 +163,7 @@ impl Solver {
         };
         let moved = self.problem.relight(&self.device, scene)?;
         self.bound = Bound::new(&self.problem);
-        spine.relight(&self.problem, self.bound, &moved);
+        spine.relight(&self.problem, self.bound, &moved)?;
         self.report = Report::new(&spine.devices, &self.problem);
         self.report.seconds.setup = start.elapsed().as_secs_f64();
         Ok(())
@@ -265,7 +265,7 @@ impl Solver {
             chunks,
             chunk_words: spine.kept.chunk_words,
         };
-        Ok(Some(Visibility::new(scene, &self.problem.settings, kept)))
+        Ok(Some(Visibility::new(scene, &self.problem, kept)))
     }
 
     /// Draws sources, no more than fit a batch, without taking them into the solution: for

@@ -2,7 +2,10 @@
 
 use std::sync::Arc;
 
+use glam::Vec3;
+
 use super::{Estimator, Settings, Visibility};
+use crate::constants::KIND_POINT;
 use crate::error::{Error, Result};
 use crate::mesh::charts::Connections;
 use crate::mesh::elements::Elements;
@@ -16,6 +19,14 @@ use crate::passes::types::ShadowOccluder;
 use crate::scene::{PointLight, Scene};
 use crate::vk::{Commands, Device};
 
+/// The light by which elements were grouped.
+#[derive(Debug, Clone)]
+pub(super) struct GroupedBy {
+    /// See [`Elements::emitted_by_material`].
+    pub emitted: Vec<Vec3>,
+    pub lights: Vec<PointLight>,
+}
+
 /// A scene to be lit.
 pub struct Problem {
     pub settings: Settings,
@@ -28,6 +39,7 @@ pub struct Problem {
     pub(super) relief: Option<ReliefBuffers>,
     /// Sources of a batch.
     pub(super) slots: u32,
+    pub(super) grouped_by: GroupedBy,
 }
 
 impl Problem {
@@ -38,7 +50,22 @@ impl Problem {
         settings: &Settings,
         kept: Option<&Visibility>,
     ) -> Result<Self> {
-        let (sources, connections) = group(&mut elements, lights, settings, kept)?;
+        let grouped_by = match kept {
+            Some(kept) => kept.grouped_by(),
+            None => GroupedBy {
+                emitted: elements.emitted_by_material(),
+                lights: lights.to_vec(),
+            },
+        };
+        let (sources, connections) = match kept {
+            Some(_) => group(&mut elements, lights, settings, &grouped_by)?,
+            None => sources::build(&mut elements, lights, &settings.grouping, settings.seed),
+        };
+        let surfaces = sources.list.iter().filter(|s| s.kind != KIND_POINT).count();
+        if kept.is_some_and(|kept| kept.surfaces() != surfaces) {
+            let what = "kept form factors are of other sources: bake again with --keep-visibility";
+            return Err(Error::Usage(what.into()));
+        }
         let occluders = match settings.estimator {
             Estimator::Receiver if settings.merging => Occluders::merged(&elements, &connections),
             _ => Occluders::elements(&elements),
@@ -64,6 +91,7 @@ impl Problem {
             state,
             relief,
             slots,
+            grouped_by,
         })
     }
 
@@ -74,6 +102,9 @@ impl Problem {
     /// Emission of elements that neither emitted nor reflected; another number of point lights. The
     /// problem is then as it was.
     pub(super) fn relight(&mut self, device: &Arc<Device>, scene: &Scene) -> Result<Vec<bool>> {
+        if scene.materials.len() < self.grouped_by.emitted.len() {
+            return Err(Error::Usage("another scene: bake again".into()));
+        }
         let before = self.elements.emitted.clone();
         self.elements.set_emission(scene);
         let mut sources = self.sources.clone();
@@ -120,20 +151,24 @@ impl Problem {
     }
 }
 
-/// Groups the elements into sources: as they were when `kept` was made, if it is given.
+/// Groups the elements into sources by this light, and lights these.
 fn group(
     elements: &mut Elements,
     lights: &[PointLight],
     settings: &Settings,
-    kept: Option<&Visibility>,
+    by: &GroupedBy,
 ) -> Result<(Sources, Connections)> {
+    // By triangle of the input, since grouping orders the elements.
+    let mut now = vec![Vec3::ZERO; elements.len()];
+    for (&input, &emitted) in elements.input_index.iter().zip(&elements.emitted) {
+        now[input as usize] = emitted;
+    }
+    elements.set_emitted(&by.emitted);
     let (grouping, seed) = (&settings.grouping, settings.seed);
-    let Some(kept) = kept else {
-        return Ok(sources::build(elements, lights, grouping, seed));
-    };
-    let now = elements.emitted_by_material(&kept.emitted());
-    let (mut sources, connections) = sources::build(elements, &kept.lights(), grouping, seed);
-    elements.emitted_by_material(&now);
+    let (mut sources, connections) = sources::build(elements, &by.lights, grouping, seed);
+    for (&input, emitted) in elements.input_index.iter().zip(&mut elements.emitted) {
+        *emitted = now[input as usize];
+    }
     sources.relight(elements, lights, seed)?;
     Ok((sources, connections))
 }

@@ -142,7 +142,7 @@ impl RowMaker {
         let evaluate = Evaluate::new(device, settings, scene, parts.meso, &batch, fresh)?;
         let couple = Couple::new(device, scene, &batch, fresh, parts.targets)?;
         let keep = (parts.kept)
-            .map(|kept| Keep::new(device, &batch.slots, fresh, kept))
+            .map(|kept| Keep::new(device, &batch.slots, batch.slot_count, fresh, kept))
             .transpose()?;
         let layout = Layout::new(&batch, couple.word_count(), parts);
         let make = |name, bytes, usage| {

@@ -115,7 +115,7 @@ impl Keeper {
         let fresh = FreshRows::new(device, kept.shape, slots, false)?;
         let slot_bytes = u64::from(slots) * size_of::<Slot>() as u64;
         let slots_buffer = Buffer::new(device, "slots", slot_bytes, BufferUse::Storage)?;
-        let keep = Keep::new(device, &slots_buffer, &fresh, kept)?;
+        let keep = Keep::new(device, &slots_buffer, slots, &fresh, kept)?;
         let row_bytes = u64::from(slots) * size_of::<KeptRow>() as u64;
         let parts = [&fresh.plain, &fresh.meso, &fresh.occupied];
         let bytes = slot_bytes + parts.iter().map(|part| part.bytes()).sum::<u64>();

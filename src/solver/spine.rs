@@ -99,28 +99,40 @@ impl Spine {
         })
     }
 
-    /// Begins anew with the rows that there are, but for those of lights that have `moved`,
+    /// Begins again with the rows that there are, but for those of lights that have `moved`,
     /// `[source]`.
-    pub fn relight(&mut self, on: &Problem, bound: Bound, moved: &[bool]) {
+    pub fn relight(&mut self, on: &Problem, bound: Bound, moved: &[bool]) -> Result<()> {
         let before = &mut self.ledger;
         let rows: Vec<_> = (before.sources.iter().zip(moved))
             .map(|(drawn, moved)| drawn.row.filter(|_| !moved))
             .collect();
+        let dropped = before
+            .sources
+            .iter()
+            .zip(moved)
+            .filter(|(_, moved)| **moved);
+        let dropped: Vec<KeptRow> = dropped.filter_map(|(drawn, _)| drawn.row).collect();
         let coupling = |s, _| before.system.take_row(s);
         self.ledger = ledger(&self.devices[0], on, bound, |s| rows[s], coupling);
         // Other devices hold lights where they were, and those that were drawn first may have been
         // all that emitted strongly.
         let to_draw = |drawn: &Drawn| drawn.strong && drawn.row.is_none();
-        if self.devices.len() > 1 || self.ledger.sources.iter().any(to_draw) {
-            self.team = None;
-        }
+        let strong = self.ledger.sources.iter().any(to_draw);
+        let team = self.team.take();
+        self.team = team.filter(|team| team.is_alone() && (!strong || team.has_emitters()));
+        let kept: Vec<KeptRow> = self.ledger.sources.iter().filter_map(|d| d.row).collect();
+        self.kept.forget(&self.devices[0], &dropped, &kept)
     }
 
     /// Goes on until the solution is done, which the elements have then, or the watch says stop.
     pub fn run(&mut self, on: &Problem, report: &mut Report, watch: &mut Watch<'_>) -> Result<()> {
+        let limit = on.settings.shots.unwrap_or(u32::MAX);
         let mut corrections = 0;
         while self.draw(on, Phase::First, report, watch)? {
             self.solve(UNSOLVED * self.ledger.stop_power(), MOST_SWEEPS, report);
+            if report.shots < limit && self.ledger.undrawn().is_some() {
+                continue;
+            }
             self.gather_kept(corrections > 0, report)?;
             if !self.draw(on, Phase::Again, report, watch)? {
                 break;
@@ -145,7 +157,6 @@ impl Spine {
         if watch.stop.is_some() {
             self.solve(UNSOLVED * self.ledger.stop_power(), MOST_SWEEPS, report);
         }
-        let limit = on.settings.shots.unwrap_or(u32::MAX);
         let done = match self.ledger.missing() <= self.ledger.most_missing {
             true => StopReason::Residual,
             false if report.shots >= limit => StopReason::Shots,
@@ -183,19 +194,19 @@ impl Spine {
                     team.submit(batch)?;
                 }
             }
-            if !self.take(phase, report)? {
+            if !self.take(on, phase, report)? {
                 return Ok(watch.stop.is_none());
             }
             let (unshot, missing) = (self.ledger.unshot(), self.ledger.missing());
             if !watch.look(report.shots, unshot, missing) {
-                while self.take(phase, report)? {}
+                while self.take(on, phase, report)? {}
                 return Ok(false);
             }
         }
     }
 
     /// Takes in the oldest batch under way. Whether there was one.
-    fn take(&mut self, phase: Phase, report: &mut Report) -> Result<bool> {
+    fn take(&mut self, on: &Problem, phase: Phase, report: &mut Report) -> Result<bool> {
         let Some(team) = &mut self.team else {
             return Ok(false);
         };
@@ -209,7 +220,7 @@ impl Spine {
             self.solve(most, ORDERING_SWEEPS, report);
             // Importance matters once the end is near.
             if self.ledger.missing() <= NEAR_THE_END * self.ledger.most_missing {
-                self.ledger.system.weigh();
+                weigh(&mut self.ledger, on);
             }
         }
         Ok(true)
@@ -384,12 +395,21 @@ fn ledger(
             system.draw(s, coupling(s, words));
         }
     }
-    (0..RESTORED_WEIGHINGS).for_each(|_| system.weigh());
-    Ledger {
+    let mut ledger = Ledger {
         system,
         sources,
         most_missing: bound.most_missing(on.settings.residual),
         most_squared: bound.most_squared(on.settings.residual),
         importance: bound.importance(),
+    };
+    (0..RESTORED_WEIGHINGS).for_each(|_| weigh(&mut ledger, on));
+    ledger
+}
+
+/// Lowers the importance of sources. Relief may send to other places than its row says, which is of
+/// even light, and may reflect more of what it receives.
+fn weigh(ledger: &mut Ledger, on: &Problem) {
+    if on.relief.is_none() {
+        ledger.system.weigh();
     }
 }

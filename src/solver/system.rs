@@ -30,6 +30,8 @@ struct Unknown {
     /// That radiosity is multiplied by for power: a surface's area, half the sphere of a point
     /// light.
     area: f64,
+    /// It has elements, so that its row also says what they see of it.
+    is_surface: bool,
     drawn: bool,
     row: Option<CouplingRow>,
     emission_shot: bool,
@@ -37,6 +39,8 @@ struct Unknown {
     shot: DVec3,
     /// Reflected radiosity that has not arrived by coupling, but was measured.
     measured: DVec3,
+    /// Radiosity that has been shot, but neither arrived by coupling nor was measured yet.
+    unmeasured: DVec3,
     /// Power that arrives at elements in the end for a unit of power that is sent, at most; RGB.
     importance: DVec3,
 }
@@ -46,7 +50,7 @@ struct Unknown {
 pub(super) struct Unshot {
     /// Of the sources that are not drawn, emission included.
     pub undrawn: f64,
-    /// Of all sources: the residual of the system.
+    /// Of all sources: the residual of the system, and what was shot without being measured.
     pub all: f64,
 }
 
@@ -60,11 +64,13 @@ impl System {
                 KIND_POINT => std::f64::consts::TAU,
                 _ => source.area,
             },
+            is_surface: source.kind != KIND_POINT,
             drawn: false,
             row: None,
             emission_shot: false,
             shot: DVec3::ZERO,
             measured: DVec3::ZERO,
+            unmeasured: DVec3::ZERO,
             importance: DVec3::splat(importance),
         };
         let mut weights = Weights::none(&targets);
@@ -116,9 +122,10 @@ impl System {
     pub fn unshot(&self) -> Unshot {
         let mut sums = Unshot::default();
         for s in 0..self.sources.len() {
+            let source = &self.sources[s];
             let power = self.unshot_power(s).0;
-            sums.all += power;
-            if !self.sources[s].drawn {
+            sums.all += power + source.area * source.unmeasured.element_sum();
+            if !source.drawn {
                 sums.undrawn += power;
             }
         }
@@ -136,7 +143,7 @@ impl System {
         for (s, source) in self.sources.iter().enumerate() {
             let counts = self.targets.reflectance(s) * source.importance;
             most = most.max(counts);
-            if let Some(row) = &source.row {
+            if let Some(row) = source.row.as_ref().filter(|_| source.is_surface) {
                 brought.add(row, counts);
                 shares.add(row, DVec3::ONE);
             }
@@ -167,10 +174,12 @@ impl System {
         emitted + (self.reflected(s) - source.shot).abs()
     }
 
-    /// Power that is missing at the elements for what a source has not shot, at most.
+    /// Power that is missing at the elements for what a source has not shot, or has shot without
+    /// being measured, at most.
     pub fn missing(&self, s: usize) -> f64 {
         let source = &self.sources[s];
-        source.area * self.unshot_radiosity(s).dot(source.importance)
+        let bounces = source.unmeasured.dot(source.importance - DVec3::ONE);
+        source.area * (self.unshot_radiosity(s).dot(source.importance) + bounces)
     }
 
     /// Area times unshot radiosity squared, summed over the colours.
@@ -193,7 +202,10 @@ impl System {
         };
         let reflected = self.reflected(s) - self.sources[s].shot;
         self.sources[s].shot += reflected;
-        let Some(row) = row else { return };
+        let Some(row) = row else {
+            self.sources[s].unmeasured += emitted + reflected.abs();
+            return;
+        };
         self.arrived.add(&row, emitted + reflected);
         // Without room the row is forgotten.
         if self.bytes + row.bytes() <= self.memory {
@@ -302,6 +314,7 @@ impl System {
             (self.sources.iter_mut()).zip(reflected.iter().zip(sent))
         {
             source.measured = reflected;
+            source.unmeasured = DVec3::ZERO;
             source.shot = sent;
         }
     }
@@ -313,6 +326,7 @@ impl System {
             let reflected = self.reflected(s);
             let source = &mut self.sources[s];
             if source.drawn && source.row.is_none() {
+                source.unmeasured += (reflected - source.shot).abs();
                 source.shot = reflected;
             }
         }

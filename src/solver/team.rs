@@ -37,6 +37,15 @@ impl Team {
         Ok(Self::Several(Several::new(devices, parts, kept)?))
     }
 
+    pub fn is_alone(&self) -> bool {
+        matches!(self, Self::Alone { .. })
+    }
+
+    /// Whether strong emitters are looked at with more care than all others.
+    pub fn has_emitters(&self) -> bool {
+        matches!(self, Self::Alone { makers, .. } if makers.emitters.is_some())
+    }
+
     /// Sources of a batch of one kind, at most.
     pub fn slots(&mut self, strong: bool) -> usize {
         match self {

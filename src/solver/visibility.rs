@@ -7,11 +7,13 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::Settings;
 use super::coupling::CouplingRow;
+use super::problem::GroupedBy;
+use super::{Problem, Settings};
 use crate::atomic_file::write_atomically;
-use crate::constants::NONE;
+use crate::constants::{KIND_POINT, NONE};
 use crate::error::{Error, Result};
+use crate::mesh::sources::Source;
 use crate::meso::Transport;
 use crate::passes::kept_rows::RestoredSize;
 use crate::passes::types::{KeptRow, KeptState};
@@ -39,16 +41,19 @@ pub(super) struct Kept<'a> {
 struct Header {
     /// A hash of the geometry, the reflectances and the settings that form factors depend on.
     key: String,
-    /// Emission `[material]` by which the elements were grouped, W·m⁻²·sr⁻¹.
-    emission: Vec<[f32; 3]>,
+    /// Emitted radiosity by which the elements were grouped, `[material]`, W·m⁻².
+    emitted: Vec<[f32; 3]>,
     /// Position and radiant intensity of the point lights then.
     lights: Vec<([f64; 3], [f32; 3])>,
+    /// Sources that are no point lights.
+    surfaces: usize,
     chunk_words: u32,
     state: [u32; 3],
     rows: usize,
     runs: usize,
     values: usize,
     words: Vec<usize>,
+    /// Of this header without it, and of the lists.
     sha256: String,
 }
 
@@ -71,7 +76,7 @@ fn key(scene: &Scene, settings: &Settings) -> String {
     let sizes = (settings.hemicube, settings.emitter_shadows());
     let (seed, grouping) = (settings.seed, settings.grouping);
     hash.update(format!(
-        "5 {estimator:?} {sizes:?} {seed} {grouping:?} {flat}"
+        "6 {estimator:?} {sizes:?} {seed} {grouping:?} {flat}"
     ));
     hexadecimal(hash)
 }
@@ -124,8 +129,19 @@ impl Lists {
             .chain(chunks.map(|chunk| bytemuck::cast_slice_mut(chunk)))
     }
 
-    fn digest(&self) -> String {
+    fn digest(&self, header: &Header) -> String {
         let mut hash = Sha256::new();
+        let Header {
+            key,
+            emitted,
+            lights,
+            chunk_words,
+            state,
+            ..
+        } = header;
+        let lengths = (header.surfaces, header.rows, header.runs, header.values);
+        let numbers = (chunk_words, state, lengths, &header.words);
+        hash.update(format!("{key} {emitted:?} {lights:?} {numbers:?}"));
         self.bytes().for_each(|bytes| hash.update(bytes));
         hexadecimal(hash)
     }
@@ -142,6 +158,16 @@ impl Lists {
 }
 
 impl Header {
+    /// Whether all chunks but the last are full, so that there are no more of them than fit a file.
+    fn is_full(&self) -> bool {
+        let most = self.chunk_words as usize;
+        let full = |(i, &words): (usize, &usize)| match i + 1 < self.words.len() {
+            true => words == most && words > 0,
+            false => words <= most,
+        };
+        self.words.iter().enumerate().all(full)
+    }
+
     /// Bytes of the lists; no more than `u64::MAX` of a damaged one.
     fn list_bytes(&self) -> u64 {
         let row_bytes = size_of::<KeptRow>() + size_of::<[u32; 2]>();
@@ -154,7 +180,7 @@ impl Header {
 }
 
 impl Visibility {
-    pub(super) fn new(scene: &Scene, settings: &Settings, kept: Kept<'_>) -> Self {
+    pub(super) fn new(scene: &Scene, problem: &Problem, kept: Kept<'_>) -> Self {
         let none = KeptRow {
             chunk: NONE,
             first: 0,
@@ -171,22 +197,26 @@ impl Visibility {
             lists.runs.extend(runs);
             lists.values.extend(values);
         }
-        let lights = scene.point_lights.iter();
+        let GroupedBy { emitted, lights } = &problem.grouped_by;
+        let surface = |source: &&Source| source.kind != KIND_POINT;
+        let mut header = Header {
+            key: key(scene, &problem.settings),
+            emitted: emitted.iter().map(Vec3::to_array).collect(),
+            lights: (lights.iter())
+                .map(|l| (l.position.to_array(), l.intensity))
+                .collect(),
+            surfaces: problem.sources.list.iter().filter(surface).count(),
+            chunk_words: kept.chunk_words,
+            state: [kept.state.chunk, kept.state.used, kept.state.rows],
+            rows: lists.rows.len(),
+            runs: lists.runs.len(),
+            values: lists.values.len(),
+            words: lists.chunks.iter().map(Vec::len).collect(),
+            sha256: String::new(),
+        };
+        header.sha256 = lists.digest(&header);
         Self {
-            header: Header {
-                key: key(scene, settings),
-                emission: scene.materials.iter().map(|m| m.ke).collect(),
-                lights: lights
-                    .map(|l| (l.position.to_array(), l.intensity))
-                    .collect(),
-                chunk_words: kept.chunk_words,
-                state: [kept.state.chunk, kept.state.used, kept.state.rows],
-                rows: lists.rows.len(),
-                runs: lists.runs.len(),
-                values: lists.values.len(),
-                words: lists.chunks.iter().map(Vec::len).collect(),
-                sha256: lists.digest(),
-            },
+            header,
             starts: lists.starts(),
             lists,
         }
@@ -233,9 +263,7 @@ impl Visibility {
 
     /// Refuses a scene whose form factors these are not.
     pub fn check(&self, scene: &Scene, settings: &Settings) -> Result<()> {
-        if self.header.emission.len() == scene.materials.len()
-            && self.header.key == key(scene, settings)
-        {
+        if self.header.key == key(scene, settings) {
             return Ok(());
         }
         Err(Error::Scene {
@@ -244,24 +272,29 @@ impl Visibility {
         })
     }
 
-    /// The point lights of the bake.
-    pub(super) fn lights(&self) -> Vec<PointLight> {
+    pub(super) fn grouped_by(&self) -> GroupedBy {
         let lights = self.header.lights.iter();
-        lights
-            .map(|&(position, intensity)| PointLight {
-                name: String::new(),
-                position: position.into(),
-                intensity,
-            })
-            .collect()
+        GroupedBy {
+            emitted: self
+                .header
+                .emitted
+                .iter()
+                .copied()
+                .map(Vec3::from)
+                .collect(),
+            lights: lights
+                .map(|&(position, intensity)| PointLight {
+                    name: String::new(),
+                    position: position.into(),
+                    intensity,
+                })
+                .collect(),
+        }
     }
 
-    /// Radiosity from emission of each material then.
-    pub(super) fn emitted(&self) -> Vec<Vec3> {
-        let emission = self.header.emission.iter();
-        emission
-            .map(|&ke| Vec3::from(ke) * std::f32::consts::PI)
-            .collect()
+    /// Sources that are no point lights.
+    pub(super) fn surfaces(&self) -> usize {
+        self.header.surfaces
     }
 
     pub fn save(&self, path: &Path) -> Result<()> {
@@ -303,13 +336,14 @@ impl Visibility {
         read(&mut header)?;
         let header: Header =
             serde_json::from_slice(&header).map_err(|_| bad("its header is damaged"))?;
-        let too_long = |&words: &usize| words > header.chunk_words as usize;
-        if header.list_bytes() != length - header_length - 24 || header.words.iter().any(too_long) {
+        if header.list_bytes() != length - header_length - 24 || !header.is_full() {
             return Err(bad("its length is not what its header says"));
         }
         let mut lists = Lists::of(&header);
         lists.bytes_mut().try_for_each(&mut read)?;
-        if lists.digest() != header.sha256 {
+        let is_kept =
+            |row: &KeptRow| row.chunk == NONE || (row.chunk as usize) < lists.chunks.len();
+        if lists.digest(&header) != header.sha256 || !lists.rows.iter().all(is_kept) {
             return Err(bad(
                 "damaged: its form factors are not those that were written",
             ));

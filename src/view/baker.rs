@@ -281,8 +281,9 @@ impl Work {
             match before.solver.relight(&scene) {
                 Ok(()) => {
                     self.start(scene, before.solver, epoch);
-                    if let Some(solving) = &mut self.solving {
-                        solving.flat = before.flat;
+                    if let Some(solving) = self.solving.as_mut().filter(|_| before.flat) {
+                        solving.flat = true;
+                        self.tell(epoch, Some(Stage::Flat));
                     }
                     return Ok(());
                 }
