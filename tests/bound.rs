@@ -80,8 +80,12 @@ fn holds(reflectances: &[f32], lights: &[PointLight]) {
         let all = solve_to(1e-6, None);
         let sources = all.report.sources as u32;
         println!("reflectance {rho}: {sources} sources");
-        for share in [8, 4, 2] {
+        for share in [8, 2] {
             check(rho, emitted, &all, &solve_to(1e-6, Some(sources / share)));
+        }
+        // Near the end the bound is that of each source.
+        for residual in [4.0, 2.0, 1.0] {
+            check(rho, emitted, &all, &solve_to(residual, None));
         }
         // Bright rooms need every source for so little.
         let residual = if rho < 0.9 { 0.01 } else { 0.5 };
@@ -89,7 +93,7 @@ fn holds(reflectances: &[f32], lights: &[PointLight]) {
         let slack = check(rho, emitted, &all, &stopped);
         assert!(stopped.report.error_bound.is_some_and(|b| b <= residual));
         if stopped.report.shots < sources {
-            // Measured: 1.01 and 1.13.
+            // Measured: 1.01 to 1.13, with a point light 1.11.
             assert!(
                 slack <= 2.0,
                 "reflectance {rho}: bound {slack:.2} x what is missing"

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::fresh_rows::FreshRows;
 use super::kept_rows::KeptRows;
 use super::shaders::{allocate, keep};
-use super::types::KeptRow;
+use super::types::{KeptRow, Slot};
 use crate::constants::KEEP_BLOCKS;
 use crate::error::Result;
 use crate::vk::{BoundCompute, Buffer, BufferUse, Commands, ComputePipeline, Device, Stage};
@@ -29,7 +29,11 @@ impl Keep {
         fresh: &FreshRows,
         kept: &KeptRows,
     ) -> Result<Self> {
-        assert!(slot_count <= fresh.slot_count, "a slot has a fresh row");
+        let slot_bytes = u64::from(slot_count) * size_of::<Slot>() as u64;
+        assert!(
+            slots.bytes() >= slot_bytes && slot_count <= fresh.slot_count,
+            "each slot is there and has a fresh row"
+        );
         let bytes = u64::from(slot_count) * size_of::<KeptRow>() as u64;
         let rows = Buffer::new(device, "rows of a batch", bytes, BufferUse::Storage)?;
         let lanes = [device.limits().subgroup_size];

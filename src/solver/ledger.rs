@@ -54,28 +54,28 @@ const UNGATHERED: f64 = 0.04;
 const UNEVEN: f64 = 0.1;
 
 impl Ledger {
-    /// Sources that are to be drawn first, with their unshot power: the strong emitters, and after
-    /// them all others, until all emission is drawn and little is left. And whether they are
-    /// strong.
+    /// Sources that are to be drawn first, with their unshot power, and whether they are strong: the
+    /// strong emitters; after them all others, until little is left; and then what still emits.
     pub fn undrawn(&self) -> Option<Candidates> {
-        let mut strong = Vec::new();
-        let mut others = Vec::new();
-        let (mut emitted_left, mut missing, mut squared) = (0.0, 0.0, 0.0);
+        let (mut strong, mut emitting, mut others) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut missing, mut squared) = (0.0, 0.0);
         for (s, drawn) in self.sources.iter().enumerate() {
             if self.system.is_drawn(s) || drawn.under_way {
                 continue;
             }
             let (power, emitted) = self.system.unshot_power(s);
-            if power > 0.0 {
-                emitted_left += emitted;
+            if power <= 0.0 {
+                continue;
+            }
+            let candidate = (s as u32, power);
+            if drawn.strong {
+                strong.push(candidate);
+            } else if emitted > 0.0 {
+                emitting.push(candidate);
+            } else {
                 missing += self.system.missing(s);
                 squared += self.system.unshot_squared(s);
-                let list = if drawn.strong {
-                    &mut strong
-                } else {
-                    &mut others
-                };
-                list.push((s as u32, power));
+                others.push(candidate);
             }
         }
         if !strong.is_empty() {
@@ -85,9 +85,12 @@ impl Ledger {
             });
         }
         let little = missing <= UNDRAWN * self.most_missing && squared <= self.most_squared;
-        let done = emitted_left == 0.0 && little;
-        (!done).then_some(Candidates {
-            powers: others,
+        let mut powers = emitting;
+        if !little {
+            powers.extend(others);
+        }
+        (!powers.is_empty()).then_some(Candidates {
+            powers,
             strong: false,
         })
     }
