@@ -186,9 +186,11 @@ impl Visibility {
             first: 0,
             scale: 1.0,
         };
+        let mut chunks = kept.chunks;
+        while chunks.pop_if(|chunk| chunk.is_empty()).is_some() {}
         let mut lists = Lists {
             rows: kept.rows.iter().map(|row| row.unwrap_or(none)).collect(),
-            chunks: kept.chunks,
+            chunks,
             ..Lists::default()
         };
         for row in &kept.coupling {
