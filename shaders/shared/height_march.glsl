@@ -42,7 +42,7 @@ vec3 product_rest(vec3 a, vec3 b, out vec3 rest) {
 }
 
 struct Segment {
-    ivec2 whole;      // cell of the start, of the period where the texture coordinates' whole parts are 0
+    ivec2 whole;      // cell of the start, in the period from texture coordinate 0 to 1
     vec3 start;       // place in that cell, and height
     vec3 step;        // from the start to the end
     vec3 step_rest;

@@ -9,7 +9,7 @@ struct Source {
     vec3 normal;       // mean normal, the hemicube's axis
     float radius;      // of the ball about `middle` that holds the group
     vec3 tangent;
-    float cone_sin;    // sine of the largest angle between `normal` and a member's; 0: all in one plane
+    float cone_sin;    // sine of the largest angle between `normal` and a member's; 0: plane
     vec3 bitangent;
     float cone_cos;
     vec3 emitted;      // radiosity from emission; a point light's intensity
@@ -38,12 +38,12 @@ struct Triangle {
     float unused;
 };
 
-// Up to MESHLET_TRIANGLES consecutive occluders.
+// Up to MESHLET_TRIANGLES consecutive occluders. A cutoff of 2 never hides them.
 struct Meshlet {
     vec3 centre;
     float radius;
     vec3 axis;         // of the cone of normals
-    float cutoff;      // back-facing as a whole where dot(centre - eye, axis) >= cutoff |centre - eye| + radius; 2: never
+    float cutoff;      // hidden where (centre - eye) · axis >= cutoff |centre - eye| + radius
     uint first;
     uint count;
     uint component;
@@ -239,7 +239,7 @@ struct ShadowNode {
     vec3 low;           // from the eye, internal units
     uint skip;          // the node that follows all that is in this one
     vec3 high;
-    uint leaf;          // LEAF_TRIANGLES times its first triangle, plus how many a leaf has; others have none
+    uint leaf;          // LEAF_TRIANGLES · its first triangle + how many; 0: no leaf
 };
 
 // What casts a shadow.

@@ -6,7 +6,7 @@ layout(location = 0) in vec3 position;     // from the scene's middle, internal 
 layout(location = 1) in vec3 normal;       // of the triangle
 layout(location = 2) in vec2 uv;
 
-layout(location = 0) out vec3 corner_light; // E of what is shown, W·m⁻²; negative where the triangle shows its back
+layout(location = 0) out vec3 corner_light; // E of what is shown, W·m⁻²; negative on backs
 layout(location = 1) out vec2 corner_uv;
 
 // [corner] of the drawn triangles, W·m⁻²: all light, and what comes straight from emitters and

@@ -12,7 +12,7 @@ layout(push_constant, scalar) uniform Parameters {
     vec2 parts;            // how often all light and direct light count
     float elements;        // 1: outlined
     float sources;         // 1: coloured
-    uint from_picture;     // 1 and 2: the surface is what the whole or the coarse picture shows; 3: what they show from elsewhere
+    uint from_picture;     // 1, 2: shows the whole or the coarse picture; 3: them from elsewhere
     uint chosen;           // element that is marked
 };
 

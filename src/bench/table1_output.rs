@@ -26,7 +26,8 @@ pub struct Row {
     /// All of the bake but reading the scene.
     pub seconds: f64,
     pub paper_minutes: Option<f64>,
-    /// Frames a second from the scene's first camera, [`super::table1::FRAME`] pixels, for bakes in K directions.
+    /// Frames a second from the scene's first camera, [`super::table1::FRAME`] pixels, for bakes in
+    /// K directions.
     pub fps_factored: Option<Rate>,
     pub fps_clusters: Option<Rate>,
     pub paper_fps: Option<f64>,

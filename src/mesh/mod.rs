@@ -10,5 +10,6 @@ pub mod meshlets;
 pub mod meso_vertices;
 pub mod occluders;
 pub mod relief;
+pub mod shadow_tree;
 pub mod sources;
 pub mod tiles;

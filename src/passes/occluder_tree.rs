@@ -4,25 +4,18 @@
 use std::sync::Arc;
 
 use super::buffers::upload;
-use super::shadow_rays::{Casts, ShadowTree};
 use super::types::ShadowOccluder;
 use crate::error::Result;
 use crate::mesh::charts::Connections;
 use crate::mesh::elements::Elements;
 use crate::mesh::occluders::Occluders;
+use crate::mesh::shadow_tree::ShadowTree;
 use crate::vk::{Buffer, BufferUse, Device};
-use glam::Vec3;
 
 /// The tree on the device.
 pub struct OccluderTree {
     pub nodes: Buffer,
     pub occluders: Buffer,
-}
-
-impl Casts for ShadowOccluder {
-    fn corners(&self) -> [Vec3; 3] {
-        [self.a, self.b, self.c]
-    }
 }
 
 /// `[occluder]`, internal units.

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::constants::{KIND_SURFACE, LEAF_TRIANGLES, NONE};
+use crate::constants::{KIND_SURFACE, NONE};
 use crate::mesh::{meshlets, sources};
 use crate::meso::HeightPyramid;
 pub use crate::structs::*;
@@ -96,13 +96,5 @@ impl HeightTile {
             top: pyramid.top(),
             highest: pyramid.highest(),
         }
-    }
-}
-
-impl ShadowNode {
-    /// Of a leaf.
-    pub fn triangles(&self) -> std::ops::Range<usize> {
-        let first = self.leaf / LEAF_TRIANGLES;
-        first as usize..(first + self.leaf % LEAF_TRIANGLES) as usize
     }
 }

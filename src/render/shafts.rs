@@ -6,7 +6,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::passes::shadow_rays::ShadowTree;
+use crate::mesh::shadow_tree::ShadowTree;
 use crate::passes::types::{LitTriangle, ShadowTriangle};
 use crate::picture::Projection;
 use crate::scene::Scene;

@@ -54,7 +54,7 @@ const UNGATHERED: f64 = 0.04;
 const UNEVEN: f64 = 0.1;
 
 impl Ledger {
-    /// Sources that are to be drawn first, with their unshot power, and whether they are strong: the
+    /// Sources that are to be drawn, with their unshot power, and whether they are strong: the
     /// strong emitters; after them all others, until little is left; and then what still emits.
     pub fn undrawn(&self) -> Option<Candidates> {
         let (mut strong, mut emitting, mut others) = (Vec::new(), Vec::new(), Vec::new());

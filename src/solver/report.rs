@@ -10,10 +10,11 @@ use crate::meso::{Class, Relief, Transport};
 use crate::passes::cull::Culling;
 use crate::vk::Device;
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum StopReason {
     /// The error bound is no more than what was asked for.
+    #[default]
     Residual,
     Budget,
     Shots,
@@ -30,17 +31,11 @@ pub struct Seconds {
     pub setup: f64,
     /// Wall time of all batches.
     pub solve_wall: f64,
-    // By GPU timestamps:
-    pub cull: f64,
-    pub item_buffer: f64,
-    /// Form factors.
-    pub bin: f64,
-    /// Coupling the sources, and keeping their form factors.
-    pub keep: f64,
-    // Wall time:
-    /// Solving among the sources.
+    #[serde(flatten)]
+    pub stages: Stages,
+    /// Wall time of solving among the sources.
     pub solve: f64,
-    /// Bringing light to the elements.
+    /// Wall time of bringing light to the elements.
     pub gather: f64,
 }
 
@@ -66,7 +61,7 @@ pub struct Skipped {
     pub dark_slots: u64,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct Report {
     pub device: String,
     /// Those that drew for it.
@@ -156,20 +151,7 @@ impl Report {
             elements: elements.len() as u64,
             sources: sources.list.len() as u64,
             batch: problem.slots,
-            hemicubes: 0,
-            emitter_hemicubes: 0,
-            emitters_by_rays: 0,
-            triangles_drawn: 0,
-            kept_sources: 0,
-            drawn_again: 0,
-            gathered_rows: 0,
-            sweeps: 0,
-            coupling_bytes: 0,
-            shots: 0,
             unshot_share: 1.0,
-            error_bound: None,
-            stop: StopReason::Residual,
-            seconds: Seconds::default(),
             skipped: Skipped {
                 black_sources: sources.black as u64,
                 triangles_merged: (elements.len() - problem.occluders.len()) as u64,
@@ -178,14 +160,8 @@ impl Report {
             relief: elements.relief.as_ref().map(ReliefReport::new),
             meshlets: problem.scene.meshlet_count.into(),
             culls: settings.culling != Culling::Off,
+            ..Self::default()
         }
-    }
-
-    pub(super) fn add_stages(&mut self, stages: Stages) {
-        self.seconds.cull += stages.cull;
-        self.seconds.item_buffer += stages.item_buffer;
-        self.seconds.bin += stages.bin;
-        self.seconds.keep += stages.keep;
     }
 
     /// Counts a row: of a strong emitter or not, drawn before or not.

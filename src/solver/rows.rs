@@ -5,6 +5,8 @@ use std::collections::VecDeque;
 use std::ops::AddAssign;
 use std::sync::Arc;
 
+use serde::Serialize;
+
 use super::drawing::{Drawing, read_items};
 use super::estimate::Evaluate;
 use super::{EmitterShadows, Settings};
@@ -51,7 +53,7 @@ pub(super) struct FactorWords {
 }
 
 /// Seconds of each stage of a batch, by GPU timestamps.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Stages {
     pub cull: f64,
     pub item_buffer: f64,
@@ -144,7 +146,24 @@ impl RowMaker {
         let keep = (parts.kept)
             .map(|kept| Keep::new(device, &batch.slots, batch.slot_count, fresh, kept))
             .transpose()?;
-        let layout = Layout::new(&batch, couple.word_count(), parts);
+        let words = |count: u32| 4 * u64::from(count);
+        let counts = match &batch.sight {
+            Sight::Hemicubes(hemicubes) => Some(&hemicubes.counts),
+            Sight::Rays(_) => None,
+        };
+        let (kept, shape) = (keep.is_some(), fresh.shape);
+        let to_host = |buffer| (!kept).then_some(buffer);
+        let parts_of_rows = [
+            (Some(&batch.slots), size_of::<Slot>() as u64),
+            (keep.as_ref().map(|k| &k.rows), size_of::<KeptRow>() as u64),
+            (Some(&couple.coupling), words(couple.word_count())),
+            (counts, words(3 * FACES)),
+            (Some(&fresh.facing_away), words(1)),
+            (to_host(&fresh.plain), words(shape.plain_count)),
+            (to_host(&fresh.meso), words(3 * shape.meso_count)),
+            (to_host(&fresh.occupied), words(shape.blocks())),
+        ];
+        let layout = Layout::new(batch.slot_count.into(), parts_of_rows);
         let make = |name, bytes, usage| {
             let buffer = || Buffer::new(device, name, bytes, usage);
             Ok::<_, crate::error::Error>([buffer()?, buffer()?])
@@ -178,8 +197,7 @@ impl RowMaker {
                 }
                 cmd.timestamp(stamps, 4);
                 cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
-                let rows = keep.as_ref().map(|keep| &keep.rows);
-                layout.record(cmd, &batch, fresh, &couple.coupling, rows, &readback[i]);
+                layout.record(cmd, &readback[i]);
                 cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
                 Ok(())
             })
@@ -272,14 +290,18 @@ pub(super) fn emitter_looks(
 }
 
 /// Where the parts of rows lie in a readback buffer: each part of all slots before the next.
-#[derive(Default)]
 struct Layout {
     slots: u64,
-    /// Bytes of each part of a slot, and where the part begins.
-    parts: [(u64, u64); PARTS],
+    parts: [Part; PARTS],
     bytes: u64,
-    kept: bool,
-    drawn: bool,
+}
+
+struct Part {
+    /// None of a part that is not read.
+    from: Option<Buffer>,
+    /// Of a slot.
+    bytes: u64,
+    at: u64,
 }
 
 const PARTS: usize = 8;
@@ -293,83 +315,49 @@ const MESO: usize = 6;
 const OCCUPIED: usize = 7;
 
 impl Layout {
-    fn new(batch: &Batch, coupling_words: u32, parts: &RowParts<'_>) -> Self {
-        let kept = parts.kept.is_some();
-        let drawn = matches!(batch.sight, Sight::Hemicubes(_));
-        let shape = parts.fresh.shape;
-        let only = |wanted: bool, bytes: u64| if wanted { bytes } else { 0 };
-        let sizes = [
-            size_of::<Slot>() as u64,
-            only(kept, size_of::<KeptRow>() as u64),
-            4 * u64::from(coupling_words),
-            only(drawn, u64::from(FACES) * size_of::<[u32; 3]>() as u64),
-            4,
-            only(!kept, 4 * u64::from(shape.plain_count)),
-            only(!kept, 12 * u64::from(shape.meso_count)),
-            only(!kept, 4 * u64::from(shape.blocks())),
-        ];
-        let slots = u64::from(batch.slot_count);
-        let mut layout = Self {
+    /// Of these buffers, with the bytes of a slot.
+    fn new(slots: u64, parts: [(Option<&Buffer>, u64); PARTS]) -> Self {
+        let mut end = 0;
+        let parts = parts.map(|(from, bytes)| {
+            let (bytes, at) = (if from.is_some() { bytes } else { 0 }, end);
+            end += slots * bytes;
+            let from = from.cloned();
+            Part { from, bytes, at }
+        });
+        Self {
             slots,
-            kept,
-            drawn,
-            ..Self::default()
-        };
-        for (part, size) in layout.parts.iter_mut().zip(sizes) {
-            *part = (size, layout.bytes);
-            layout.bytes += size * slots;
+            parts,
+            bytes: end,
         }
-        layout
     }
 
-    fn record(
-        &self,
-        cmd: &Commands,
-        batch: &Batch,
-        fresh: &FreshRows,
-        coupling: &Buffer,
-        rows: Option<&Buffer>,
-        to: &Buffer,
-    ) {
-        let copy = |part: usize, from: &Buffer| {
-            let (size, at) = self.parts[part];
-            cmd.copy(from, 0, to, at, size * self.slots);
-        };
-        copy(SLOT, &batch.slots);
-        if let Some(rows) = rows {
-            copy(ROW, rows);
+    fn record(&self, cmd: &Commands, to: &Buffer) {
+        for Part { from, bytes, at } in &self.parts {
+            if let Some(from) = from {
+                cmd.copy(from, 0, to, *at, bytes * self.slots);
+            }
         }
-        copy(COUPLING, coupling);
-        if let Sight::Hemicubes(hemicubes) = &batch.sight {
-            copy(COUNTS, &hemicubes.counts);
-        }
-        copy(AWAY, &fresh.facing_away);
-        copy(PLAIN, &fresh.plain);
-        copy(MESO, &fresh.meso);
-        copy(OCCUPIED, &fresh.occupied);
     }
 
     fn read(&self, slot: u64, source: u32, from: &Buffer) -> Row {
-        let at = |part: usize| self.parts[part].1 + slot * self.parts[part].0;
-        let words = |part: usize| from.read(at(part), self.parts[part].0 as usize / 4);
+        let at = |part: usize| self.parts[part].at + slot * self.parts[part].bytes;
+        let bytes = |part: usize| self.parts[part].bytes as usize;
+        let words = |part: usize| from.read(at(part), bytes(part) / 4);
         let drawn: Slot = from.read(at(SLOT), 1)[0];
         assert_eq!(drawn.source, source, "a slot holds what was asked for");
         Row {
             source,
             scale: drawn.scale,
-            coupling: from.read(at(COUPLING), self.parts[COUPLING].0 as usize / 4),
-            factors: match self.kept {
-                true => Factors::Kept(from.read::<KeptRow>(at(ROW), 1)[0]),
-                false => Factors::Host(FactorWords {
+            coupling: from.read(at(COUPLING), bytes(COUPLING) / 4),
+            factors: match self.parts[ROW].from {
+                Some(_) => Factors::Kept(from.read::<KeptRow>(at(ROW), 1)[0]),
+                None => Factors::Host(FactorWords {
                     plain: words(PLAIN),
                     meso: words(MESO),
                     occupied: words(OCCUPIED),
                 }),
             },
-            counts: match self.drawn {
-                true => from.read(at(COUNTS), FACES as usize),
-                false => Vec::new(),
-            },
+            counts: from.read(at(COUNTS), bytes(COUNTS) / size_of::<[u32; 3]>()),
             facing_away: from.read(at(AWAY), 1)[0],
         }
     }

@@ -93,12 +93,6 @@ impl Several {
     }
 }
 
-impl Drop for Several {
-    fn drop(&mut self) {
-        self.board.close();
-    }
-}
-
 /// Keeps rows that come from the host.
 struct Keeper {
     device: Arc<Device>,

@@ -132,7 +132,7 @@ impl Shots {
                 .map(|s| self.sources[s].shoot(s as u32, reflected[s]))
                 .collect();
             let (stages, counts) = pass.run(&slots)?;
-            report.add_stages(stages);
+            report.seconds.stages += stages;
             for (counts, _) in counts.chunks(FACES as usize).zip(&slots) {
                 report.add_drawn(counts, strong);
             }

@@ -253,7 +253,7 @@ impl Spine {
 
     /// Solves the system, keeps the rows of a batch, and gathers by those that find no room.
     fn take_in(&mut self, made: Made, report: &mut Report) -> Result<()> {
-        report.add_stages(made.stages);
+        report.seconds.stages += made.stages;
         let mut loose = Vec::new();
         for row in made.rows {
             let s = row.source as usize;
