@@ -264,6 +264,7 @@ fn a_solver_is_relit_where_it_is() {
     let device = device();
     let mut more = relit_scene();
     more.point_light(DVec3::splat(0.5), 1.0);
+    let file = tempfile::NamedTempFile::new().expect("a file");
     for emitter_hemicube in [Some(settings().hemicube), None] {
         let settings = Settings {
             emitter_hemicube,
@@ -278,10 +279,12 @@ fn a_solver_is_relit_where_it_is() {
         let by_file = solve(&relit, kept.as_ref());
         let expected = by_file.light().expect("the light comes back");
         assert!(solver.relight(&more.0.scene).is_err());
+        let mut lengths = Vec::new();
         for (scene, expected, drawn) in [
             (&relit, &expected, 2),
             (&first, &before, 2),
             (&first, &before, 0),
+            (&relit, &expected, 2),
         ] {
             solver.relight(scene).expect("only lights differ");
             solver.run(|_| true).expect("the device solves the scene");
@@ -292,7 +295,14 @@ fn a_solver_is_relit_where_it_is() {
             let off = largest_difference(&light.irradiance, &expected.irradiance);
             println!("relit in place, {drawn} rows: {off:.1e}");
             assert!(off <= TOLERANCE);
+            let kept = solver.visibility(scene).expect("it comes back");
+            (kept.expect("it is kept").save(file.path())).expect("it is written");
+            lengths.push(file.path().metadata().expect("it is there").len());
         }
+        assert_eq!(
+            lengths[0], lengths[3],
+            "lights that move give back their room"
+        );
     }
     assert_silent();
 }
