@@ -35,7 +35,8 @@ pub fn module(text: &str) -> Result<String, String> {
                 let offsets: String = members.iter().map(offset).collect();
                 let _ = writeln!(
                     list,
-                    "Struct {{ name: {name:?}, offsets: &[{offsets}], bytes: size_of::<{name}>() }},"
+                    "Struct {{ name: {name:?}, offsets: &[{offsets}], \
+                     bytes: size_of::<{name}>() }},"
                 );
                 open = None;
             }

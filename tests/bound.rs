@@ -99,7 +99,7 @@ fn holds(reflectances: &[f32], lights: &[PointLight]) {
                 "reflectance {rho}: bound {slack:.2} x what is missing"
             );
         }
-        assert!(stopped.report.shots < sources || rho > 0.5);
+        assert!(stopped.report.shots < sources || rho > 0.99);
     }
 }
 

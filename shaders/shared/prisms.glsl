@@ -46,7 +46,8 @@ struct Tetrahedron {
 
 // From space to the shares of the corners b, c and d.
 mat3 turn_of(Tetrahedron t) {
-    mat3 edges = mat3(t.b.position - t.a.position, t.c.position - t.a.position, t.d.position - t.a.position);
+    mat3 edges = mat3(t.b.position - t.a.position, t.c.position - t.a.position,
+                      t.d.position - t.a.position);
     float volume = determinant(edges);
     return volume == 0.0 ? mat3(0.0) : inverse(edges);
 }
@@ -65,8 +66,8 @@ Part cut(Tetrahedron t, vec3 from, vec3 along) {
     vec4 padded = at + PADDING;
     vec4 zero = -padded / mix(vec4(1.0), rate, notEqual(rate, vec4(0.0)));
     vec4 behind = mix(vec4(-1.0), zero, grows);
-    vec4 before = mix(mix(vec4(NEVER), vec4(-NEVER), lessThan(padded, vec4(0.0))), mix(vec4(NEVER), zero, falls),
-                      notEqual(rate, vec4(0.0)));
+    vec4 before = mix(mix(vec4(NEVER), vec4(-NEVER), lessThan(padded, vec4(0.0))),
+                      mix(vec4(NEVER), zero, falls), notEqual(rate, vec4(0.0)));
     Part part;
     part.enter = max(max(max(behind.x, behind.y), max(behind.z, behind.w)), -1.0);
     part.leave = min(min(before.x, before.y), min(before.z, before.w));
@@ -74,7 +75,8 @@ Part cut(Tetrahedron t, vec3 from, vec3 along) {
     vec4 last = at + part.leave * rate;
     part.from = first.x * t.a.uvh + first.y * t.b.uvh + first.z * t.c.uvh + first.w * t.d.uvh;
     part.to = last.x * t.a.uvh + last.y * t.b.uvh + last.z * t.c.uvh + last.w * t.d.uvh;
-    part.first = first.x * t.a.share + first.y * t.b.share + first.z * t.c.share + first.w * t.d.share;
+    part.first = first.x * t.a.share + first.y * t.b.share + first.z * t.c.share
+                 + first.w * t.d.share;
     part.last = last.x * t.a.share + last.y * t.b.share + last.z * t.c.share + last.w * t.d.share;
     return part;
 }
@@ -104,7 +106,8 @@ bool meet_part(Part part, Prism p, ReliefSurface surface, bool plane, out Place 
         }
         // A ray that comes in through the bottom shows the underside; one that comes in below the
         // surface through a side, at a seam of heights, shows the step.
-        place.under = hit.t == 0.0 && from.z < surface.lowest + BOTTOM * (surface.top - surface.lowest);
+        place.under = hit.t == 0.0
+                      && from.z < surface.lowest + BOTTOM * (surface.top - surface.lowest);
         t = hit.t;
         place.gradient = hit.gradient;
         place.height = hit.height;

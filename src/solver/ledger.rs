@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::gather::LitRow;
+use super::progress::Bound;
 use super::system::System;
 use crate::passes::types::KeptRow;
 
@@ -11,12 +12,7 @@ pub(super) struct Ledger {
     pub system: System,
     /// `[source]`
     pub sources: Vec<Drawn>,
-    /// Missing power at which the solution is done, internal units.
-    pub most_missing: f64,
-    /// See [`super::progress::Bound::most_squared`].
-    pub most_squared: f64,
-    /// What a unit of unshot power can turn into at most.
-    pub importance: f64,
+    pub bound: Bound,
 }
 
 /// Sources that are to be drawn, with the power that they have to send.
@@ -84,7 +80,8 @@ impl Ledger {
                 strong: true,
             });
         }
-        let little = missing <= UNDRAWN * self.most_missing && squared <= self.most_squared;
+        let bound = self.bound;
+        let little = missing <= UNDRAWN * bound.most_missing() && squared <= bound.most_squared();
         let mut powers = emitting;
         if !little {
             powers.extend(others);
@@ -107,7 +104,7 @@ impl Ledger {
         // The last ones may keep what is little together.
         let mut kept_back = 0.0;
         while let Some(&(_, power)) = owing.last()
-            && kept_back + power <= UNGATHERED * self.stop_power()
+            && kept_back + power <= UNGATHERED * self.bound.stop_power()
         {
             kept_back += power;
             owing.pop();
@@ -118,11 +115,6 @@ impl Ledger {
             powers: owing,
             strong,
         })
-    }
-
-    /// Unshot power that turns into the missing power at which the solution is done, at most.
-    pub fn stop_power(&self) -> f64 {
-        self.most_missing / self.importance
     }
 
     /// What a source has to send the elements: emitted and reflected radiosity.

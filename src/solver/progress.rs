@@ -31,6 +31,8 @@ pub(super) struct Bound {
     emitted: f64,
     /// Of all elements, internal units.
     area: f64,
+    /// The bound at which the solution is done.
+    residual: f64,
 }
 
 /// The rms of the light that undrawn sources fail to bring, over the mean of what is emitted, for a
@@ -45,6 +47,7 @@ impl Bound {
             factor: (rho < 1.0).then(|| 1.0 / (1.0 - rho)),
             emitted: sources.map(Source::emitted_power).sum(),
             area: problem.elements.area.iter().sum(),
+            residual: problem.settings.residual,
         }
     }
 
@@ -70,16 +73,21 @@ impl Bound {
         (self.factor).map(|factor| self.share(missing) + rounding * factor * factor)
     }
 
-    /// Missing power at which the bound is `residual`, rounding apart.
-    pub fn most_missing(&self, residual: f64) -> f64 {
-        residual * self.emitted
+    /// Missing power at which the solution is done, internal units; rounding apart.
+    pub fn most_missing(&self) -> f64 {
+        self.residual * self.emitted
+    }
+
+    /// Unshot power that turns into so much, at most.
+    pub fn stop_power(&self) -> f64 {
+        self.most_missing() / self.importance()
     }
 
     /// What undrawn sources may have of area times unshot radiosity squared, summed over the
     /// colours. With form factors F_es from an element, ∫ (Σ_s F_es b_s)² ≤ Σ_s A_s b_s², since
     /// Σ_s F_es ≤ 1 (Jensen) and A_e F_es = A_s F_se.
-    pub fn most_squared(&self, residual: f64) -> f64 {
-        (LOCAL * residual * self.emitted).powi(2) / (3.0 * self.area)
+    pub fn most_squared(&self) -> f64 {
+        (LOCAL * self.residual * self.emitted).powi(2) / (3.0 * self.area)
     }
 }
 
@@ -88,7 +96,6 @@ pub(super) struct Watch<'a> {
     start: Instant,
     budget: Duration,
     bound: Bound,
-    residual: f64,
     sources: u32,
     history: Vec<(f64, f64)>,
     go_on: &'a mut dyn FnMut(&Update) -> bool,
@@ -102,7 +109,6 @@ impl<'a> Watch<'a> {
             start: Instant::now(),
             budget: problem.settings.budget.unwrap_or(Duration::MAX),
             bound,
-            residual: problem.settings.residual,
             sources: problem.scene.source_count,
             history: Vec::new(),
             go_on,
@@ -125,7 +131,7 @@ impl<'a> Watch<'a> {
             unshot_share: self.bound.share(unshot),
             error_bound: self.bound.of(missing),
             elapsed,
-            left: time_left(&self.history, self.residual),
+            left: time_left(&self.history, self.bound.residual),
         };
         if !(self.go_on)(&update) {
             self.stop = Some(StopReason::Interrupted);

@@ -30,10 +30,7 @@ pub(super) struct Shots {
     emitters: Option<ShotPass>,
     /// `[source]`
     sources: Vec<Shot>,
-    /// Missing power at which the solution is done, internal units, and what a unit of unshot power
-    /// can turn into at most.
-    most_missing: f64,
-    importance: f64,
+    bound: Bound,
 }
 
 /// What a source has sent.
@@ -100,8 +97,7 @@ impl Shots {
             all: ShotPass::new(device, on, relief, relief.slots, face)?,
             emitters,
             sources,
-            most_missing: bound.most_missing(on.settings.residual),
-            importance: bound.importance(),
+            bound,
         })
     }
 
@@ -111,7 +107,7 @@ impl Shots {
         loop {
             let reflected = self.measure(on)?;
             let unshot = self.unshot(&reflected);
-            if !watch.look(report.shots, unshot, self.importance * unshot) {
+            if !watch.look(report.shots, unshot, self.bound.importance() * unshot) {
                 return Ok(());
             }
             let (chosen, strong) = self.choose(&reflected);
@@ -162,7 +158,7 @@ impl Shots {
                 powers.push((s, power));
             }
         }
-        if emitted_left == 0.0 && self.importance * power_left <= self.most_missing {
+        if emitted_left == 0.0 && power_left <= self.bound.stop_power() {
             return (Vec::new(), false);
         }
         powers.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));

@@ -129,7 +129,11 @@ impl Spine {
         let limit = on.settings.shots.unwrap_or(u32::MAX);
         let mut corrections = 0;
         while self.draw(on, Phase::First, report, watch)? {
-            self.solve(UNSOLVED * self.ledger.stop_power(), MOST_SWEEPS, report);
+            self.solve(
+                UNSOLVED * self.ledger.bound.stop_power(),
+                MOST_SWEEPS,
+                report,
+            );
             if report.shots < limit && self.ledger.undrawn().is_some() {
                 continue;
             }
@@ -144,7 +148,9 @@ impl Spine {
             }
             self.measure()?;
             let left = self.ledger.missing();
-            if corrections > u32::from(on.relief.is_some()) && left <= self.ledger.most_missing {
+            if corrections > u32::from(on.relief.is_some())
+                && left <= self.ledger.bound.most_missing()
+            {
                 break;
             }
             if corrections == CORRECTIONS {
@@ -155,9 +161,13 @@ impl Spine {
             self.ledger.system.shoot_unknown();
         }
         if watch.stop.is_some() {
-            self.solve(UNSOLVED * self.ledger.stop_power(), MOST_SWEEPS, report);
+            self.solve(
+                UNSOLVED * self.ledger.bound.stop_power(),
+                MOST_SWEEPS,
+                report,
+            );
         }
-        let done = match self.ledger.missing() <= self.ledger.most_missing {
+        let done = match self.ledger.missing() <= self.ledger.bound.most_missing() {
             true => StopReason::Residual,
             false if report.shots >= limit => StopReason::Shots,
             false => StopReason::Unsolved,
@@ -216,10 +226,10 @@ impl Spine {
         self.take_in(made, report)?;
         if phase == Phase::First {
             let undrawn = self.ledger.system.unshot().undrawn;
-            let most = ORDERED * undrawn.max(self.ledger.stop_power());
+            let most = ORDERED * undrawn.max(self.ledger.bound.stop_power());
             self.solve(most, ORDERING_SWEEPS, report);
             // Importance matters once the end is near.
-            if self.ledger.missing() <= NEAR_THE_END * self.ledger.most_missing {
+            if self.ledger.missing() <= NEAR_THE_END * self.ledger.bound.most_missing() {
                 weigh(&mut self.ledger, on);
             }
         }
@@ -398,9 +408,7 @@ fn ledger(
     let mut ledger = Ledger {
         system,
         sources,
-        most_missing: bound.most_missing(on.settings.residual),
-        most_squared: bound.most_squared(on.settings.residual),
-        importance: bound.importance(),
+        bound,
     };
     (0..RESTORED_WEIGHINGS).for_each(|_| weigh(&mut ledger, on));
     ledger

@@ -82,7 +82,8 @@ fn is_taken_off_the_screen_and_put_back() {
 fn obeys_real_keys_and_mouse() {
     let room = Room::baked("room");
     let script = format!(
-        "{QUIET}frames 1\nmove 200 120\npress middle\nmove 240 140\nrelease middle\nkey 2\nframes 2\nscreenshot script.png"
+        "{QUIET}frames 1\nmove 200 120\npress middle\nmove 240 140\nrelease middle\nkey 2\n\
+         frames 2\nscreenshot script.png"
     );
     view(room.path(), "room.safetensors", &script);
     let display = Display::new();
