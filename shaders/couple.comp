@@ -1,7 +1,7 @@
 // Couples the drawn sources of a batch to all sources: what a source's row brings to the members of
-// each target, as a mean by area. A target of one reflectance has one word, Σ A_j F_js / A_t, which
-// the host multiplies by the reflectance; any other has three, Σ ρ_j A_j F_js / A_t. One invocation
-// a target and slot. src/reference/couple.rs is the same in f64.
+// each target, as a mean by weights w_j, of which those of a target sum to its area A_t. A target of
+// one reflectance has one word, Σ w_j F_js / A_t, which the host multiplies by the reflectance; any
+// other has three, Σ ρ_j w_j F_js / A_t. One invocation a target and slot. src/reference/couple.rs is the same in f64.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/types.glsl"
@@ -11,7 +11,7 @@ layout(local_size_x = GROUP) in;
 layout(scalar, binding = 0) readonly buffer Slots { Slot slots[]; };
 layout(scalar, binding = 1) readonly buffer Targets { CouplingTarget targets[]; };
 layout(scalar, binding = 2) readonly buffer Reflectances { vec3 reflectance[]; };
-layout(scalar, binding = 3) readonly buffer Areas { float element_area[]; };
+layout(scalar, binding = 3) readonly buffer Weights { float weights[]; };
 // [slot][element], of elements without and with relief.
 layout(scalar, binding = 4) readonly buffer Fresh { float fresh[]; };
 layout(scalar, binding = 5) readonly buffer FreshMeso { vec3 fresh_meso[]; };
@@ -52,7 +52,7 @@ void main() {
         }
         for (; i < block_end; i++) {
             float f = meso ? fresh_meso[first_factor + i].z : fresh[first_factor + i];
-            float weighted = f * element_area[base + i];
+            float weighted = f * weights[base + i];
             even += weighted;
             if (target.word_count == 3) {
                 coloured += weighted * reflectance[base + i];

@@ -1,6 +1,6 @@
 // In an enclosed scene all that a source sends arrives. Its form factors were found one by one,
-// from samples: this scales each fresh slot's so that together they take the whole source. One
-// workgroup a slot. src/reference/normalise.rs is the same in f64.
+// from samples: this sums each fresh slot's, and scales them so that together they take the whole
+// source. One workgroup a slot. src/reference/normalise.rs is the same in f64.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/types.glsl"
@@ -14,9 +14,13 @@ layout(scalar, binding = 2) readonly buffer Areas { float element_area[]; };
 layout(scalar, binding = 3) readonly buffer Fresh { float fresh[]; };
 layout(scalar, binding = 4) readonly buffer FreshMeso { vec3 fresh_meso[]; };
 
+// Share of the source that its form factors take together, [slot].
+layout(scalar, binding = 5) writeonly buffer Shares { float shares[]; };
+
 layout(push_constant, scalar) uniform Parameters {
     uint plain_count;
     uint meso_count;
+    uint scales;         // 0: the sums are found, and nothing is scaled
 };
 
 // A sum further off than this is no error of sampling: the source stands inside another body.
@@ -47,7 +51,11 @@ void main() {
         barrier();
     }
     float share = sums[0] / sources[source].area;
-    if (lane == 0 && sources[source].kind == KIND_SURFACE && abs(share - 1.0) <= MOST_OFF) {
+    bool is_surface = sources[source].kind == KIND_SURFACE;
+    if (lane == 0) {
+        shares[slot] = is_surface ? share : -1.0;
+    }
+    if (lane == 0 && scales == 1 && is_surface && abs(share - 1.0) <= MOST_OFF) {
         slots[slot].scale = 1.0 / share;
     }
 }

@@ -30,6 +30,16 @@ shared! {
     RECEIVE_PARTS = 2;
     RECEIVE_NEAR = 3;
     RECEIVE_KINDS = 4;
+    /// The lists after those: elements of which the item buffer leaves open whether they are seen,
+    /// and elements that a silhouette may cut the source for.
+    RECEIVE_DOUBTFUL = 4;
+    RECEIVE_CROSSED = 5;
+    RECEIVE_LISTS = 6;
+    /// Places on a source from which rays find the share of it that such an element sees, or half
+    /// as many; a power of two, at most 32.
+    SOURCE_EYES = 8;
+    /// Bits of a listed element below those of that share.
+    LISTED_BITS = 27;
     /// Elements that an invocation sorts: they share the data that it loads of each source.
     SORT_ELEMENTS = 4;
     /// Most slots that a dispatch sorts receivers for: the bits of a word.

@@ -286,7 +286,10 @@ fn bakes_and_renders_files_of_every_kind() {
     );
     let report: serde_json::Value =
         serde_json::from_slice(&bake.stdout).expect("one JSON object on stdout");
-    assert_eq!(report["elements"], 4);
+    assert!(
+        report["elements"].as_u64() > Some(1000),
+        "four triangles are cut"
+    );
     assert_eq!(report["stop"], "residual");
     for key in [
         "device",

@@ -239,7 +239,6 @@ fn weak_emitters_are_drawn_as_all_others() {
         build.solve(&Settings {
             grouping: Grouping {
                 max_area: 1.0 / 2048.0,
-                max_area_near: 1.0 / 2048.0,
                 ..Grouping::default()
             },
             ..settings(emitter_hemicube)

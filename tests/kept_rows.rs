@@ -6,6 +6,7 @@ use common::{Build, assert_silent, device};
 use glam::{DVec3, Vec3};
 use mesolux::bake;
 use mesolux::math::directions::Directions;
+use mesolux::mesh::near::Nearness;
 use mesolux::meso::{Options, Transport};
 use mesolux::solver::{Light, Report, Settings, Solver, Visibility};
 
@@ -41,6 +42,11 @@ fn settings() -> Settings {
         hemicube: 32,
         batch: 6,
         residual: RESIDUAL,
+        // What near sources send part by part is settled only where rows are kept.
+        nearness: Nearness {
+            source: 2.0,
+            part: 2.0,
+        },
         relief: Options {
             transport: Transport::Physical,
             directions: Directions::new(32).expect("a number of the paper"),

@@ -9,13 +9,21 @@ use common::{Build, assert_silent, device};
 use glam::DVec3;
 use mesolux::constants::NONE;
 use mesolux::mesh::elements::Elements;
+use mesolux::mesh::near::Nearness;
 use mesolux::mesh::sources::Source;
 use mesolux::passes::cull::Culling;
 use mesolux::passes::occluder_tree::shadow_occluders;
 use mesolux::reference;
+use mesolux::reference::form_factors::Sight;
 use mesolux::solver::{Estimator, Report, Settings, Solver};
 
 const FACE: u32 = 32;
+
+/// No source fills so much of a view.
+const NONE_NEAR: Nearness = Nearness {
+    source: 2.0,
+    part: 2.0,
+};
 
 /// An open room with a sphere, a sheet seen from behind, an emitter and a point light.
 fn scene() -> Build {
@@ -68,6 +76,9 @@ fn settings() -> Settings {
         // The twins look at one batch after another, all of one size.
         emitter_hemicube: Some(FACE),
         batch: 6,
+        // The twins know one visibility a source: that of its eye.
+        nearness: NONE_NEAR,
+        silhouettes: false,
         ..Settings::default()
     }
 }
@@ -286,11 +297,11 @@ fn coupling_equals_its_twin() {
             .map(|e| e.x / emitted)
             .collect();
         let found = &solver.draw(&[source]).expect("it is drawn").coupling[0];
-        let elements = &solver.problem.elements;
-        let even = elements.even_reflectance();
+        let even = solver.problem.elements.even_reflectance();
         let targets = solver.coupling_targets();
         coloured += targets.iter().filter(|t| t.word_count == 3).count();
-        let expected = reference::couple::couple(elements, &even, targets, &row);
+        let expected =
+            reference::couple::couple(&solver.problem.near.weights, &even, targets, &row);
         assert_eq!(found.len(), expected.len());
         let largest = expected.iter().copied().fold(0.0, f64::max);
         let apart = (found.iter().zip(&expected))
@@ -356,6 +367,11 @@ fn estimators_equal_their_twins() {
         );
         // Where a ray passes so close to an edge that rounding decides.
         let doubtful: Vec<Cell<bool>> = vec![Cell::new(false); elements.len()];
+        let by_ray = |e: usize, source: &Source, p| {
+            let depth = reference::occluder_rays::hidden(&occluders, source, p);
+            doubtful[e].set(doubtful[e].get() || depth.abs() < DOUBT);
+            depth < 0.0
+        };
         for &s in &chosen {
             let source = &solver.problem.sources.list[s as usize];
             let items = reference::item_buffer::item_buffer(
@@ -370,16 +386,19 @@ fn estimators_equal_their_twins() {
             let factors: Vec<f64> = (0..elements.len())
                 .map(|e| match estimator {
                     Estimator::Receiver if by_rays => {
-                        let sees = |p| {
-                            let depth = reference::occluder_rays::hidden(&occluders, source, p);
-                            doubtful[e].set(doubtful[e].get() || depth.abs() < DOUBT);
-                            depth < 0.0
-                        };
+                        let sees = |p| by_ray(e, source, p);
                         reference::form_factors::gather(elements, source, e, sees)
                     }
                     Estimator::Receiver => {
-                        let sees = |p| {
-                            reference::form_factors::visible(elements, source, &items, FACE, p, e)
+                        let drawn = reference::form_factors::Drawn {
+                            elements,
+                            source,
+                            items: &items,
+                            n: FACE,
+                        };
+                        let sees = |p| match drawn.sight(p, e) {
+                            Sight::Doubtful => by_ray(e, source, p),
+                            sight => sight == Sight::Seen,
                         };
                         reference::form_factors::gather(elements, source, e, sees)
                     }

@@ -69,7 +69,6 @@ fn solver_by(estimator: Estimator, transport: Transport, k: u32, shots: Option<u
         // Sources that few batches see twice.
         grouping: Grouping {
             max_area: 1.0 / 512.0,
-            max_area_near: 1.0 / 512.0,
             ..Grouping::default()
         },
         relief: Options {

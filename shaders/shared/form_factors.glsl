@@ -1,13 +1,20 @@
 // Form factors of the elements that sort_receivers.comp has listed for one slot and kind.
 // VECTOR_FLUX: the elements receive by direction, and get the vector whose dot product with the
-// normal is the form factor. SHADOW_RAYS: what is seen is asked of rays instead of the item buffer.
+// normal is the form factor. SHADOW_RAYS: what is seen is asked of rays alone; otherwise of the item
+// buffer, and of rays where that leaves it open.
 
-#ifdef SHADOW_RAYS
 #define RAYS 1
 #ifdef VECTOR_FLUX
 #define SHADOW_OCCLUDERS 13
 #else
 #define SHADOW_OCCLUDERS 12
+#endif
+#ifndef SHADOW_RAYS
+#define ITEM_BUFFER
+#ifdef VECTOR_FLUX
+#define SHADOW_NODES 14
+#else
+#define SHADOW_NODES 13
 #endif
 #endif
 #include "shared/receivers.glsl"
@@ -177,12 +184,19 @@ const vec3 POINTS[11] = vec3[](
 );
 
 bool visible(vec3 p, vec3 n, uint element, Source s, bool asks) {
-#ifdef SHADOW_RAYS
+#ifdef ITEM_BUFFER
+    uint sight = sight_of(p, n, element, first_slot, s, asks);
+    asks = sight == DOUBTFUL;
+    if (subgroupBallot(asks) == uvec4(0)) {
+        return sight == SEEN;
+    }
+#endif
     bool open[1] = bool[1](asks);
     look(s, vec4[1](vec4(p, 0.0)), vec3[1](n), open);
-    return open[0];
+#ifdef ITEM_BUFFER
+    return sight == SEEN || open[0];
 #else
-    return visible(p, n, element, first_slot, s, asks);
+    return open[0];
 #endif
 }
 
@@ -225,14 +239,17 @@ FLUX mean_form_factor(uint element, vec4 ball, vec3 n, Source s) {
 }
 
 void main() {
-    uint list = first_slot * RECEIVE_KINDS + KIND;
+    uint list = first_slot * RECEIVE_LISTS + KIND;
     // The lanes past the end do as the last one does.
     uint at = min(gl_GlobalInvocationID.x, lists[list].count - 1);
-    uint i = listed[list * element_count + at];
+    uint word = listed[list * element_count + at];
+    uint i = bitfieldExtract(word, 0, int(LISTED_BITS));
+    // The share of the source that it sees.
+    float share = float((word >> LISTED_BITS) + 1) / 32.0;
     uint e = first_element + i;
     Source s = load_source(slots[first_slot].source);
     vec3 n = fetch(planes, e).xyz;
-    FLUX f = mean_form_factor(e, fetch(balls, e), n, s);
+    FLUX f = share * mean_form_factor(e, fetch(balls, e), n, s);
 #ifdef VECTOR_FLUX
     MesoElement meso = meso_elements[i];
     vec3 local = vec3(dot(meso.tangent, f), dot(meso.bitangent, f), dot(n, f));

@@ -25,6 +25,16 @@ ivec2 hemicube_pixel(vec2 texel, uint n) {
     return clamp(pixel, ivec2(0), ivec2(n - 1u, 3u * n - 1u));
 }
 
+// The first of the four texels of a face whose centres lie about a coordinate.
+ivec2 hemicube_corner(vec2 texel, uint n) {
+    int side = int(n);
+    int row = clamp(int(texel.y), 0, 3 * side - 1);
+    int first_row = row < side ? 0 : row / (side / 2) * (side / 2);
+    int rows = row < side ? side : side / 2;
+    ivec2 corner = ivec2(floor(texel - 0.5));
+    return clamp(corner, ivec2(0, first_row), ivec2(side - 2, first_row + rows - 2));
+}
+
 // The direction, in the source's frame, through the centre of a texel of the column.
 vec3 hemicube_direction(ivec2 pixel, uint n) {
     vec2 at = (vec2(pixel) + 0.5) / float(n);

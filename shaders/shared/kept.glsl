@@ -1,6 +1,6 @@
 // Form factors as they are kept: in 16 bits, so that replaying them takes little memory. Fresh ones
 // are rounded in the same way, so that a factor is the same to the bit whether it was kept or not.
-// src/reference/kept.rs is the same.
+// src/math/kept.rs is the same.
 
 // Exponents of 2^-43 to 2^20 in 6 bits, 10 bits behind the leading one: off by 1/2048 at most. Less
 // than 2^-43 is nothing.

@@ -20,7 +20,7 @@ layout(binding = 3) uniform usamplerBuffer balls;
 layout(scalar, binding = 4) buffer Counts { ReceiverList lists[]; };
 // The elements, counted from the first of the dispatch, [slot][kind][element].
 layout(scalar, binding = 5) buffer Listed { uint listed[]; };
-#ifndef SHADOW_OCCLUDERS
+#ifdef ITEM_BUFFER
 layout(binding = 6) uniform usampler2D items;
 #endif
 
@@ -58,18 +58,12 @@ const float NEAR = 4.0;
 
 #ifdef SHADOW_OCCLUDERS
 #include "shared/shadow_packets.glsl"
-#else
-// Whether p, on an element with normal n, is seen from the source's eye, for the lanes that ask.
-bool visible(vec3 p, vec3 n, uint element, uint slot, Source s, bool asks) {
-    vec3 d = p - s.eye;
-    vec3 local = vec3(dot(d, s.tangent), dot(d, s.bitangent), dot(d, s.normal));
-    vec2 texel = hemicube_texel(local, face_size);
-    ivec2 pixel = hemicube_pixel(texel, face_size);
-    uint item = texelFetch(items, ivec2(slot * face_size, 0) + pixel, 0).r;
-    if (!asks || item == NONE || item == element) {
-        return asks;
-    }
-    vec4 plane = fetch(planes, item);
+#endif
+
+#ifdef ITEM_BUFFER
+// Whether an item that a pixel shows leaves p, on a surface with normal n, open to the source's eye.
+bool leaves_open(uint item, ivec2 pixel, vec3 p, vec3 n, Source s) {
+    vec4 plane = fetch(planes, item == NONE ? 0 : item);
     float eye_height = dot(plane.xyz, s.eye) - plane.w;
     float height = dot(plane.xyz, p) - plane.w;
     float depth = eye_height >= 0.0 ? -height : height;
@@ -78,6 +72,7 @@ bool visible(vec3 p, vec3 n, uint element, uint slot, Source s, bool asks) {
     }
     // The item's plane lies in front of p. It is still the same surface, seen a pixel aside, where
     // the two planes' angle and the distance between the points explain the height.
+    vec3 d = p - s.eye;
     vec3 ray = hemicube_direction(pixel, face_size);
     vec3 world = ray.x * s.tangent + ray.y * s.bitangent + ray.z * s.normal;
     float along = -eye_height / dot(plane.xyz, world);
@@ -93,6 +88,57 @@ bool visible(vec3 p, vec3 n, uint element, uint slot, Source s, bool asks) {
     }
     float sine = length(cross(n, plane.xyz));
     return apart <= REACH * footprint && depth <= apart * sine + HEIGHT_EPSILON;
+}
+
+// Whether a place is seen from the source's eye, by its pixel alone.
+bool shown(vec3 p, vec3 n, uint slot, Source s) {
+    vec3 d = p - s.eye;
+    vec3 local = vec3(dot(d, s.tangent), dot(d, s.bitangent), dot(d, s.normal));
+    ivec2 pixel = hemicube_pixel(hemicube_texel(local, face_size), face_size);
+    uint item = texelFetch(items, ivec2(slot * face_size, 0) + pixel, 0).r;
+    return item == NONE || leaves_open(item, pixel, p, n, s);
+}
+
+// What the item buffer says of a place.
+const uint HIDDEN_FROM = 0;
+const uint SEEN = 1;
+const uint DOUBTFUL = 2;
+
+// What the four pixels about p show: it is doubtful where they do not agree. The answer of a lane is
+// the same in any company.
+uint sight_of(vec3 p, vec3 n, uint element, uint slot, Source s, bool asks) {
+    vec3 d = p - s.eye;
+    vec3 local = vec3(dot(d, s.tangent), dot(d, s.bitangent), dot(d, s.normal));
+    vec2 texel = hemicube_texel(local, face_size);
+    ivec2 first = hemicube_corner(texel, face_size);
+    ivec2 own = clamp(hemicube_pixel(texel, face_size) - first, ivec2(0), ivec2(1));
+    ivec2 column = ivec2(slot * face_size, 0);
+    // Its own pixel first.
+    ivec2 pixel[4];
+    uint item[4];
+    bool same = true;
+    for (uint k = 0; k < 4; k++) {
+        pixel[k] = first + (own ^ ivec2(k & 1, k >> 1));
+        item[k] = texelFetch(items, column + pixel[k], 0).r;
+        same = same && item[k] == item[0];
+    }
+    // In front of what they all show, p is open whatever the pixel.
+    vec4 plane = fetch(planes, item[0] == NONE ? 0 : item[0]);
+    float height = dot(plane.xyz, p) - plane.w;
+    bool before = (dot(plane.xyz, s.eye) >= plane.w ? -height : height) <= HEIGHT_EPSILON;
+    bool certain = same && (item[0] == NONE || item[0] == element || before);
+    uint open = asks && certain ? 1 : 0;
+    uint looked = open;
+    for (uint k = 0; k < 4; k++) {
+        bool looks = asks && !certain;
+        // A software device works through what any lane needs.
+        if (subgroupBallot(looks) != uvec4(0)) {
+            bool opens = item[k] == NONE || item[k] == element || leaves_open(item[k], pixel[k], p, n, s);
+            open += looks && opens ? 1 : 0;
+            looked += looks ? 1 : 0;
+        }
+    }
+    return open == 0 ? HIDDEN_FROM : open == looked ? SEEN : DOUBTFUL;
 }
 #endif
 

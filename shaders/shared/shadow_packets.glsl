@@ -4,7 +4,10 @@
 // meets its box. src/reference/occluder_rays.rs is the same in f64.
 
 // NODE_TEXELS a node.
-layout(binding = 6) uniform usamplerBuffer shadow_nodes;
+#ifndef SHADOW_NODES
+#define SHADOW_NODES 6
+#endif
+layout(binding = SHADOW_NODES) uniform usamplerBuffer shadow_nodes;
 // OCCLUDER_TEXELS an occluder.
 layout(binding = SHADOW_OCCLUDERS) uniform usamplerBuffer shadow_occluders;
 

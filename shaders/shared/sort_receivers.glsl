@@ -1,17 +1,23 @@
 // Lists the elements that see each source of the batch, by how their form factor is found: as of a
 // point, by the outline of the source, by its parts as points, or, near it, with more care.
 // Elements that it lies behind, turns its back to or is hidden from are in no list, and their form
-// factor is 0. SHADOW_RAYS: what is seen is asked of rays instead of the item buffer, one slot a
-// dispatch, since lavapipe ends all loops of an invocation after 65,535 turns.
+// factor is 0. Where the item buffer leaves open whether an element is seen, it is listed apart, for
+// resolve_receivers.comp. SHADOW_RAYS: what is seen is asked of rays instead of the item buffer, one
+// slot a dispatch, since lavapipe ends all loops of an invocation after 65,535 turns.
 
 #ifdef SHADOW_RAYS
 #define SHADOW_OCCLUDERS 9
 #define RAYS SORT_ELEMENTS
+#else
+#define ITEM_BUFFER
 #endif
 #include "shared/receivers.glsl"
+#include "shared/receive_kinds.glsl"
 
 // 1: blocks of elements that see nothing of a source are passed over as a whole.
 layout(constant_id = 0) const uint CULL_BLOCKS = 1;
+// 1: where a silhouette may cut a source, rays find the share of it that an element sees.
+layout(constant_id = 1) const uint SILHOUETTES = 1;
 
 // Elements that see nothing of a source, whatever stands between: it lies behind them or shows them
 // its back, [slot].
@@ -21,51 +27,6 @@ layout(scalar, binding = 8) readonly buffer Blocks { ReceiverBlock blocks[]; };
 
 // Rounding of distances, a few steps of f32 at coordinates up to 1.
 const float BLOCK_EPSILON = 1e-6;
-
-// Lane k of a subgroup makes room in the list of kind k for all lanes.
-void append(uint slot, uint kind, bool mine, uint i) {
-    uint count = 0;
-    uint before = 0;
-    for (uint k = 0; k < RECEIVE_KINDS; k++) {
-        uvec4 lanes = subgroupBallot(mine && kind == k);
-        count = gl_SubgroupInvocationID == k ? subgroupBallotBitCount(lanes) : count;
-        before = kind == k ? subgroupBallotExclusiveBitCount(lanes) : before;
-    }
-    uint first = 0;
-    if (count > 0) {
-        uint list = slot * RECEIVE_KINDS + gl_SubgroupInvocationID;
-        first = atomicAdd(lists[list].count, count);
-        atomicMax(lists[list].groups_x, (first + count + GROUP - 1) / GROUP);
-    }
-    for (uint k = 0; k < RECEIVE_KINDS; k++) {
-        uint first_of_kind = subgroupBroadcast(first, k);
-        before += kind == k ? first_of_kind : 0;
-    }
-    if (mine) {
-        listed[(slot * RECEIVE_KINDS + kind) * element_count + before] = i;
-    }
-}
-
-// How the form factor from an element to a source is found, should it be seen; RECEIVE_KINDS where
-// it is 0. `near`: parts of the element may be seen, whether its centroid is or not.
-uint kind_of(Source s, vec4 ball, vec3 n, out bool near) {
-    vec3 d = ball.xyz - s.middle;
-    float distance_middle = length(d);
-    float across = dot(d, n);
-    near = distance_middle - s.radius <= NEAR * ball.w;
-    bool behind = across >= s.radius;
-    bool above = across <= -s.radius && distance_middle * distance_middle >= ACUTE * s.radius * s.radius;
-    bool whole = shows_whole_front(s, ball.xyz);
-    bool points = distance_middle - s.radius >= POINT_DISTANCE * s.part_radius;
-    bool curved = s.cone_sin != 0.0;
-    float far_distance = (curved ? POINT_DISTANCE : FLAT_POINT_DISTANCE) * s.radius;
-    bool far = s.kind == KIND_POINT || whole && distance_middle >= far_distance;
-    bool by_parts = curved && points;
-    uint kind = near ? RECEIVE_NEAR : far ? RECEIVE_FAR : by_parts ? RECEIVE_PARTS
-        : whole && above ? RECEIVE_OUTLINE : RECEIVE_NEAR;
-    bool shows = shows_front(s, ball.xyz) && !lies_in_plane(s, ball.xyz, n);
-    return !behind && (near || shows) ? kind : RECEIVE_KINDS;
-}
 
 // Whether `kind_of` is RECEIVE_KINDS for every element of a block. Each lane may ask of another
 // source.
@@ -98,6 +59,47 @@ bool none_sees(ReceiverBlock block, uint source) {
     bool near = sqrt(square) - radius - block.radius - BLOCK_EPSILON <= NEAR * block.largest;
     return behind || below && !near;
 }
+
+// About the form factor from a place to the part of a source above its horizon, as if nothing stood
+// between.
+float form_factor_about(Source s, vec3 p, vec3 n) {
+    vec3 d = s.middle - p;
+    float square = dot(d, d);
+    float facing = s.cone_sin == 0.0 ? max(-dot(d, s.normal), 0.0) : sqrt(square);
+    float height = dot(d, n);
+    float above = max(max(height, 0.25 * (height + s.radius)), 0.0);
+    return s.kind == KIND_POINT ? 0.0 : s.area * facing * above * 0.318309886 / (square * square);
+}
+
+// Whether the eye of a source lies below the horizon of a place that sees more of the source than
+// this: what of the source is seen is found from other places on it.
+const float BELOW_FACTOR = 1.0 / 2048.0;
+
+bool eye_is_below(Source s, vec3 p, vec3 n) {
+    return dot(s.eye - p, n) <= 0.0 && form_factor_about(s, p, n) > BELOW_FACTOR;
+}
+
+#ifdef ITEM_BUFFER
+// An element that sees a source under a larger form factor is worth several rays.
+const float CROSSED_FACTOR = 1.0 / 64.0;
+
+// Whether places about p, as far off as the source is wide, are seen otherwise than p is.
+bool around_differs(vec3 p, vec3 n, uint slot, Source s, uint sight, bool asks) {
+    if (subgroupBallot(asks) == uvec4(0)) {
+        return false;
+    }
+    vec3 across = cross(n, p - s.eye);
+    vec3 along = cross(n, across);
+    float reach = s.radius * inversesqrt(max(dot(across, across), 1e-30));
+    bool differs = false;
+    for (uint k = 0; k < 4; k++) {
+        vec3 way = k < 2 ? across : along;
+        vec3 q = p + (k % 2 == 0 ? reach : -reach) * way;
+        differs = differs || shown(q, n, slot, s) != (sight == SEEN);
+    }
+    return asks && differs;
+}
+#endif
 
 // Bit k: the k-th slot from `first` on holds a source of which one of the elements from `low` to
 // `high` may see something. `held`: it holds one at all. A lane a slot, SORT_SLOTS at most.
@@ -148,25 +150,53 @@ void main() {
             Source s = load_source(slots[slot].source);
             uint kind[SORT_ELEMENTS];
             bool seen[SORT_ELEMENTS];
+            bool doubtful[SORT_ELEMENTS];
+            bool crossed[SORT_ELEMENTS];
             bool near[SORT_ELEMENTS];
             for (uint j = 0; j < SORT_ELEMENTS; j++) {
                 uint i = first + j * gl_SubgroupSize;
                 kind[j] = kind_of(s, ball[j], n[j], near[j]);
                 seen[j] = i < element_count && kind[j] < RECEIVE_KINDS && !near[j];
+                doubtful[j] = false;
+                // The element's own body would hide the eye.
+                crossed[j] = SILHOUETTES == 1 && seen[j] && eye_is_below(s, ball[j].xyz, n[j]);
+                seen[j] = seen[j] && !crossed[j];
             }
 #ifdef SHADOW_RAYS
+            bool asked[SORT_ELEMENTS] = seen;
             look(s, ball, n, seen);
+            // Where some of these neighbours see the eye and others do not, a silhouette is near.
+            bool any_open[SORT_ELEMENTS];
+            bool any_hidden[SORT_ELEMENTS];
+            for (uint j = 0; j < SORT_ELEMENTS; j++) {
+                any_open[j] = subgroupBallot(seen[j]) != uvec4(0);
+                any_hidden[j] = subgroupBallot(asked[j] && !seen[j]) != uvec4(0);
+            }
+            for (uint j = 0; j < SORT_ELEMENTS; j++) {
+                uint low = max(j, 1) - 1;
+                uint high = min(j + 1, SORT_ELEMENTS - 1);
+                bool some_open = any_open[low] || any_open[j] || any_open[high];
+                bool some_hidden = any_hidden[low] || any_hidden[j] || any_hidden[high];
+                bool mixed = some_open && some_hidden && s.kind == KIND_SURFACE;
+                crossed[j] = crossed[j] || SILHOUETTES == 1 && mixed && asked[j];
+            }
 #else
             for (uint j = 0; j < SORT_ELEMENTS; j++) {
                 uint e = first_element + first + j * gl_SubgroupSize;
-                seen[j] = visible(ball[j].xyz, n[j], e, slot, s, seen[j]);
+                bool wide = SILHOUETTES == 1 && seen[j] && form_factor_about(s, ball[j].xyz, n[j]) > CROSSED_FACTOR;
+                uint sight = sight_of(ball[j].xyz, n[j], e, slot, s, seen[j]);
+                crossed[j] = crossed[j] || wide && sight == DOUBTFUL || around_differs(ball[j].xyz, n[j], slot, s, sight, wide);
+                seen[j] = sight == SEEN;
+                doubtful[j] = sight == DOUBTFUL && !crossed[j];
             }
 #endif
             uint of_slot = 0;
             for (uint j = 0; j < SORT_ELEMENTS; j++) {
                 uint i = first + j * gl_SubgroupSize;
                 bool mine = i < element_count && kind[j] < RECEIVE_KINDS;
-                append(slot, kind[j], mine && (near[j] || seen[j]), i);
+                append(slot, kind[j], mine && (near[j] || seen[j]) && !crossed[j], with_share(i, 1.0));
+                append_open(slot, RECEIVE_DOUBTFUL, doubtful[j], i);
+                append_open(slot, RECEIVE_CROSSED, crossed[j], i);
                 of_slot += subgroupBallotBitCount(subgroupBallot(i < element_count && kind[j] == RECEIVE_KINDS));
             }
             if (subgroupElect()) {

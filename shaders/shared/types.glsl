@@ -90,6 +90,12 @@ struct KeptRow {
     float scale;       // of all of them
 };
 
+// A form factor to a near source, which is found on the host.
+struct NearFactor {
+    uint element;
+    float factor;
+};
+
 // How far the memory for kept form factors is filled.
 struct KeptState {
     uint chunk;        // the one under way

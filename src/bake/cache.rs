@@ -10,6 +10,7 @@ use sha2::{Digest, Sha256};
 
 use crate::bake::solution::{Bake, Origin, Solution, VERSION};
 use crate::error::{Error, Result};
+use crate::scene::Scene;
 use crate::solver::{Settings, StopReason};
 
 /// Most bakes that are kept, and most bytes in all; the least recently used are deleted first.
@@ -23,9 +24,9 @@ pub struct CachedBake {
 }
 
 impl CachedBake {
-    /// The place of the bake of a scene with this [`crate::scene::Scene::hash`] by these settings.
+    /// The place of the bake of a scene by these settings.
     /// `maker` identifies the program and the device: the bake of another one is not used.
-    pub fn new(folder: &Path, scene_hash: &str, settings: &Settings, maker: &str) -> Self {
+    pub fn new(folder: &Path, scene: &Scene, settings: &Settings, maker: &str) -> Self {
         let Settings {
             estimator,
             hemicube,
@@ -36,6 +37,9 @@ impl CachedBake {
             shots,
             seed,
             grouping,
+            nearness,
+            silhouettes,
+            normalise,
             culling,
             merging,
             batch,
@@ -46,9 +50,10 @@ impl CachedBake {
             relief,
         } = settings;
         let emitter_shadows = settings.emitter_shadows();
+        let scene_hash = scene.hash();
         let key = format!(
-            "bake cache 4, layout {VERSION}\n{maker}\n{scene_hash}\n{estimator:?} {hemicube} {emitter_shadows:?} {residual:?} {shots:?} {seed} \
-             {grouping:?} {culling:?} {merging} {batch} {visibility_memory:?} {coupling_memory} {:?} {:?}",
+            "bake cache 5, layout {VERSION}\n{maker}\n{scene_hash}\n{estimator:?} {hemicube} {emitter_shadows:?} {residual:?} {shots:?} {seed} \
+             {grouping:?} {nearness:?} {silhouettes} {normalise} {culling:?} {merging} {batch} {visibility_memory:?} {coupling_memory} {:?} {:?}",
             relief.transport, relief.directions
         );
         let name: String = Sha256::digest(key)[..16]
@@ -57,7 +62,7 @@ impl CachedBake {
             .collect();
         Self {
             path: folder.join(format!("bake-{name}.safetensors")),
-            hash: scene_hash.to_owned(),
+            hash: scene.input_hash(),
         }
     }
 

@@ -67,12 +67,8 @@ pub fn solve_on(
 pub fn solution(scene: &Scene, solver: &Solver) -> Result<Solution> {
     let mut report = solver.report().clone();
     report.skipped.degenerate_triangles = scene.dropped_degenerate as u64;
-    Ok(Solution::new(
-        scene,
-        &solver.problem.elements,
-        &solver.light()?,
-        report,
-    ))
+    let elements = &solver.problem.elements;
+    Ok(Solution::new(scene, elements, &solver.light()?, report).with_corners(scene))
 }
 
 /// The elements of a scene, with their relief where `settings` want it.

@@ -40,7 +40,6 @@ pub fn scaled(scale: f64) -> Grouping {
     Grouping {
         max_elements: ((plain.max_elements as f64 * scale).round() as usize).max(1),
         max_area: plain.max_area * scale,
-        max_area_near: plain.max_area_near * scale,
         max_power: plain.max_power * scale,
     }
 }

@@ -86,14 +86,14 @@ pub struct SolveOptions {
     /// that of --quality, 1/256 for normal]
     #[arg(long, value_name = "X")]
     source_area: Option<f64>,
-    /// Most area of a plane source that has another surface close before it, as a share of the
-    /// scene's [default: by --quality; normal: a quarter of --source-area]
-    #[arg(long, value_name = "SHARE")]
-    source_area_near: Option<f64>,
     /// Most emitted power that shoots together, as a share of the scene's [default: that of
     /// --quality, 1/128 for normal]
     #[arg(long, value_name = "X")]
     source_power: Option<f64>,
+    /// Leave the form factors of closed rooms as they were found, in place of scaling them so that all
+    /// light arrives; the report gives their sums either way
+    #[arg(long)]
+    no_normalise: bool,
     /// Stop after this many seconds
     #[arg(long, value_name = "SECONDS")]
     budget: Option<f64>,
@@ -176,7 +176,6 @@ impl SolveOptions {
             residual: Some(settings.residual),
             source_elements: Some(settings.grouping.max_elements),
             source_area: Some(settings.grouping.max_area),
-            source_area_near: Some(settings.grouping.max_area_near),
             source_power: Some(settings.grouping.max_power),
             ..self.clone()
         })
@@ -197,13 +196,9 @@ impl SolveOptions {
                 "--source-elements 0: must be at least 1".into(),
             ));
         }
-        let max_area = share("--source-area", self.source_area, preset.max_area)?;
-        let preset_near = preset.max_area_near * max_area / preset.max_area;
-        let max_area_near = share("--source-area-near", self.source_area_near, preset_near)?;
         Ok(Grouping {
             max_elements: self.source_elements.unwrap_or(preset.max_elements),
-            max_area,
-            max_area_near,
+            max_area: share("--source-area", self.source_area, preset.max_area)?,
             max_power: share("--source-power", self.source_power, preset.max_power)?,
         })
     }
@@ -225,6 +220,7 @@ impl SolveOptions {
             emitter_hemicube: self.emitter_hemicube.or(preset.emitter_hemicube),
             residual: self.residual.unwrap_or(preset.residual),
             grouping: self.grouping(preset.grouping)?,
+            normalise: !self.no_normalise,
             budget: self.budget()?,
             shots: self.shots,
             seed: self.seed,
@@ -302,7 +298,7 @@ pub fn run(options: &Options) -> Result<()> {
             None => tracing::warn!("no form factors are kept: --keep-visibility writes nothing"),
         }
     }
-    let origin = origin(&options.scene, &options.builtin, scene.hash());
+    let origin = origin(&options.scene, &options.builtin, scene.input_hash());
     solution.save(&options.output, &origin, &options.solve.filled()?)?;
     let report = &solution.report;
     tracing::info!(

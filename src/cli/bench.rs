@@ -307,7 +307,7 @@ fn run_stress(options: &StressOptions) -> Result<()> {
 fn run_hemicube(options: &HemicubeOptions) -> Result<()> {
     let builtin = Builtin {
         patches: options.builtin.patches.or(Some(83_160)),
-        statue: options.builtin.statue.clone(),
+        ..options.builtin.clone()
     };
     let scene = builtin.load("cornell")?;
     let device = options.device.open()?;

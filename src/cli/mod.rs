@@ -22,7 +22,7 @@ use std::process::ExitCode;
 use clap::{Args, Parser, Subcommand};
 use mesolux::bake::solution::Bake;
 use mesolux::error::{Error, Result};
-use mesolux::scene::{BuiltinOptions, Scene};
+use mesolux::scene::{BuiltinOptions, OnInput, Refinement, Scene};
 use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::prelude::*;
 
@@ -58,7 +58,7 @@ enum Command {
     Bench(bench::Options),
 }
 
-/// Options of the built-in scenes.
+/// Options of built-in scenes, and how finely others are cut.
 #[derive(Args, Clone)]
 struct Builtin {
     /// Built-in scenes: exactly this many elements
@@ -67,6 +67,16 @@ struct Builtin {
     /// Built-in scenes: this mesh as the statue
     #[arg(long, value_name = "MESH.obj")]
     statue: Option<PathBuf>,
+    /// Cut triangles whose edges are longer than this, in scene units, and where other surfaces are
+    /// close, shorter ones [default: by the area of the scene; built-in scenes are not cut]
+    #[arg(long, value_name = "X")]
+    element_size: Option<f64>,
+    /// Cut to no more triangles than this
+    #[arg(long, value_name = "N", default_value_t = Refinement::default().max_elements)]
+    max_elements: usize,
+    /// Light every triangle as it is
+    #[arg(long, conflicts_with = "element_size")]
+    no_refine: bool,
 }
 
 impl Builtin {
@@ -75,9 +85,14 @@ impl Builtin {
         let builtin = Self {
             patches: bake.origin.patches,
             statue: bake.origin.statue.clone(),
+            element_size: None,
+            max_elements: 0,
+            no_refine: true,
         };
         let scene = builtin.load(&bake.origin.scene)?;
-        if scene.hash() != bake.origin.hash || scene.triangles.len() != bake.irradiance.len() {
+        let count = scene.triangles.len();
+        let is_of_it = |on: &OnInput| (on.triangle as usize) < count;
+        if scene.hash() != bake.origin.hash || !bake.on_input.iter().all(is_of_it) {
             return Err(Error::file(
                 path,
                 format!(
@@ -86,12 +101,24 @@ impl Builtin {
                 ),
             ));
         }
-        Ok(scene)
+        let is_whole = |(t, on): (u32, &OnInput)| *on == OnInput::whole(t);
+        let same = bake.on_input.len() == count && (0..).zip(&bake.on_input).all(is_whole);
+        match same {
+            true => Ok(scene),
+            false => Ok(scene.cut_as(&bake.on_input)),
+        }
     }
 
-    fn load(&self, scene: &str) -> Result<Scene> {
+    fn load(&self, name: &str) -> Result<Scene> {
+        if let Some(size) = self.element_size
+            && !(size.is_finite() && size > 0.0)
+        {
+            return Err(Error::Usage(format!(
+                "--element-size {size}: must be above 0"
+            )));
+        }
         let scene = mesolux::scene::load(
-            scene,
+            name,
             &BuiltinOptions {
                 patches: self.patches,
                 statue: self.statue.clone(),
@@ -105,6 +132,26 @@ impl Builtin {
                 "{} triangles without area were left out",
                 scene.dropped_degenerate
             );
+        }
+        let named = mesolux::scene::builtin::NAMES.contains(&name);
+        if self.no_refine || named && self.element_size.is_none() {
+            return Ok(scene);
+        }
+        let before = scene.triangles.len();
+        let scene = scene.refined(&Refinement {
+            element_size: self.element_size,
+            max_elements: self.max_elements,
+        });
+        let now = scene.triangles.len();
+        if now > before {
+            tracing::info!("{before} triangles are cut to {now} elements; --no-refine leaves them");
+        }
+        if let Some(note) = scene
+            .notes
+            .last()
+            .filter(|note| note.contains("--max-elements"))
+        {
+            tracing::warn!("{note}");
         }
         Ok(scene)
     }

@@ -110,7 +110,7 @@ pub fn run(options: &Options) -> Result<()> {
         None => Some(bake_visibly(&device, &scene, &settings)?),
     };
     if let (Some(solution), Some(folder)) = (&solution, folder) {
-        let origin = origin(&options.input, &options.builtin, scene.hash());
+        let origin = origin(&options.input, &options.builtin, scene.input_hash());
         let cached = options.cached(folder, &scene, &settings, &device);
         match cached.save(solution, &origin, &options.solve) {
             Ok(true) => tracing::info!("bake kept as {}", cached.path.display()),
@@ -206,7 +206,7 @@ impl Options {
         device: &Device,
     ) -> CachedBake {
         let maker = format!("{} on {}", program(), device.name());
-        CachedBake::new(folder, &scene.hash(), settings, &maker)
+        CachedBake::new(folder, scene, settings, &maker)
     }
 
     /// One picture, or a series of them.

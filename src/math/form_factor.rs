@@ -21,6 +21,39 @@ pub fn to_polygon(p: DVec3, n: DVec3, contour: &[DVec3]) -> f64 {
     -sum / TAU
 }
 
+/// [`to_polygon`] of a triangle.
+pub fn to_triangle(p: DVec3, n: DVec3, triangle: &[DVec3; 3]) -> f64 {
+    let corners = triangle.map(|v| v - p);
+    let heights = corners.map(|v| v.dot(n));
+    // One corner more than the triangle where the horizon cuts one off.
+    let mut clipped = [DVec3::ZERO; 4];
+    let mut count = 0;
+    let mut push = |v: DVec3| {
+        clipped[count] = v;
+        count += 1;
+    };
+    for i in 0..3 {
+        let next = (i + 1) % 3;
+        let (a, ha, hb) = (corners[i], heights[i], heights[next]);
+        if ha > 0.0 {
+            push(a);
+        }
+        if (ha > 0.0) != (hb > 0.0) {
+            push(a + (corners[next] - a) * (ha / (ha - hb)));
+        }
+    }
+    let mut sum = 0.0;
+    for i in 0..count {
+        let (a, b) = (clipped[i], clipped[if i + 1 < count { i + 1 } else { 0 }]);
+        let normal = a.cross(b);
+        let length = normal.length();
+        if length > 0.0 {
+            sum += length.atan2(a.dot(b)) * n.dot(normal) / length;
+        }
+    }
+    -sum / TAU
+}
+
 /// The contour relative to `p`, cut at the plane through `p` (Sutherland–Hodgman).
 fn clip_to_horizon(p: DVec3, n: DVec3, contour: &[DVec3]) -> Vec<DVec3> {
     let mut clipped = Vec::with_capacity(contour.len() + 2);

@@ -29,9 +29,9 @@ pub fn face_rectangle(face: u32, n: u32) -> [u32; 4] {
     }
 }
 
-/// The pixel that a direction in the source's frame falls in; directions below the horizon fall in
-/// the lowest row.
-pub fn pixel_of(direction: DVec3, n: u32) -> Pixel {
+/// Column and row that a direction in the source's frame points to, in pixels of the column;
+/// directions below the horizon point to the lowest row.
+pub fn texel_of(direction: DVec3, n: u32) -> (f64, f64) {
     let a = direction.abs();
     let z = direction.z.max(0.0);
     let size = f64::from(n);
@@ -47,7 +47,13 @@ pub fn pixel_of(direction: DVec3, n: u32) -> Pixel {
         let first_row = if positive { first } else { first + 0.5 };
         (u / w, (first_row + 0.5 * z / w) * size)
     };
-    let column = (u * 0.5 + 0.5) * size;
+    ((u * 0.5 + 0.5) * size, row)
+}
+
+/// The pixel that a direction in the source's frame falls in; directions below the horizon fall in
+/// the lowest row.
+pub fn pixel_of(direction: DVec3, n: u32) -> Pixel {
+    let (column, row) = texel_of(direction, n);
     Pixel {
         column: (column.max(0.0) as u32).min(n - 1),
         row: (row.max(0.0) as u32).min(3 * n - 1),

@@ -3,3 +3,4 @@
 pub mod directions;
 pub mod form_factor;
 pub mod hemicube;
+pub mod kept;

@@ -8,6 +8,9 @@ use crate::scene::Scene;
 /// Cosine of 35°, the greatest angle between normals that counts as one smooth surface.
 const CREASE_COS: f64 = 0.819_152_044_288_992;
 
+/// Cosine of 2°, the greatest angle between normals that counts as one plane.
+const PLANE_COS: f64 = 0.999_390_827_019_096;
+
 /// Most elements about a vertex that are compared with one another, so that a fan of 100,000
 /// triangles does not cost 10¹⁰ steps. About a vertex with more, no elements are joined.
 const MOST_AROUND: usize = 512;
@@ -62,13 +65,18 @@ impl Corners {
     /// them, each with its angle at the vertex: with these weights the diagonals of a fan do not
     /// matter.
     pub fn smooth(&self, e: usize, vertex: u32) -> impl Iterator<Item = (usize, f64)> {
+        self.within(e, vertex, CREASE_COS)
+    }
+
+    /// The same of triangles whose normals have this cosine at least with that of `e`.
+    fn within(&self, e: usize, vertex: u32, cosine: f64) -> impl Iterator<Item = (usize, f64)> {
         let [from, to] = [vertex, vertex + 1].map(|v| self.first[v as usize] as usize);
         let crowded = to - from > MOST_AROUND;
         self.corners[from..to]
             .iter()
             .map(|&corner| (corner as usize / 3, corner as usize % 3))
             .filter(move |&(other, _)| {
-                let even = || self.normals[e].dot(self.normals[other]) >= CREASE_COS;
+                let even = || self.normals[e].dot(self.normals[other]) >= cosine;
                 other == e || (!crowded && even())
             })
             .map(|(other, k)| (other, self.angles[other][k]))
@@ -81,26 +89,56 @@ fn angle(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     u.cross(v).length().atan2(u.dot(v))
 }
 
-/// Irradiance at each corner, `[triangle][corner]`, W·m⁻², RGB: the mean of [`Corners::smooth`].
-pub fn corner_irradiance(scene: &Scene, irradiance: &[Vec3]) -> Vec<[Vec3; 3]> {
+/// What elements about a vertex have light in common there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Joined {
+    /// Those of one smooth surface, to 35°, as pictures show it.
+    Smooth,
+    /// Those of one plane, to 2°: the facets of a curved surface turn to other light, each its own.
+    Plane,
+}
+
+/// Irradiance at each corner, `[triangle][corner]`, W·m⁻², RGB. Linear between the corners and
+/// continuous where triangles are joined, it has nearly the means of the triangles: the mean of the
+/// triangles about a corner, and of what that mean leaves of theirs (one step of Landweber's
+/// iteration), no brighter or darker than they are.
+pub fn corner_irradiance(scene: &Scene, irradiance: &[Vec3], joined: Joined) -> Vec<[Vec3; 3]> {
     let corners = Corners::new(scene);
-    scene
-        .triangles
-        .par_iter()
-        .enumerate()
-        .map(|(e, triangle)| {
-            triangle.vertices.map(|vertex| {
-                let (mut sum, mut weight) = (DVec3::ZERO, 0.0);
-                for (other, angle) in corners.smooth(e, vertex) {
-                    sum += irradiance[other].as_dvec3() * angle;
-                    weight += angle;
-                }
-                if weight > 0.0 {
-                    (sum / weight).as_vec3()
-                } else {
-                    irradiance[e]
-                }
-            })
-        })
-        .collect()
+    let cosine = match joined {
+        Joined::Smooth => CREASE_COS,
+        Joined::Plane => PLANE_COS,
+    };
+    let each = |find: &(dyn Fn(usize, u32) -> Vec3 + Sync)| -> Vec<[Vec3; 3]> {
+        let triangles = scene.triangles.par_iter().enumerate();
+        triangles
+            .map(|(e, triangle)| triangle.vertices.map(|v| find(e, v)))
+            .collect()
+    };
+    let mean = |values: &[Vec3], e: usize, vertex: u32| -> Vec3 {
+        let (mut sum, mut weight) = (DVec3::ZERO, 0.0);
+        for (other, angle) in corners.within(e, vertex, cosine) {
+            sum += values[other].as_dvec3() * angle;
+            weight += angle;
+        }
+        match weight > 0.0 {
+            true => (sum / weight).as_vec3(),
+            false => values[e],
+        }
+    };
+    let means = each(&|e, vertex| mean(irradiance, e, vertex));
+    let left: Vec<Vec3> = (irradiance.iter().zip(&means))
+        .map(|(whole, [a, b, c])| whole - (a + b + c) / 3.0)
+        .collect();
+    let corrected = each(&|e, vertex| {
+        let about = || {
+            corners
+                .within(e, vertex, cosine)
+                .map(|(other, _)| irradiance[other])
+        };
+        let low = about().fold(Vec3::INFINITY, Vec3::min);
+        let high = about().fold(Vec3::NEG_INFINITY, Vec3::max);
+        let found = mean(irradiance, e, vertex) + mean(&left, e, vertex);
+        found.clamp(low, high)
+    });
+    corrected
 }

@@ -8,6 +8,7 @@ pub mod corners;
 pub mod elements;
 pub mod meshlets;
 pub mod meso_vertices;
+pub mod near;
 pub mod occluders;
 pub mod relief;
 pub mod shadow_tree;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::buffers::{SceneBuffers, upload};
 use super::occluder_tree::OccluderTree;
 use super::types::{Draw, Slot, View};
-use crate::constants::{FACES, MESHLET_TRIANGLES, RECEIVE_KINDS};
+use crate::constants::{FACES, MESHLET_TRIANGLES, RECEIVE_LISTS};
 use crate::error::Result;
 use crate::math::hemicube::pixel_count;
 use crate::vk::{
@@ -56,6 +56,8 @@ pub struct Hemicubes {
     pub items: Image,
     pub framebuffer: Framebuffer,
     pub sampler: Sampler,
+    /// What decides where the item buffer leaves open what is seen.
+    pub occluders: Option<OccluderTree>,
 }
 
 /// Bytes of the lists of drawn triangles, for one occluder in one face of one slot.
@@ -82,6 +84,14 @@ impl Batch {
     ) -> Result<Self> {
         let hemicubes = Hemicubes::new(device, pass, scene, size)?;
         Self::new(device, size.slots, Sight::Hemicubes(hemicubes))
+    }
+
+    /// Decides by rays where its item buffers leave open what is seen.
+    pub fn with_rays(mut self, tree: &OccluderTree) -> Self {
+        if let Sight::Hemicubes(hemicubes) = &mut self.sight {
+            hemicubes.occluders = Some(tree.clone());
+        }
+        self
     }
 
     /// Of a batch that draws.
@@ -159,6 +169,7 @@ impl Hemicubes {
             framebuffer: Framebuffer::new(device, "item buffer", pass, &items, &depth)?,
             sampler: Sampler::new(device, "item buffer", false)?,
             items,
+            occluders: None,
         })
     }
 }
@@ -168,7 +179,7 @@ impl Hemicubes {
 fn most_slots(limits: &Limits, (elements, occluders): (u32, u32), face_size: u32) -> u32 {
     let region = u64::from(FACES) * u64::from(occluders);
     // Of receivers: fresh form factors are no more. Lists of triangles may be drawn in parts.
-    let lists = 4 * u64::from(RECEIVE_KINDS) * u64::from(elements);
+    let lists = 4 * u64::from(RECEIVE_LISTS) * u64::from(elements);
     let by_buffer = limits.max_storage_buffer_range / lists.max(1);
     let by_memory =
         limits.heap_bytes / 8 / (DRAWN_BYTES * region + 8 * pixel_count(face_size) as u64);
@@ -194,8 +205,8 @@ mod tests {
             timestamp_period: 1.0,
         };
         for (elements, occluders, expected) in [
-            (1_000_000, 25_000, 8),
-            (1_000_000, 1_000_000, 8),
+            (1_000_000, 25_000, 5),
+            (1_000_000, 1_000_000, 5),
             (10_000, 10_000, 128),
             (100_000_000, 100_000_000, 1),
         ] {

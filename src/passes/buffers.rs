@@ -8,10 +8,12 @@ use glam::Vec3;
 
 use super::receiver_blocks::receiver_blocks;
 use super::types::{Component, Meshlet, Source, Triangle, contour_corners};
+use crate::constants::SOURCE_EYES;
 use crate::error::Result;
 use crate::mesh::charts::Connections;
 use crate::mesh::elements::Elements;
 use crate::mesh::meshlets;
+use crate::mesh::near::{NearPairs, PartTree};
 use crate::mesh::occluders::Occluders;
 use crate::mesh::sources::{self, Sources};
 use crate::vk::{Buffer, BufferUse, Commands, Device, Stage};
@@ -41,12 +43,21 @@ pub struct SceneBuffers {
     /// Blocks of GROUP elements without relief, then of those with it.
     pub receiver_blocks: Buffer,
     pub areas: Buffer,
+    /// See [`NearPairs::weights`].
+    pub weights: Buffer,
     /// Of an element with a relief: that of even light.
     pub reflectance: Buffer,
     pub sources: Buffer,
+    /// Places on each source, `[source][SOURCE_EYES]`.
+    pub eyes: Buffer,
     pub contours: Buffer,
     pub meshlets: Buffer,
     pub components: Buffer,
+    /// Form factors from near elements, one source after another, and where each begins.
+    pub near_factors: Buffer,
+    pub near_starts: Buffer,
+    /// Of one source, at most.
+    pub most_near: u32,
 }
 
 impl SceneBuffers {
@@ -56,11 +67,13 @@ impl SceneBuffers {
         sources: &Sources,
         connections: &Connections,
         occluders: &Occluders,
+        near: &NearPairs,
     ) -> Result<Self> {
         let vertices: Vec<Vec3> = elements.vertices.iter().map(|v| v.as_vec3()).collect();
         let planes = planes(elements);
         let triangles = triangles(elements, &planes);
-        let areas: Vec<f32> = elements.area.iter().map(|&a| a as f32).collect();
+        let narrow = |values: &[f64]| -> Vec<f32> { values.iter().map(|&v| v as f32).collect() };
+        let (areas, weights) = (narrow(&elements.area), narrow(&near.weights));
         let Outlined {
             list,
             contours,
@@ -92,11 +105,16 @@ impl SceneBuffers {
             balls: upload(device, "balls", &balls(elements), texels)?,
             receiver_blocks: upload(device, "receiver blocks", &blocks, storage)?,
             areas: upload(device, "areas", &areas, storage)?,
+            weights: upload(device, "weights", &weights, storage)?,
             reflectance: upload(device, "reflectance", &reflectance, storage)?,
             sources: upload(device, "sources", &list, texels)?,
+            eyes: upload(device, "eyes", &eyes(elements, sources, near), texels)?,
             contours: upload(device, "contours", &contours, texels)?,
             meshlets: upload(device, "meshlets", &meshlets, storage)?,
             components: upload(device, "components", &components, storage)?,
+            near_factors: upload(device, "near factors", &near.rows, storage)?,
+            near_starts: upload(device, "near starts", &near.row_starts, storage)?,
+            most_near: near.longest_row(),
         })
     }
 }
@@ -106,6 +124,22 @@ impl SceneBuffers {
     pub fn write_sources(&self, device: &Arc<Device>, sources: &[sources::Source]) -> Result<()> {
         write(device, &self.sources, &Outlined::new(sources).list)
     }
+}
+
+/// Places on each source, `[source][SOURCE_EYES]`.
+fn eyes(elements: &Elements, sources: &Sources, near: &NearPairs) -> Vec<[f32; 4]> {
+    let of_source = |(source, tree): (&sources::Source, &PartTree)| {
+        let places = tree.places(elements, source, SOURCE_EYES as usize);
+        places
+            .into_iter()
+            .map(|place| place.as_vec3().extend(0.0).to_array())
+    };
+    sources
+        .list
+        .iter()
+        .zip(&near.trees)
+        .flat_map(of_source)
+        .collect()
 }
 
 /// Normal n and n · x, `[element]`.

@@ -37,7 +37,7 @@ impl Couple {
             slots: &batch.slots,
             targets: &on_device,
             reflectance: &scene.reflectance,
-            element_area: &scene.areas,
+            weights: &scene.weights,
             fresh: &fresh.plain,
             fresh_meso: &fresh.meso,
             occupied: &fresh.occupied,

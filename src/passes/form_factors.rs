@@ -6,20 +6,34 @@
 
 use std::sync::Arc;
 
-use super::batch::{Batch, Sight};
+use super::batch::{Batch, Hemicubes, Sight};
 use super::buffers::SceneBuffers;
 use super::fresh_rows::{FreshRows, ReceiverLists};
 use super::groups;
+use super::occluder_tree::OccluderTree;
 use super::shaders::{
-    form_factors, form_factors_rays, form_factors_relief, form_factors_relief_rays, sort_receivers,
-    sort_receivers_rays,
+    form_factors, form_factors_rays, form_factors_relief, form_factors_relief_rays,
+    resolve_receivers, sort_receivers, sort_receivers_rays,
 };
 use super::types::ReceiverList;
-use crate::constants::{RECEIVE_KINDS, SORT_ELEMENTS, SORT_SLOTS};
+use crate::constants::{
+    RECEIVE_CROSSED, RECEIVE_DOUBTFUL, RECEIVE_KINDS, RECEIVE_LISTS, SORT_ELEMENTS, SORT_SLOTS,
+    SOURCE_EYES,
+};
 use crate::error::Result;
 use crate::vk::{
     BoundCompute, Buffer, Commands, ComputePipeline, ComputeShader, Device, ShaderBindings, Stage,
 };
+
+/// What is looked at more closely, or not at all.
+#[derive(Debug, Clone, Copy)]
+pub struct Care {
+    /// Blocks of elements that see nothing of a source are passed over as a whole, which leaves the
+    /// lists the same.
+    pub culls: bool,
+    /// Where a silhouette may cut a source, rays find the share of it that an element sees.
+    pub silhouettes: bool,
+}
 
 /// Bound to a batch.
 pub struct FormFactors {
@@ -41,6 +55,8 @@ struct Range {
     lists: ReceiverLists,
     fresh: Buffer,
     sort: BoundCompute,
+    /// What rays decide about, with its list.
+    resolve: Vec<(u32, BoundCompute)>,
     /// One a kind.
     form_factors: Vec<BoundCompute>,
 }
@@ -89,15 +105,14 @@ macro_rules! found {
 }
 
 impl FormFactors {
-    /// `meso`: the elements with a relief. `culls`: whether blocks of elements that see nothing of
-    /// a source are passed over as a whole, which leaves the lists the same.
+    /// `meso`: the elements with a relief.
     pub fn new(
         device: &Arc<Device>,
         scene: &SceneBuffers,
         batch: &Batch,
         rows: &FreshRows,
         meso: Option<&Buffer>,
-        culls: bool,
+        care: Care,
     ) -> Result<Self> {
         let plain = On {
             scene,
@@ -107,7 +122,7 @@ impl FormFactors {
             fresh: &rows.plain,
             meso: None,
         };
-        let mut ranges = vec![Range::new(device, &plain, culls)?];
+        let mut ranges = vec![Range::new(device, &plain, care)?];
         if meso.is_some() {
             let with_relief = On {
                 lists: &rows.meso_lists,
@@ -115,7 +130,7 @@ impl FormFactors {
                 meso,
                 ..plain
             };
-            ranges.push(Range::new(device, &with_relief, culls)?);
+            ranges.push(Range::new(device, &with_relief, care)?);
         }
         // Rays of one slot at a time.
         let (face_size, at_once) = match &batch.sight {
@@ -159,13 +174,25 @@ impl FormFactors {
             }
         }
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+        let list_at = |slot: u32, list: u32| {
+            size_of::<ReceiverList>() as u64 * u64::from(slot * RECEIVE_LISTS + list)
+        };
+        for range in &self.ranges {
+            for &(list, ref resolve) in &range.resolve {
+                for slot in 0..self.slot_count {
+                    let push = parameters(range, slot..slot + 1);
+                    let at = list_at(slot, list);
+                    cmd.dispatch_indirect(resolve, &push, &range.lists.counts, at);
+                }
+            }
+            cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+        }
         // Every element is in one list of a slot at most.
         for range in &self.ranges {
             for slot in 0..self.slot_count {
-                for (kind, form_factors) in range.form_factors.iter().enumerate() {
+                for (kind, form_factors) in (0..).zip(&range.form_factors) {
                     let push = parameters(range, slot..slot + 1);
-                    let list = u64::from(slot * RECEIVE_KINDS) + kind as u64;
-                    let at = size_of::<ReceiverList>() as u64 * list;
+                    let at = list_at(slot, kind);
                     cmd.dispatch_indirect(form_factors, &push, &range.lists.counts, at);
                 }
             }
@@ -174,7 +201,7 @@ impl FormFactors {
 }
 
 impl Range {
-    fn new(device: &Arc<Device>, on: &On<'_>, culls: bool) -> Result<Self> {
+    fn new(device: &Arc<Device>, on: &On<'_>, care: Care) -> Result<Self> {
         let shape = on.rows.shape;
         let [first_element, element_count, first_block] = match on.meso {
             None => [0, shape.plain_count, 0],
@@ -186,15 +213,17 @@ impl Range {
             first_block,
             lists: on.lists.clone(),
             fresh: on.fresh.clone(),
-            sort: sort(device, on, culls)?,
+            sort: sort(device, on, care)?,
+            resolve: resolve(device, on)?,
             form_factors: form_factors(device, on)?,
         })
     }
 }
 
-fn sort(device: &Arc<Device>, on: &On<'_>, culls: bool) -> Result<BoundCompute> {
+fn sort(device: &Arc<Device>, on: &On<'_>, care: Care) -> Result<BoundCompute> {
     let pipeline = |shader: &ComputeShader<'_>| {
-        ComputePipeline::in_subgroups(device, "sort receivers", shader, &[culls.into()])
+        let constants = [care.culls, care.silhouettes].map(u32::from);
+        ComputePipeline::in_subgroups(device, "sort receivers", shader, &constants)
     };
     let (away_count, blocks) = (&on.rows.facing_away, &on.scene.receiver_blocks);
     match &on.batch.sight {
@@ -218,17 +247,60 @@ fn sort(device: &Arc<Device>, on: &On<'_>, culls: bool) -> Result<BoundCompute> 
     }
 }
 
+/// What decides where item buffers leave open what is seen.
+fn rays(hemicubes: &Hemicubes) -> &OccluderTree {
+    let tree = hemicubes.occluders.as_ref();
+    tree.expect("a batch for form factors has rays")
+}
+
+/// One a list that is left open.
+fn resolve(device: &Arc<Device>, on: &On<'_>) -> Result<Vec<(u32, BoundCompute)>> {
+    // Those of strong emitters are the sharpest shadows.
+    let (tree, from) = match &on.batch.sight {
+        Sight::Rays(tree) => (tree, SOURCE_EYES),
+        Sight::Hemicubes(hemicubes) => (rays(hemicubes), SOURCE_EYES / 2),
+    };
+    let (shadow_nodes, shadow_occluders) = (&tree.nodes, &tree.occluders);
+    let eyes = &on.scene.eyes;
+    let bindings = receivers!(resolve_receivers, on, shadow_nodes, shadow_occluders, eyes);
+    let bind = |list: u32| {
+        let shader = &resolve_receivers::SHADER;
+        let pipeline =
+            ComputePipeline::in_subgroups(device, "resolve receivers", shader, &[list, from])?;
+        Ok((list, pipeline.bind(&bindings)?))
+    };
+    [RECEIVE_DOUBTFUL, RECEIVE_CROSSED]
+        .into_iter()
+        .map(bind)
+        .collect()
+}
+
 /// One a kind.
 fn form_factors(device: &Arc<Device>, on: &On<'_>) -> Result<Vec<BoundCompute>> {
     match (&on.batch.sight, on.meso) {
         (Sight::Hemicubes(hemicubes), None) => {
             let items = hemicubes.sampled_items();
-            let bindings = found!(form_factors, on, items);
+            let OccluderTree {
+                nodes: shadow_nodes,
+                occluders: shadow_occluders,
+            } = rays(hemicubes);
+            let bindings = found!(form_factors, on, items, shadow_occluders, shadow_nodes);
             kinds(device, &form_factors::SHADER, &bindings)
         }
         (Sight::Hemicubes(hemicubes), Some(meso_elements)) => {
             let items = hemicubes.sampled_items();
-            let bindings = found!(form_factors_relief, on, items, meso_elements);
+            let OccluderTree {
+                nodes: shadow_nodes,
+                occluders: shadow_occluders,
+            } = rays(hemicubes);
+            let bindings = found!(
+                form_factors_relief,
+                on,
+                items,
+                meso_elements,
+                shadow_occluders,
+                shadow_nodes
+            );
             kinds(device, &form_factors_relief::SHADER, &bindings)
         }
         (Sight::Rays(tree), None) => {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::buffers::{SceneBuffers, filled, upload};
 use super::groups;
 use super::types::ReceiverList;
-use crate::constants::RECEIVE_KINDS;
+use crate::constants::RECEIVE_LISTS;
 use crate::error::Result;
 use crate::vk::{Buffer, BufferUse, Device};
 
@@ -70,7 +70,7 @@ pub struct ReceiverLists {
 
 impl ReceiverLists {
     fn new(device: &Arc<Device>, slots: u32, elements: u32) -> Result<Self> {
-        let lists = slots * RECEIVE_KINDS;
+        let lists = slots * RECEIVE_LISTS;
         let empty = ReceiverList {
             groups_x: 0,
             groups_y: 1,

@@ -1,5 +1,5 @@
 //! Keeps the rows of a batch. Shaders: `allocate.comp`, `keep.comp`; the codes' twin:
-//! [`crate::reference::kept`].
+//! [`crate::math::kept`].
 
 use std::sync::Arc;
 

@@ -19,7 +19,7 @@ impl Measure {
         let bindings = Bindings {
             sources: &scene.sources,
             reflectance: &scene.reflectance,
-            element_area: &scene.areas,
+            weights: &scene.weights,
             direct: &state.direct,
             indirect: &state.indirect,
             source_reflected: &state.reflected,

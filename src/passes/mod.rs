@@ -14,6 +14,7 @@ pub mod keep;
 pub mod kept_rows;
 pub mod measure;
 pub mod measure_relief;
+pub mod near_rows;
 pub mod normalise;
 pub mod occluder_tree;
 pub mod pixels_relief;

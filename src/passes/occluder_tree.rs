@@ -12,7 +12,8 @@ use crate::mesh::occluders::Occluders;
 use crate::mesh::shadow_tree::ShadowTree;
 use crate::vk::{Buffer, BufferUse, Device};
 
-/// The tree on the device.
+/// The tree on the device. A clone is another handle to it.
+#[derive(Clone)]
 pub struct OccluderTree {
     pub nodes: Buffer,
     pub occluders: Buffer,
@@ -47,8 +48,7 @@ pub fn shadow_occluders(
 impl OccluderTree {
     /// # Errors
     /// A device without the memory.
-    pub fn new(device: &Arc<Device>, occluders: Vec<ShadowOccluder>) -> Result<Self> {
-        let tree = ShadowTree::new(occluders);
+    pub fn new(device: &Arc<Device>, tree: &ShadowTree<ShadowOccluder>) -> Result<Self> {
         let texels = BufferUse::Texels;
         Ok(Self {
             nodes: upload(device, "occluder nodes", tree.nodes(), texels)?,

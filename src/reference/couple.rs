@@ -2,14 +2,13 @@
 
 use glam::Vec3;
 
-use crate::mesh::elements::Elements;
 use crate::structs::CouplingTarget;
 
-/// The words of one row: Σ A_j F_js / A_t of a target of one reflectance, Σ ρ_j A_j F_js / A_t by
+/// The words of one row: Σ w_j F_js / A_t of a target of one reflectance, Σ ρ_j w_j F_js / A_t by
 /// colour of any other. `row`: form factor from each element to the source; `reflectance`: of even
-/// light.
+/// light; `weights`: area of each element as it counts in its source's mean.
 pub fn couple(
-    elements: &Elements,
+    weights: &[f64],
     reflectance: &[Vec3],
     targets: &[CouplingTarget],
     row: &[f32],
@@ -18,8 +17,8 @@ pub fn couple(
     for target in targets {
         let first = target.first_element as usize;
         let members = first..first + target.element_count as usize;
-        let area: f64 = members.clone().map(|e| elements.area[e]).sum();
-        let brought = |e: usize| elements.area[e] * f64::from(row[e]) / area;
+        let area: f64 = members.clone().map(|e| weights[e]).sum();
+        let brought = |e: usize| weights[e] * f64::from(row[e]) / area;
         assert_eq!(words.len(), target.first_word as usize);
         match target.word_count {
             1 => words.push(members.map(brought).sum()),

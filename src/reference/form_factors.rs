@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use crate::constants::{KIND_POINT, NONE};
 use crate::math::form_factor::to_polygon;
-use crate::math::hemicube::{direction_of, pixel_of};
+use crate::math::hemicube::{Pixel, direction_of, pixel_of, texel_of};
 use crate::mesh::elements::Elements;
 use crate::mesh::sources::Source;
 
@@ -106,46 +106,102 @@ fn form_factor(elements: &Elements, source: &Source, p: DVec3, element: usize) -
         .sum()
 }
 
-/// Whether the source sees a place `p` on an element, by its item buffer `items`, `[row][column]`
-/// of a hemicube of `n` pixels a side.
-pub fn visible(
-    elements: &Elements,
-    source: &Source,
-    items: &[u32],
-    n: u32,
-    p: DVec3,
-    element: usize,
-) -> bool {
-    let d = p - source.eye;
-    let local = DVec3::new(
-        d.dot(source.tangent),
-        d.dot(source.bitangent),
-        d.dot(source.normal),
-    );
-    let pixel = pixel_of(local, n);
-    let item = items[(pixel.row * n + pixel.column) as usize];
-    if item == NONE || item as usize == element {
-        return true;
+/// What an item buffer says of a place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sight {
+    Hidden,
+    Seen,
+    /// The pixels about it do not agree.
+    Doubtful,
+}
+
+/// A source with its item buffer, `[row][column]` of a hemicube of `n` pixels a side.
+#[derive(Clone, Copy)]
+pub struct Drawn<'a> {
+    pub elements: &'a Elements,
+    pub source: &'a Source,
+    pub items: &'a [u32],
+    pub n: u32,
+}
+
+impl Drawn<'_> {
+    fn local(&self, p: DVec3) -> DVec3 {
+        let Source {
+            tangent,
+            bitangent,
+            normal,
+            eye,
+            ..
+        } = self.source;
+        let d = p - eye;
+        DVec3::new(d.dot(*tangent), d.dot(*bitangent), d.dot(*normal))
     }
-    let plane = elements.normal[item as usize];
-    let on_plane = elements.centroid[item as usize];
-    let eye_height = (source.eye - on_plane).dot(plane);
-    let height = (p - on_plane).dot(plane);
-    let depth = if eye_height >= 0.0 { -height } else { height };
-    if depth <= HEIGHT_EPSILON {
-        return true;
+
+    fn item(&self, pixel: Pixel) -> u32 {
+        self.items[(pixel.row * self.n + pixel.column) as usize]
     }
-    let ray = direction_of(pixel, n);
-    let ray = source.tangent * ray.x + source.bitangent * ray.y + source.normal * ray.z;
-    let seen = source.eye + ray * (-eye_height / plane.dot(ray));
-    let apart = p.distance(seen);
-    let normal = elements.normal[element];
-    let grazing = normal.dot(d).abs().min(plane.dot(d).abs()) / d.length();
-    let footprint = d.length() * 2.0 / f64::from(n) / grazing.max(0.05);
-    if (seen - source.eye).dot(d) > d.length() * (d.length() + REACH * footprint) {
-        return true;
+
+    /// What the four pixels about a place `p` on an element show.
+    pub fn sight(&self, p: DVec3, element: usize) -> Sight {
+        let pixels = pixels_about(self.local(p), self.n);
+        let open = |&pixel: &Pixel| {
+            let item = self.item(pixel);
+            item == NONE || item as usize == element || self.leaves_open(item, pixel, p, element)
+        };
+        match pixels.iter().filter(|pixel| open(pixel)).count() {
+            0 => Sight::Hidden,
+            4 => Sight::Seen,
+            _ => Sight::Doubtful,
+        }
     }
-    apart <= REACH * footprint && depth <= apart * normal.cross(plane).length() + HEIGHT_EPSILON
+
+    /// Whether an item that a pixel shows leaves a place on an element open.
+    fn leaves_open(&self, item: u32, pixel: Pixel, p: DVec3, element: usize) -> bool {
+        let Self {
+            elements,
+            source,
+            n,
+            ..
+        } = *self;
+        let d = p - source.eye;
+        let plane = elements.normal[item as usize];
+        let on_plane = elements.centroid[item as usize];
+        let eye_height = (source.eye - on_plane).dot(plane);
+        let height = (p - on_plane).dot(plane);
+        let depth = if eye_height >= 0.0 { -height } else { height };
+        if depth <= HEIGHT_EPSILON {
+            return true;
+        }
+        let ray = direction_of(pixel, n);
+        let ray = source.tangent * ray.x + source.bitangent * ray.y + source.normal * ray.z;
+        let seen = source.eye + ray * (-eye_height / plane.dot(ray));
+        let apart = p.distance(seen);
+        let normal = elements.normal[element];
+        let grazing = normal.dot(d).abs().min(plane.dot(d).abs()) / d.length();
+        let footprint = d.length() * 2.0 / f64::from(n) / grazing.max(0.05);
+        if (seen - source.eye).dot(d) > d.length() * (d.length() + REACH * footprint) {
+            return true;
+        }
+        apart <= REACH * footprint && depth <= apart * normal.cross(plane).length() + HEIGHT_EPSILON
+    }
+}
+
+/// The four pixels of a face whose centres lie about a direction.
+fn pixels_about(local: DVec3, n: u32) -> [Pixel; 4] {
+    let (column, row) = texel_of(local, n);
+    let own = pixel_of(local, n);
+    let (first_row, rows) = match own.row < n {
+        true => (0, n),
+        false => (own.row / (n / 2) * (n / 2), n / 2),
+    };
+    let low = |at: f64, first: u32, count: u32| {
+        ((at - 0.5).floor().max(0.0) as u32).clamp(first, first + count - 2)
+    };
+    let (column, row) = (low(column, 0, n), low(row, first_row, rows));
+    [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| Pixel {
+        column: column + x,
+        row: row + y,
+    })
 }
 
 /// Sample points of a triangle (two barycentric coordinates, weight): the centroid; degree 2;

@@ -6,19 +6,22 @@ use crate::constants::KIND_POINT;
 use crate::mesh::elements::Elements;
 use crate::mesh::sources::Source;
 
-/// Mean by area over a source's members of reflectance times irradiance, RGB, `[source]`.
-pub fn measure(elements: &Elements, sources: &[Source], irradiance: &[Vec3]) -> Vec<DVec3> {
+/// Mean, by the weights of [`crate::mesh::near::NearPairs`], over a source's members of reflectance times irradiance, RGB, `[source]`.
+pub fn measure(
+    elements: &Elements,
+    weights: &[f64],
+    sources: &[Source],
+    irradiance: &[Vec3],
+) -> Vec<DVec3> {
     let of_source = |source: &Source| {
         if source.kind == KIND_POINT {
             return DVec3::ZERO;
         }
         let first = source.first_element as usize;
         let range = first..first + source.element_count as usize;
-        let area: f64 = range.clone().map(|e| elements.area[e]).sum();
+        let area: f64 = range.clone().map(|e| weights[e]).sum();
         let reflected = |e: usize| elements.reflectance[e] * irradiance[e];
-        let sum: DVec3 = range
-            .map(|e| reflected(e).as_dvec3() * elements.area[e])
-            .sum();
+        let sum: DVec3 = range.map(|e| reflected(e).as_dvec3() * weights[e]).sum();
         sum / area
     };
     sources.iter().map(of_source).collect()

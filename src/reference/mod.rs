@@ -6,7 +6,6 @@ pub mod cull;
 pub mod disc;
 pub mod form_factors;
 pub mod item_buffer;
-pub mod kept;
 pub mod measure;
 pub mod normalise;
 pub mod occluder_rays;

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3};
 
-use crate::mesh::corners::corner_irradiance;
+use crate::mesh::corners::{Joined, corner_irradiance};
 use crate::picture::{SAMPLES, View};
 use crate::scene::Scene;
 
@@ -15,7 +15,7 @@ const EDGE: f64 = 1.0 / 16.0;
 /// Mean radiance of each pixel, `[row][column]` from the top left, W·m⁻²·sr⁻¹; none where a sample
 /// lies within 1/16 of a pixel of an edge, where the rasteriser may see another element.
 pub fn shade(scene: &Scene, irradiance: &[Vec3], view: &View<'_>) -> Vec<Option<DVec3>> {
-    let corners = corner_irradiance(scene, irradiance);
+    let corners = corner_irradiance(scene, irradiance, Joined::Smooth);
     let camera = view.camera;
     let back = (camera.position - camera.look_at).normalize();
     let right = camera.up.cross(back).normalize();

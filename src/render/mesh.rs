@@ -9,7 +9,7 @@ use super::flat_relief::FlatRelief;
 use super::seen_scene::SeenScene;
 use super::shafts::Shafts;
 use super::textures::Bound;
-use super::{Light, corner_irradiance};
+use super::{Joined, Light, corner_irradiance};
 use crate::error::Result;
 use crate::mesh::corners::Corners;
 use crate::passes::buffers::upload;
@@ -81,7 +81,7 @@ impl Mesh {
             ..
         } = *seen;
         let far = |e: usize| rest.and_then(|rest| rest.far.get(&e));
-        let smooth = corner_irradiance(scene, &lighting.baked());
+        let smooth = corner_irradiance(scene, &lighting.baked(), Joined::Smooth);
         // The visible side is decided here in f64: a rasteriser decides it from rounded corners,
         // wrongly for slivers.
         let mut order: Vec<_> = scene

@@ -38,7 +38,7 @@ pub use slots::slot_colour;
 pub(crate) use textures::upload as upload_texture;
 
 use crate::error::Result;
-pub use crate::mesh::corners::corner_irradiance;
+pub use crate::mesh::corners::{Joined, corner_irradiance};
 pub use crate::picture::{FileKind, Light, MOST_PIXELS, Picture, SAMPLES, View, tone};
 use crate::scene::Scene;
 use crate::vk::Device;

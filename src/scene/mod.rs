@@ -28,6 +28,7 @@ mod obj;
 mod obj_lint;
 #[cfg(feature = "formats")]
 mod placement;
+mod refine;
 mod relief_notes;
 #[cfg(feature = "formats")]
 mod scene_file;
@@ -48,6 +49,7 @@ pub use displace::{displace, relief_normals};
 pub use load::load;
 pub use maps::{HeightMap, NormalMap};
 pub use material::Material;
+pub use refine::{OnInput, RefinedFrom, Refinement};
 pub use texture::Texture;
 #[cfg(feature = "formats")]
 pub use write::write_scene;
@@ -70,6 +72,8 @@ pub struct Scene {
     pub dropped_degenerate: usize,
     /// Triangles left out because an earlier one has the same corners and the same front.
     pub dropped_duplicates: usize,
+    /// None of a scene as it was read.
+    pub refined_from: Option<RefinedFrom>,
     /// What was made up or ignored while reading, one sentence each, to show to the user.
     pub notes: Vec<String>,
 }

@@ -8,8 +8,9 @@ use crate::passes::batch::Batch;
 use crate::passes::bin_pixels::BinPixels;
 use crate::passes::buffers::SceneBuffers;
 use crate::passes::cull::Culling;
-use crate::passes::form_factors::FormFactors;
+use crate::passes::form_factors::{Care, FormFactors};
 use crate::passes::fresh_rows::FreshRows;
+use crate::passes::near_rows::NearRows;
 use crate::passes::normalise::Normalise;
 use crate::vk::{Buffer, Commands, Device, Stage};
 
@@ -18,6 +19,7 @@ use crate::vk::{Buffer, Commands, Device, Stage};
 pub(super) enum Evaluate {
     Receivers {
         form_factors: FormFactors,
+        near: Option<NearRows>,
         /// In enclosed scenes.
         normalise: Option<Normalise>,
     },
@@ -36,12 +38,24 @@ impl Evaluate {
         if settings.estimator == Estimator::Pixel {
             return Ok(Self::Pixels(BinPixels::new(device, scene, batch, fresh)?));
         }
-        let culls = settings.culling != Culling::Off;
-        let normalise = || Normalise::new(device, scene, batch, fresh);
+        let care = Care {
+            culls: settings.culling != Culling::Off,
+            silhouettes: settings.silhouettes,
+        };
+        let normalise = || Normalise::new(device, scene, batch, fresh, settings.normalise);
         Ok(Self::Receivers {
-            form_factors: FormFactors::new(device, scene, batch, fresh, meso, culls)?,
+            form_factors: FormFactors::new(device, scene, batch, fresh, meso, care)?,
+            near: NearRows::new(device, scene, batch, fresh)?,
             normalise: scene.enclosed.then(normalise).transpose()?,
         })
+    }
+
+    /// Sums of the form factors of each slot's source, in enclosed scenes.
+    pub fn shares(&self) -> Option<&Buffer> {
+        match self {
+            Self::Receivers { normalise, .. } => Some(&normalise.as_ref()?.shares),
+            Self::Pixels(_) => None,
+        }
     }
 
     /// Ends with a barrier before compute passes.
@@ -50,9 +64,14 @@ impl Evaluate {
         match self {
             Self::Receivers {
                 form_factors,
+                near,
                 normalise,
             } => {
                 form_factors.record(cmd);
+                if let Some(near) = near {
+                    cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+                    near.record(cmd);
+                }
                 if let Some(normalise) = normalise {
                     cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
                     normalise.record(cmd);

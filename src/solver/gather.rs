@@ -133,6 +133,15 @@ impl Gathering {
         }
     }
 
+    /// Irradiance of each element, direct and indirect.
+    pub fn irradiance(&self, on: &Problem) -> Result<Vec<DVec3>> {
+        let count = on.elements.len();
+        let direct: Vec<Vec3> = download(&self.device, &on.state.direct, count)?;
+        let indirect: Vec<Vec3> = download(&self.device, &on.state.indirect, count)?;
+        let sum = |(d, i): (&Vec3, &Vec3)| d.as_dvec3() + i.as_dvec3();
+        Ok(direct.iter().zip(&indirect).map(sum).collect())
+    }
+
     /// Radiosity that each source reflects of what has been gathered.
     pub fn measure(&self) -> Result<Vec<DVec3>> {
         Commands::run(&self.device, "measure", |cmd| {

@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::gather::LitRow;
+use super::near::Sent;
 use super::progress::Bound;
 use super::system::System;
 use crate::passes::types::KeptRow;
@@ -37,6 +38,8 @@ pub(super) struct Drawn {
     pub emission_gathered: bool,
     /// Reflected radiosity that the elements have received.
     pub gathered: DVec3,
+    /// Scale of the form factors through which the elements have received it.
+    pub scale: Option<f32>,
     /// With a relief: what it sends has been corrected by direction.
     pub directed: bool,
 }
@@ -143,6 +146,18 @@ impl Ledger {
         self.system.area(s) * light.element_sum()
     }
 
+    /// What each source has sent to the elements through its row; none of one that sent nothing.
+    pub fn sent(&self) -> Vec<Option<Sent>> {
+        let sent = |drawn: &Drawn| {
+            Some(Sent {
+                emission: drawn.emission_gathered,
+                reflected: drawn.gathered,
+                scale: drawn.scale?.into(),
+            })
+        };
+        self.sources.iter().map(sent).collect()
+    }
+
     /// What a source has to send through its row, which counts as sent from now on.
     pub fn send(&mut self, s: usize, row: KeptRow, by_direction: bool) -> Option<LitRow> {
         let (emitted, reflected) = self.owed(s);
@@ -154,6 +169,7 @@ impl Ledger {
         }
         // As it was rounded, so that nothing is lost.
         drawn.gathered += sent.as_dvec3();
+        drawn.scale = Some(row.scale);
         drawn.emission_gathered |= self.system.emission_is_shot(s);
         drawn.directed |= drawn.relief && drawn.times > 1;
         Some(LitRow {

@@ -8,6 +8,7 @@ use crate::error::Result;
 use crate::passes::buffers::{SceneBuffers, upload};
 use crate::passes::fresh_rows::{FreshRows, RowShape};
 use crate::passes::kept_rows::KeptRows;
+use crate::passes::occluder_tree::OccluderTree;
 use crate::passes::types::{CouplingTarget, MesoElement};
 use crate::vk::{BufferUse, Device};
 
@@ -51,16 +52,21 @@ impl Makers {
             [] => None,
             meso => Some(upload(device, "meso elements", meso, BufferUse::Storage)?),
         };
+        let occluders = match settings.estimator {
+            Estimator::Receiver => Some(OccluderTree::new(device, &parts.problem.occluder_tree)?),
+            Estimator::Pixel => None,
+        };
         let row_parts = RowParts {
             settings,
             scene,
             targets: parts.targets,
             meso: meso.as_ref(),
             fresh: &fresh,
+            occluders: occluders.as_ref(),
             kept,
         };
         let looks = match parts.strong {
-            true => emitter_looks(device, settings, || parts.problem.shadow_occluders()),
+            true => emitter_looks(device, settings),
             false => None,
         };
         let emitters = looks.map(|looks| RowMaker::new(device, &row_parts, looks));

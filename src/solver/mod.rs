@@ -16,6 +16,7 @@ mod gather;
 mod ledger;
 mod look;
 mod makers;
+mod near;
 mod problem;
 mod progress;
 mod relief_light;
@@ -33,7 +34,7 @@ mod visibility;
 use std::sync::Arc;
 use std::time::Instant;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::error::{Error, Result};
 use crate::mesh::elements::Elements;
@@ -180,7 +181,7 @@ impl Solver {
     pub fn gather(&mut self) -> Result<()> {
         let start = Instant::now();
         if let Method::Rows(spine) = &mut self.method {
-            spine.gather_kept(false, &mut self.report)?;
+            let _moved = spine.bring(&self.problem, false, &mut self.report)?;
         }
         self.report.seconds.solve_wall += start.elapsed().as_secs_f64();
         Ok(())
@@ -222,8 +223,18 @@ impl Solver {
             elements, state, ..
         } = &self.problem;
         let count = elements.len();
-        let direct: Vec<Vec3> = download(&self.device, &state.direct, count)?;
-        let indirect: Vec<Vec3> = download(&self.device, &state.indirect, count)?;
+        let mut direct: Vec<Vec3> = download(&self.device, &state.direct, count)?;
+        let mut indirect: Vec<Vec3> = download(&self.device, &state.indirect, count)?;
+        if let Method::Rows(spine) = &self.method {
+            // What rounding leaves below none is none.
+            let add = |light: &mut [Vec3], near: &[DVec3]| {
+                for (light, near) in light.iter_mut().zip(near) {
+                    *light = (light.as_dvec3() + near).max(DVec3::ZERO).as_vec3();
+                }
+            };
+            add(&mut direct, &spine.near.direct);
+            add(&mut indirect, &spine.near.indirect);
+        }
         let irradiance: Vec<Vec3> = direct.iter().zip(&indirect).map(|(d, i)| d + i).collect();
         let mut radiosity: Vec<Vec3> = (0..count)
             .map(|e| elements.emitted[e] + elements.reflectance[e] * irradiance[e])

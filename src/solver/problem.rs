@@ -9,7 +9,9 @@ use crate::constants::KIND_POINT;
 use crate::error::{Error, Result};
 use crate::mesh::charts::Connections;
 use crate::mesh::elements::Elements;
+use crate::mesh::near::NearPairs;
 use crate::mesh::occluders::Occluders;
+use crate::mesh::shadow_tree::ShadowTree;
 use crate::mesh::sources::{self, Sources};
 use crate::passes::batch::Hemicubes;
 use crate::passes::buffers::{SceneBuffers, State};
@@ -34,6 +36,9 @@ pub struct Problem {
     pub sources: Sources,
     pub connections: Connections,
     pub occluders: Occluders,
+    /// Of the occluders; empty with the `pixel` estimator.
+    pub(super) occluder_tree: ShadowTree<ShadowOccluder>,
+    pub near: NearPairs,
     pub(super) scene: SceneBuffers,
     pub(super) state: State,
     pub(super) relief: Option<ReliefBuffers>,
@@ -70,7 +75,19 @@ impl Problem {
             Estimator::Receiver if settings.merging => Occluders::merged(&elements, &connections),
             _ => Occluders::elements(&elements),
         };
-        let scene = SceneBuffers::new(device, &elements, &sources, &connections, &occluders)?;
+        let (occluder_tree, near) = match settings.estimator {
+            Estimator::Receiver => {
+                let tree = ShadowTree::new(shadow_occluders(&elements, &connections, &occluders));
+                let near = NearPairs::new(&elements, &sources.list, &tree, &settings.nearness);
+                (tree, near)
+            }
+            Estimator::Pixel => {
+                let none = NearPairs::none(&elements, sources.list.len());
+                (ShadowTree::default(), none)
+            }
+        };
+        let scene =
+            SceneBuffers::new(device, &elements, &sources, &connections, &occluders, &near)?;
         let state = State::new(device, &scene)?;
         let wanted = settings.batch.clamp(1, scene.source_count.max(1));
         let slots = Hemicubes::fitting_slots(device, &scene, settings.hemicube, wanted);
@@ -87,6 +104,8 @@ impl Problem {
             sources,
             connections,
             occluders,
+            occluder_tree,
+            near,
             scene,
             state,
             relief,
@@ -135,11 +154,8 @@ impl Problem {
             &self.sources,
             &self.connections,
             &self.occluders,
+            &self.near,
         )
-    }
-
-    pub(super) fn shadow_occluders(&self) -> Vec<ShadowOccluder> {
-        shadow_occluders(&self.elements, &self.connections, &self.occluders)
     }
 
     /// Whether a source emits so strongly that it is looked at with more care, `[source]`.

@@ -37,6 +37,8 @@ pub struct Seconds {
     pub solve: f64,
     /// Wall time of bringing light to the elements.
     pub gather: f64,
+    /// Wall time of what near sources send part by part.
+    pub near: f64,
 }
 
 /// What the scene did not need.
@@ -59,6 +61,61 @@ pub struct Skipped {
     pub receivers_facing_away: u64,
     /// Directions without light that were left out when their element was to send.
     pub dark_slots: u64,
+}
+
+/// Pairs of source and element about which rays decided.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct ByRays {
+    /// The item buffer left open whether the element sees the source.
+    pub doubtful: u64,
+    /// A silhouette may cut the source: rays found the share of it that the element sees.
+    pub silhouettes: u64,
+}
+
+/// Light from near sources, part by part.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct Near {
+    /// Elements and sources that are near them.
+    pub pairs: u64,
+    /// Parts of sources in these pairs.
+    pub parts: u64,
+    /// Rays to see the parts by.
+    pub rays: u64,
+    /// Sweeps over the parts.
+    pub sweeps: u64,
+}
+
+/// How much of each source of an enclosed scene its form factors take together, before they are
+/// scaled: 1 where they are exact.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct RawSums {
+    pub sources: u64,
+    /// By the area of the sources.
+    pub mean: f64,
+    /// Root mean square of what each is off 1, by area.
+    pub spread: f64,
+    /// The sum that is furthest off 1, and its source.
+    pub worst: f64,
+    pub worst_source: u32,
+    /// Sources that were off by more than sampling explains, and not scaled.
+    pub unscaled: u64,
+    #[serde(skip)]
+    area: f64,
+}
+
+impl RawSums {
+    fn add(&mut self, source: u32, area: f64, share: f64, scaled: bool) {
+        let all = self.area + area;
+        let off = share - 1.0;
+        self.mean = (self.mean * self.area + share * area) / all;
+        self.spread = ((self.spread.powi(2) * self.area + off * off * area) / all).sqrt();
+        self.area = all;
+        if self.sources == 0 || off.abs() > (self.worst - 1.0).abs() {
+            (self.worst, self.worst_source) = (share, source);
+        }
+        self.sources += 1;
+        self.unscaled += u64::from(!scaled);
+    }
 }
 
 #[derive(Debug, Clone, Default, Serialize)]
@@ -87,6 +144,10 @@ pub struct Report {
     pub gathered_rows: u64,
     /// Gauss–Seidel sweeps among the sources.
     pub sweeps: u64,
+    pub near: Near,
+    pub by_rays: ByRays,
+    /// Null in open scenes.
+    pub raw_sums: Option<RawSums>,
     /// Bytes of the coupling between the sources.
     pub coupling_bytes: u64,
     /// Sources drawn, again or not.
@@ -157,6 +218,12 @@ impl Report {
                 triangles_merged: (elements.len() - problem.occluders.len()) as u64,
                 ..Skipped::default()
             },
+            near: Near {
+                pairs: problem.near.rows.len() as u64,
+                parts: problem.near.entries.len() as u64,
+                rays: problem.near.rays,
+                sweeps: 0,
+            },
             relief: elements.relief.as_ref().map(ReliefReport::new),
             meshlets: problem.scene.meshlet_count.into(),
             culls: settings.culling != Culling::Off,
@@ -165,7 +232,19 @@ impl Report {
     }
 
     /// Counts a row: of a strong emitter or not, drawn before or not.
-    pub(super) fn add(&mut self, row: &Row, strong: bool, again: bool) {
+    pub(super) fn add(&mut self, row: &Row, area: f64, strong: bool, again: bool) {
+        if let Some(share) = row.share.filter(|_| !again) {
+            let sums = self.raw_sums.get_or_insert_default();
+            sums.add(
+                row.source,
+                area,
+                share.into(),
+                row.scale != 1.0 || share == 1.0,
+            );
+        }
+        let [doubtful, silhouettes] = row.resolved;
+        self.by_rays.doubtful += doubtful;
+        self.by_rays.silhouettes += silhouettes;
         self.add_drawn(&row.counts, strong);
         self.drawn_again += u64::from(again);
         self.skipped.receivers_facing_away += u64::from(row.facing_away);

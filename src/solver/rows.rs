@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::drawing::{Drawing, read_items};
 use super::estimate::Evaluate;
 use super::{EmitterShadows, Settings};
-use crate::constants::FACES;
+use crate::constants::{FACES, RECEIVE_CROSSED, RECEIVE_DOUBTFUL, RECEIVE_LISTS};
 use crate::error::Result;
 use crate::passes::batch::{Batch, Sight};
 use crate::passes::buffers::SceneBuffers;
@@ -19,7 +19,7 @@ use crate::passes::fresh_rows::FreshRows;
 use crate::passes::keep::Keep;
 use crate::passes::kept_rows::KeptRows;
 use crate::passes::occluder_tree::OccluderTree;
-use crate::passes::types::{CouplingTarget, KeptRow, ShadowOccluder, Slot};
+use crate::passes::types::{CouplingTarget, KeptRow, ReceiverList, Slot};
 use crate::vk::{Buffer, BufferUse, Commands, Device, Stage, Timestamps};
 
 /// The row of one source, and what was counted while it was made.
@@ -27,6 +27,9 @@ pub(super) struct Row {
     pub source: u32,
     /// Of all form factors.
     pub scale: f32,
+    /// Share of the source that its form factors take together, before they are scaled; none of a
+    /// point light, and in open scenes.
+    pub share: Option<f32>,
     /// Words of the coupling row, not scaled.
     pub coupling: Vec<f32>,
     pub factors: Factors,
@@ -35,6 +38,9 @@ pub(super) struct Row {
     pub counts: Vec<[u32; 3]>,
     /// Elements that see nothing of the source, whatever stands between.
     pub facing_away: u32,
+    /// Elements of which rays found whether they see it, and elements of which they found the share
+    /// of it that they see, since a silhouette may cut it.
+    pub resolved: [u64; 2],
 }
 
 /// Where the form factors of a row are.
@@ -89,6 +95,8 @@ pub(super) struct RowParts<'a> {
     /// Elements with a relief.
     pub meso: Option<&'a Buffer>,
     pub fresh: &'a FreshRows,
+    /// What hides places, for rays; the `pixel` estimator follows none.
+    pub occluders: Option<&'a OccluderTree>,
     /// Where rows are kept; without it they come to the host.
     pub kept: Option<&'a KeptRows>,
 }
@@ -97,7 +105,7 @@ pub(super) struct RowParts<'a> {
 pub(super) enum Looks {
     /// Hemicubes of so many pixels a side.
     Hemicubes(u32),
-    Rays(Vec<ShadowOccluder>),
+    Rays,
 }
 
 /// Makes rows of the sources that it is asked for, two batches at a time.
@@ -131,14 +139,16 @@ impl RowMaker {
                 let slots = fresh.slot_count;
                 let size = Drawing::fitting(device, scene, settings, slots, face);
                 let (drawing, batch) = Drawing::new(device, scene, settings.culling, &size)?;
+                let batch = match parts.occluders {
+                    Some(tree) => batch.with_rays(tree),
+                    None => batch,
+                };
                 (Some(drawing), batch)
             }
-            Looks::Rays(occluders) => {
-                let tree = OccluderTree::new(device, occluders)?;
-                (
-                    None,
-                    Batch::new(device, fresh.slot_count, Sight::Rays(tree))?,
-                )
+            Looks::Rays => {
+                let tree = parts.occluders.expect("rays have occluders").clone();
+                let sight = Sight::Rays(tree);
+                (None, Batch::new(device, fresh.slot_count, sight)?)
             }
         };
         let evaluate = Evaluate::new(device, settings, scene, parts.meso, &batch, fresh)?;
@@ -153,12 +163,16 @@ impl RowMaker {
         };
         let (kept, shape) = (keep.is_some(), fresh.shape);
         let to_host = |buffer| (!kept).then_some(buffer);
+        let list_bytes = u64::from(RECEIVE_LISTS) * size_of::<ReceiverList>() as u64;
         let parts_of_rows = [
             (Some(&batch.slots), size_of::<Slot>() as u64),
             (keep.as_ref().map(|k| &k.rows), size_of::<KeptRow>() as u64),
             (Some(&couple.coupling), words(couple.word_count())),
             (counts, words(3 * FACES)),
             (Some(&fresh.facing_away), words(1)),
+            (evaluate.shares(), words(1)),
+            (Some(&fresh.plain_lists.counts), list_bytes),
+            (Some(&fresh.meso_lists.counts), list_bytes),
             (to_host(&fresh.plain), words(shape.plain_count)),
             (to_host(&fresh.meso), words(3 * shape.meso_count)),
             (to_host(&fresh.occupied), words(shape.blocks())),
@@ -263,25 +277,21 @@ impl RowMaker {
 
 /// Whether strong emitters are looked at with more care than all others.
 pub(super) fn looks_closer(device: &Device, settings: &Settings) -> bool {
-    emitter_looks(device, settings, Vec::new).is_some()
+    emitter_looks(device, settings).is_some()
 }
 
 /// Pixels a side of the hemicubes of strong emitters, if they are drawn by hemicubes.
 pub(super) fn emitter_face(device: &Device, settings: &Settings) -> u32 {
-    match emitter_looks(device, settings, Vec::new) {
+    match emitter_looks(device, settings) {
         Some(Looks::Hemicubes(face)) => face,
         _ => settings.hemicube,
     }
 }
 
 /// What strong emitters are looked at with, if not as all others are.
-pub(super) fn emitter_looks(
-    device: &Device,
-    settings: &Settings,
-    occluders: impl FnOnce() -> Vec<ShadowOccluder>,
-) -> Option<Looks> {
+pub(super) fn emitter_looks(device: &Device, settings: &Settings) -> Option<Looks> {
     match settings.emitter_shadows() {
-        EmitterShadows::Rays => Some(Looks::Rays(occluders())),
+        EmitterShadows::Rays => Some(Looks::Rays),
         EmitterShadows::Hemicubes(face) => {
             let face = face.min(device.limits().max_image_side / 6 * 2);
             (face > settings.hemicube).then_some(Looks::Hemicubes(face))
@@ -304,15 +314,18 @@ struct Part {
     at: u64,
 }
 
-const PARTS: usize = 8;
+const PARTS: usize = 11;
 const SLOT: usize = 0;
 const ROW: usize = 1;
 const COUPLING: usize = 2;
 const COUNTS: usize = 3;
 const AWAY: usize = 4;
-const PLAIN: usize = 5;
-const MESO: usize = 6;
-const OCCUPIED: usize = 7;
+const SHARES: usize = 5;
+const LISTS: usize = 6;
+const MESO_LISTS: usize = 7;
+const PLAIN: usize = 8;
+const MESO: usize = 9;
+const OCCUPIED: usize = 10;
 
 impl Layout {
     /// Of these buffers, with the bytes of a slot.
@@ -348,6 +361,9 @@ impl Layout {
         Row {
             source,
             scale: drawn.scale,
+            share: (self.parts[SHARES].from.is_some())
+                .then(|| from.read(at(SHARES), 1)[0])
+                .filter(|&share| share >= 0.0),
             coupling: from.read(at(COUPLING), bytes(COUPLING) / 4),
             factors: match self.parts[ROW].from {
                 Some(_) => Factors::Kept(from.read::<KeptRow>(at(ROW), 1)[0]),
@@ -359,6 +375,13 @@ impl Layout {
             },
             counts: from.read(at(COUNTS), bytes(COUNTS) / size_of::<[u32; 3]>()),
             facing_away: from.read(at(AWAY), 1)[0],
+            resolved: [RECEIVE_DOUBTFUL, RECEIVE_CROSSED].map(|list| {
+                let of = |part| {
+                    let lists: Vec<ReceiverList> = from.read(at(part), RECEIVE_LISTS as usize);
+                    u64::from(lists[list as usize].count)
+                };
+                of(LISTS) + of(MESO_LISTS)
+            }),
         }
     }
 }

@@ -9,6 +9,7 @@ use super::Settings;
 use super::drawing::Drawing;
 use crate::error::{Error, Result};
 use crate::mesh::elements::Elements;
+use crate::mesh::near::NearPairs;
 use crate::mesh::occluders::Occluders;
 use crate::mesh::sources;
 use crate::passes::batch::BatchSize;
@@ -81,7 +82,8 @@ pub fn ids_come_back_right(device: &Arc<Device>) -> Result<bool> {
     let settings = Settings::default();
     let (sources, connections) = sources::build(&mut elements, &[], &settings.grouping, 0);
     let occluders = Occluders::elements(&elements);
-    let scene = SceneBuffers::new(device, &elements, &sources, &connections, &occluders)?;
+    let near = NearPairs::none(&elements, sources.list.len());
+    let scene = SceneBuffers::new(device, &elements, &sources, &connections, &occluders, &near)?;
     let size = BatchSize {
         slots: 1,
         face: SIZE,

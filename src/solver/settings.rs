@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use crate::error::{Error, Result};
+use crate::mesh::near::Nearness;
 use crate::mesh::sources::Grouping;
 use crate::meso;
 use crate::passes::cull::Culling;
@@ -52,6 +53,12 @@ pub struct Settings {
     pub shots: Option<u32>,
     pub seed: u64,
     pub grouping: Grouping,
+    /// Which sources an element takes part by part.
+    pub nearness: Nearness,
+    /// Whether rays find what an element sees of a source that a silhouette may cut.
+    pub silhouettes: bool,
+    /// Whether form factors in enclosed scenes are scaled so that all that is sent arrives.
+    pub normalise: bool,
     pub culling: Culling,
     /// Draws connected elements of one plane as few triangles; see [`crate::mesh::occluders`]. The
     /// `pixel` estimator asks for every element and does without.
@@ -83,6 +90,9 @@ impl Default for Settings {
             shots: None,
             seed: 0,
             grouping: Grouping::default(),
+            nearness: Nearness::default(),
+            silhouettes: true,
+            normalise: true,
             culling: Culling::default(),
             merging: true,
             batch: 16,

@@ -80,7 +80,7 @@ impl Shots {
         let sources: Vec<Shot> = list.map(shot).collect();
         let any_strong = sources.iter().any(|s| s.strong);
         let looks = match any_strong {
-            true => emitter_looks(device, &on.settings, || on.shadow_occluders()),
+            true => emitter_looks(device, &on.settings),
             false => None,
         };
         let emitters = match looks {

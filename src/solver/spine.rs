@@ -13,6 +13,7 @@ use super::coupling::{CouplingRow, Targets};
 use super::gather::{Gathering, LitRow};
 use super::ledger::{Candidates, Drawn, Ledger};
 use super::makers::{Batch, TeamParts};
+use super::near::NearLight;
 use super::progress::{Bound, Watch};
 use super::rows::{Factors, Made, looks_closer};
 use super::system::System;
@@ -35,6 +36,7 @@ pub(super) struct Spine {
     pub ledger: Ledger,
     pub kept: KeptRows,
     gathering: Gathering,
+    pub near: NearLight,
 }
 
 /// What is drawn.
@@ -48,6 +50,15 @@ enum Phase {
 
 /// Of the unshot power that turns into what may be missing: what sweeps may leave.
 const UNSOLVED: f64 = 0.01;
+
+/// What a last sweep over near sources may change of an element's light, over the mean of all.
+const UNSETTLED: f64 = 1e-4;
+
+/// Of the unshot power that turns into what may be missing: what near sources may still move.
+const UNMOVED: f64 = 0.05;
+
+/// Times that light is brought and solved by turns, at most.
+const MOST_TURNS: usize = 8;
 
 /// Between batches sweeps leave this share of what the undrawn sources have: it orders them well
 /// enough.
@@ -92,6 +103,7 @@ impl Spine {
         let coupling = |s, words| restored?.coupling(s, words);
         Ok(Self {
             gathering: Gathering::new(device, on, &kept)?,
+            near: NearLight::new(on),
             devices: devices.to_vec(),
             team: None,
             ledger: ledger(device, on, bound, rows, coupling),
@@ -113,6 +125,7 @@ impl Spine {
             .filter(|(_, moved)| **moved);
         let dropped: Vec<KeptRow> = dropped.filter_map(|(drawn, _)| drawn.row).collect();
         let coupling = |s, _| before.system.take_row(s);
+        self.near.relight(on);
         self.ledger = ledger(&self.devices[0], on, bound, |s| rows[s], coupling);
         // Other devices hold lights where they were, and those that were drawn first may have been
         // all that emitted strongly.
@@ -137,7 +150,10 @@ impl Spine {
             if report.shots < limit && self.ledger.undrawn().is_some() {
                 continue;
             }
-            self.gather_kept(corrections > 0, report)?;
+            self.settle(on, corrections > 0, report)?;
+            if report.shots < limit && self.ledger.undrawn().is_some() {
+                continue;
+            }
             if !self.draw(on, Phase::Again, report, watch)? {
                 break;
             }
@@ -223,7 +239,7 @@ impl Spine {
         let Some(made) = team.take(&self.kept)? else {
             return Ok(false);
         };
-        self.take_in(made, report)?;
+        self.take_in(on, made, report)?;
         if phase == Phase::First {
             let undrawn = self.ledger.system.unshot().undrawn;
             let most = ORDERED * undrawn.max(self.ledger.bound.stop_power());
@@ -262,13 +278,14 @@ impl Spine {
     }
 
     /// Solves the system, keeps the rows of a batch, and gathers by those that find no room.
-    fn take_in(&mut self, made: Made, report: &mut Report) -> Result<()> {
+    fn take_in(&mut self, on: &Problem, made: Made, report: &mut Report) -> Result<()> {
         report.seconds.stages += made.stages;
         let mut loose = Vec::new();
         for row in made.rows {
             let s = row.source as usize;
             report.add(
                 &row,
+                on.sources.list[s].area,
                 self.ledger.sources[s].strong,
                 self.ledger.sources[s].times > 0,
             );
@@ -300,6 +317,41 @@ impl Spine {
             })
             .collect();
         self.gather(&rows, report)
+    }
+
+    /// Brings the elements what all kept rows send, and what near sources send beyond their means.
+    /// The power that the sources reflect more or less for it, internal units.
+    pub fn bring(&mut self, on: &Problem, by_direction: bool, report: &mut Report) -> Result<f64> {
+        self.gather_kept(by_direction, report)?;
+        if self.near.is_empty() {
+            return Ok(0.0);
+        }
+        let start = Instant::now();
+        let brought = self.gathering.irradiance(on)?;
+        let sum: DVec3 = brought.iter().sum();
+        let most = UNSETTLED * sum.max_element() / brought.len() as f64;
+        self.near.solve(on, &brought, &self.ledger.sent(), most);
+        let near = on.sources.list.iter().map(|source| match source.kind {
+            KIND_POINT => DVec3::ZERO,
+            _ => self.near.reflected(on, source),
+        });
+        let moved = self.ledger.system.set_near(near);
+        report.seconds.near += start.elapsed().as_secs_f64();
+        report.near.sweeps = self.near.sweeps;
+        Ok(moved)
+    }
+
+    /// Brings light and solves by turns, until what near sources send fits the rest.
+    fn settle(&mut self, on: &Problem, by_direction: bool, report: &mut Report) -> Result<()> {
+        for _ in 0..MOST_TURNS {
+            let moved = self.bring(on, by_direction, report)?;
+            if moved <= UNMOVED * self.ledger.bound.stop_power() {
+                break;
+            }
+            let most = UNSOLVED * self.ledger.bound.stop_power();
+            self.solve(most, MOST_SWEEPS, report);
+        }
+        Ok(())
     }
 
     fn gather(&self, rows: &[LitRow], report: &mut Report) -> Result<()> {

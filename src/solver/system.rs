@@ -39,6 +39,8 @@ struct Unknown {
     shot: DVec3,
     /// Reflected radiosity that has not arrived by coupling, but was measured.
     measured: DVec3,
+    /// Reflected radiosity beside that of the rows: of light from near sources.
+    near: DVec3,
     /// Radiosity that has been shot, but neither arrived by coupling nor was measured yet.
     unmeasured: DVec3,
     /// Power that arrives at elements in the end for a unit of power that is sent, at most; RGB.
@@ -70,6 +72,7 @@ impl System {
             emission_shot: false,
             shot: DVec3::ZERO,
             measured: DVec3::ZERO,
+            near: DVec3::ZERO,
             unmeasured: DVec3::ZERO,
             importance: DVec3::splat(importance),
         };
@@ -105,7 +108,8 @@ impl System {
 
     /// Radiosity that a source reflects, as far as it is known.
     pub fn reflected(&self, s: usize) -> DVec3 {
-        self.sources[s].measured + self.arrived.reflected(&self.targets, s)
+        let source = &self.sources[s];
+        source.measured + source.near + self.arrived.reflected(&self.targets, s)
     }
 
     /// Unshot power of a source, and of it what is emitted.
@@ -317,6 +321,17 @@ impl System {
             source.unmeasured = DVec3::ZERO;
             source.shot = sent;
         }
+    }
+
+    /// Sets the reflected radiosity of each source beside that of the rows, `[source]`. The power by
+    /// which it changes.
+    pub fn set_near(&mut self, reflected: impl Iterator<Item = DVec3>) -> f64 {
+        let mut moved = 0.0;
+        for (source, near) in self.sources.iter_mut().zip(reflected) {
+            let before = std::mem::replace(&mut source.near, near);
+            moved += source.area * (near - before).abs().element_sum();
+        }
+        moved
     }
 
     /// Sources that were drawn and have no row shoot what they have: measuring will find what

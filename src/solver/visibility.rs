@@ -75,8 +75,9 @@ fn key(scene: &Scene, settings: &Settings) -> String {
     let estimator = settings.estimator;
     let sizes = (settings.hemicube, settings.emitter_shadows());
     let (seed, grouping) = (settings.seed, settings.grouping);
+    let near = (settings.nearness, settings.silhouettes, settings.normalise);
     hash.update(format!(
-        "6 {estimator:?} {sizes:?} {seed} {grouping:?} {flat}"
+        "7 {estimator:?} {sizes:?} {seed} {grouping:?} {near:?} {flat}"
     ));
     hexadecimal(hash)
 }

@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 
 use crate::bake::solution::{Bake, DirectionalLight, Solution};
 use crate::error::Result;
-use crate::render::{Lighting, corner_irradiance, tone};
+use crate::render::{Joined, Lighting, corner_irradiance, tone};
 use crate::scene::{Scene, Triangle};
 use crate::solver::{Ambient, Solver, StopReason, Update};
 
@@ -53,8 +53,8 @@ impl Snapshot {
     ) -> Self {
         Self {
             epoch,
-            corners: corner_irradiance(scene, &irradiance),
-            corners_direct: corner_irradiance(scene, &direct),
+            corners: corner_irradiance(scene, &irradiance, Joined::Smooth),
+            corners_direct: corner_irradiance(scene, &direct, Joined::Smooth),
             exposure: exposure(scene, &irradiance, ambient.irradiance),
             scene: Arc::clone(scene),
             irradiance,

@@ -8,7 +8,7 @@ use std::sync::{Arc, OnceLock};
 
 use glam::{DVec3, Vec3};
 use mesolux::reference;
-use mesolux::render::{Picture, View, corner_irradiance, render};
+use mesolux::render::{Joined, Picture, View, corner_irradiance, render};
 use mesolux::scene::{Camera, Material, Scene, Triangle};
 use mesolux::vk::Device;
 
@@ -265,7 +265,7 @@ fn irradiance_is_smooth_up_to_a_crease() {
             materials: vec![material(RED)],
             ..Scene::default()
         };
-        let corners = corner_irradiance(&scene, &[Vec3::ONE, Vec3::splat(3.0)]);
+        let corners = corner_irradiance(&scene, &[Vec3::ONE, Vec3::splat(3.0)], Joined::Smooth);
         assert_eq!(corners[0][0], Vec3::ONE, "a corner of its own");
         // At vertex 1 both have a right angle.
         let shared = if smooth { 2.0 } else { 1.0 };

@@ -12,9 +12,10 @@ use sha2::{Digest, Sha256};
 use super::{DirectionalLight, Origin, Solution};
 use crate::atomic_file::write_atomically;
 use crate::error::{Error, Result};
+use crate::scene::OnInput;
 
 /// Version of the file's layout.
-pub const VERSION: &str = "1";
+pub const VERSION: &str = "2";
 
 /// One tensor to be written.
 struct Tensor {
@@ -113,6 +114,22 @@ impl Solution {
             Tensor::vectors("irradiance_direct", &[n, 3], &self.irradiance_direct),
             Tensor::vectors("radiosity", &[n, 3], &self.radiosity),
         ];
+        let triangles: Vec<u32> = self.on_input.iter().map(|on| on.triangle).collect();
+        tensors.push(Tensor::words("input_triangle", &triangles));
+        let corners = self
+            .on_input
+            .iter()
+            .flat_map(|on| on.corners.as_flattened());
+        let corners = corners.map(|&weight| weight as f32);
+        tensors.push(Tensor::floats("input_corners", &[n, 3, 2], corners));
+        if let Some(corners) = &self.corners {
+            let at_corners = |name, light: &[[Vec3; 3]]| {
+                Tensor::vectors(name, &[n, 3, 3], light.iter().flatten())
+            };
+            let direct = &corners.irradiance_direct;
+            tensors.push(at_corners("corner_irradiance", &corners.irradiance));
+            tensors.push(at_corners("corner_irradiance_direct", direct));
+        }
         if let Some(relief) = &self.relief {
             tensors.extend(relief.tensors());
         }
@@ -157,6 +174,8 @@ pub struct Bake {
     pub irradiance: Vec<Vec3>,
     pub irradiance_direct: Vec<Vec3>,
     pub relief: Option<DirectionalLight>,
+    /// Where each triangle lies in the scene as it was read.
+    pub on_input: Vec<OnInput>,
 }
 
 impl Bake {
@@ -200,6 +219,7 @@ impl Bake {
             origin,
             irradiance_direct: tensors.vectors("irradiance_direct", &[])?,
             relief: tensors.relief(irradiance.len())?,
+            on_input: tensors.on_input(irradiance.len())?,
             irradiance,
         };
         match bake.irradiance.len() == bake.irradiance_direct.len() {
@@ -244,6 +264,28 @@ impl Tensors<'_> {
             return Err(self.bad(name, "not all numbers are finite"));
         }
         Ok(values.chunks_exact(3).map(Vec3::from_slice).collect())
+    }
+
+    /// Where each of so many triangles lies in the input.
+    fn on_input(&self, triangles: usize) -> Result<Vec<OnInput>> {
+        let words = self.tensor("input_triangle", Dtype::U32, &[])?;
+        let corners = self.tensor("input_corners", Dtype::F32, &[3, 2])?;
+        let corners: Vec<f64> = (corners.into_iter())
+            .map(|word| f64::from(f32::from_le_bytes(word)))
+            .collect();
+        if words.len() != triangles || corners.len() != 6 * triangles {
+            return Err(self.bad("input_corners", "not of as many triangles as irradiance"));
+        }
+        if !corners.iter().all(|weight| (0.0..=1.0).contains(weight)) {
+            return Err(self.bad("input_corners", "a corner lies outside its triangle"));
+        }
+        let on_input = words.into_iter().zip(corners.chunks_exact(6));
+        Ok(on_input
+            .map(|(triangle, c)| OnInput {
+                triangle: u32::from_le_bytes(triangle),
+                corners: [[c[0], c[1]], [c[2], c[3]], [c[4], c[5]]],
+            })
+            .collect())
     }
 
     /// Light by direction of some of the scene's `triangles` triangles.

@@ -5,9 +5,10 @@ mod file;
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
+use crate::mesh::corners::{Joined, corner_irradiance};
 use crate::mesh::elements::Elements;
 use crate::meso::Relief;
-use crate::scene::Scene;
+use crate::scene::{OnInput, Scene};
 use crate::solver::{Light, ReliefLight, Report};
 pub use file::{Bake, VERSION};
 
@@ -24,11 +25,23 @@ pub struct Solution {
     pub irradiance: Vec<Vec3>,
     /// W·m⁻², RGB, straight from emitters and point lights.
     pub irradiance_direct: Vec<Vec3>,
+    /// Where each triangle lies in the scene as it was read.
+    pub on_input: Vec<OnInput>,
+    /// None of a solution under way.
+    pub corners: Option<CornerLight>,
     /// W·m⁻², RGB: πLe + ρE; of an element with a relief, the mean of what it sends.
     pub radiosity: Vec<Vec3>,
     /// Light by direction of the elements with a relief; none where no element has one.
     pub relief: Option<DirectionalLight>,
     pub report: Report,
+}
+
+/// Irradiance at the corners, `[triangle][corner]`, W·m⁻², RGB: linear between them, continuous
+/// over planes.
+pub struct CornerLight {
+    pub irradiance: Vec<[Vec3; 3]>,
+    /// The part straight from emitters and point lights.
+    pub irradiance_direct: Vec<[Vec3; 3]>,
 }
 
 /// Light by direction, `[meso element]` in the order of the input; slots as in
@@ -107,6 +120,8 @@ impl Solution {
             material: elements.to_input_order(&elements.material),
             irradiance: elements.to_input_order(&light.irradiance),
             irradiance_direct: elements.to_input_order(&light.irradiance_direct),
+            corners: None,
+            on_input: scene.on_input(),
             radiosity: elements.to_input_order(&light.radiosity),
             relief: elements
                 .relief
@@ -115,5 +130,15 @@ impl Solution {
                 .map(|(relief, light)| DirectionalLight::new(elements, relief, light)),
             report,
         }
+    }
+
+    /// With the light at the corners.
+    pub fn with_corners(mut self, scene: &Scene) -> Self {
+        let at_corners = |light: &[Vec3]| corner_irradiance(scene, light, Joined::Plane);
+        self.corners = Some(CornerLight {
+            irradiance: at_corners(&self.irradiance),
+            irradiance_direct: at_corners(&self.irradiance_direct),
+        });
+        self
     }
 }

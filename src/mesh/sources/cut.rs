@@ -2,7 +2,6 @@
 
 use super::Grouping;
 use super::group::{Shape, bisect};
-use super::near::Surroundings;
 use crate::mesh::charts::{Connections, charts, morton_order};
 use crate::mesh::elements::Elements;
 
@@ -46,11 +45,7 @@ pub(super) struct Groups {
 
 /// Cuts the charts in two until no part is over the limits.
 pub(super) fn cut(elements: &Elements, connections: &Connections, limits: &Limits<'_>) -> Groups {
-    let Limits {
-        grouping,
-        total_area,
-        ..
-    } = *limits;
+    let grouping = limits.grouping;
     let is_flat = |members: &[u32]| {
         let members = members.iter().map(|&e| e as usize);
         Shape::new(elements, members).flat
@@ -60,8 +55,6 @@ pub(super) fn cut(elements: &Elements, connections: &Connections, limits: &Limit
     let is_curved = |chart: &&Vec<u32>| !elements.is_meso(chart[0] as usize) && !is_flat(chart);
     let curved: usize = charts.iter().filter(is_curved).map(Vec::len).sum();
     let most_curved = grouping.most_curved(curved);
-    let reach = (grouping.max_area * total_area).sqrt();
-    let surroundings = Surroundings::new(elements, &charts, reach);
     let mut groups = Groups {
         order: Vec::with_capacity(elements.len()),
         ranges: Vec::new(),
@@ -81,10 +74,7 @@ pub(super) fn cut(elements: &Elements, connections: &Connections, limits: &Limit
                 most_curved
             };
             let many = members.len() > most && !plane;
-            let uneven = plane
-                && area > grouping.max_area_near * total_area
-                && members.iter().any(|&e| surroundings.any_before(e, c));
-            let large = many || uneven || limits.too_much(area, emitted);
+            let large = many || limits.too_much(area, emitted);
             if large && members.len() > 1 {
                 let at = bisect(elements, &mut members);
                 stack.push(members.split_off(at));

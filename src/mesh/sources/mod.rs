@@ -8,7 +8,6 @@
 mod cut;
 mod eyes;
 mod group;
-mod near;
 mod single;
 
 use glam::{DVec3, Vec3};
@@ -34,9 +33,6 @@ pub struct Grouping {
     pub max_elements: usize,
     /// Most area of a source, as a share of the scene's.
     pub max_area: f64,
-    /// The same for a plane source with another surface in front of it, nearer than the source's
-    /// side: its light is uneven there, and so is what the other surface receives of it.
-    pub max_area_near: f64,
     /// Most emitted power of a source, as a share of the scene's.
     pub max_power: f64,
 }
@@ -59,7 +55,6 @@ impl Default for Grouping {
         Self {
             max_elements: 48,
             max_area: 1.0 / 256.0,
-            max_area_near: 1.0 / 1024.0,
             max_power: 1.0 / 128.0,
         }
     }

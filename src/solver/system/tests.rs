@@ -165,8 +165,8 @@ fn sweeps_give_the_exact_solution() {
     for (white, mixed, most_sweeps, tolerance) in [
         (0.7, false, 26, 7e-9),
         (0.7, true, 26, 7e-9),
-        (0.999, false, 32, 6e-8),
-        (0.999, true, 32, 6e-8),
+        (0.999, false, 32, 2e-7),
+        (0.999, true, 32, 2e-7),
     ] {
         let room = room(white, mixed);
         let mut system = system(&room, u64::MAX);

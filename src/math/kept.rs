@@ -1,4 +1,4 @@
-//! Twin of the codes of kept form factors, `shaders/shared/kept.glsl`.
+//! Codes of kept form factors; `shaders/shared/kept.glsl` is the same.
 
 use glam::{Vec2, Vec3};
 
@@ -17,6 +17,11 @@ pub fn kept_factor(code: u32) -> f32 {
         0 => 0.0,
         code => f32::from_bits((code + ZERO) << SHIFT),
     }
+}
+
+/// A form factor as it is kept.
+pub fn as_kept(f: f32) -> f32 {
+    kept_factor(factor_code(f))
 }
 
 /// A unit vector of the upper hemisphere on the upper half of an octahedron, 16 bits a coordinate.

@@ -1,0 +1,70 @@
+// How elements receive from a source, and their lists. Including files have shared/receivers.glsl.
+
+// Lane k of a subgroup makes room in the list of kind k for all lanes.
+void append(uint slot, uint kind, bool mine, uint listed_word) {
+    uint count = 0;
+    uint before = 0;
+    for (uint k = 0; k < RECEIVE_KINDS; k++) {
+        uvec4 lanes = subgroupBallot(mine && kind == k);
+        count = gl_SubgroupInvocationID == k ? subgroupBallotBitCount(lanes) : count;
+        before = kind == k ? subgroupBallotExclusiveBitCount(lanes) : before;
+    }
+    uint first = 0;
+    if (count > 0) {
+        uint list = slot * RECEIVE_LISTS + gl_SubgroupInvocationID;
+        first = atomicAdd(lists[list].count, count);
+        atomicMax(lists[list].groups_x, (first + count + GROUP - 1) / GROUP);
+    }
+    for (uint k = 0; k < RECEIVE_KINDS; k++) {
+        uint first_of_kind = subgroupBroadcast(first, k);
+        before += kind == k ? first_of_kind : 0;
+    }
+    if (mine) {
+        listed[(slot * RECEIVE_LISTS + kind) * element_count + before] = listed_word;
+    }
+}
+
+// An element with the share of the source that it sees, rounded to a multiple of 1/32 above 0.
+uint with_share(uint i, float share) {
+    return i | uint(max(share * 32.0 - 0.5, 0.0)) << LISTED_BITS;
+}
+
+// The same for one of the lists that are resolved by rays.
+void append_open(uint slot, uint which, bool mine, uint i) {
+    uvec4 lanes = subgroupBallot(mine);
+    if (lanes == uvec4(0)) {
+        return;
+    }
+    uint count = subgroupBallotBitCount(lanes);
+    uint list = slot * RECEIVE_LISTS + which;
+    uint first = 0;
+    if (subgroupElect()) {
+        first = atomicAdd(lists[list].count, count);
+        atomicMax(lists[list].groups_x, (first + count + GROUP - 1) / GROUP);
+    }
+    first = subgroupBroadcastFirst(first);
+    if (mine) {
+        listed[list * element_count + first + subgroupBallotExclusiveBitCount(lanes)] = i;
+    }
+}
+
+// How the form factor from an element to a source is found, should it be seen; RECEIVE_KINDS where
+// it is 0. `near`: parts of the element may be seen, whether its centroid is or not.
+uint kind_of(Source s, vec4 ball, vec3 n, out bool near) {
+    vec3 d = ball.xyz - s.middle;
+    float distance_middle = length(d);
+    float across = dot(d, n);
+    near = distance_middle - s.radius <= NEAR * ball.w;
+    bool behind = across >= s.radius;
+    bool above = across <= -s.radius && distance_middle * distance_middle >= ACUTE * s.radius * s.radius;
+    bool whole = shows_whole_front(s, ball.xyz);
+    bool points = distance_middle - s.radius >= POINT_DISTANCE * s.part_radius;
+    bool curved = s.cone_sin != 0.0;
+    float far_distance = (curved ? POINT_DISTANCE : FLAT_POINT_DISTANCE) * s.radius;
+    bool far = s.kind == KIND_POINT || whole && distance_middle >= far_distance;
+    bool by_parts = curved && points;
+    uint kind = near ? RECEIVE_NEAR : far ? RECEIVE_FAR : by_parts ? RECEIVE_PARTS
+        : whole && above ? RECEIVE_OUTLINE : RECEIVE_NEAR;
+    bool shows = shows_front(s, ball.xyz) && !lies_in_plane(s, ball.xyz, n);
+    return !behind && (near || shows) ? kind : RECEIVE_KINDS;
+}

@@ -1,0 +1,160 @@
+//! The members of a source as a tree of parts.
+
+use glam::DVec3;
+
+use crate::mesh::elements::Elements;
+use crate::mesh::sources::Source;
+
+/// Steps of the R₂ sequence (Roberts 2018).
+const R2: [f64; 2] = [0.754_877_666_246_693, 0.569_840_290_998_053];
+
+/// A binary tree over the members of a source, in depth-first order: part 0 is the whole source. A
+/// part of `count` members from `first` on has the first half of them as its next part, and the
+/// others as part 2·⌊count/2⌋ after it.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct PartTree {
+    /// Elements, so that those of each part are consecutive.
+    pub members: Vec<u32>,
+}
+
+/// A part while the tree is walked.
+#[derive(Debug, Clone, Copy)]
+pub struct Part {
+    pub index: usize,
+    pub first: usize,
+    pub count: usize,
+}
+
+impl Part {
+    /// The two halves of a part of several members.
+    pub fn halves(self) -> [Self; 2] {
+        let half = self.count / 2;
+        let [one, other] = [
+            (1, self.first, half),
+            (2 * half, self.first + half, self.count - half),
+        ];
+        [one, other].map(|(after, first, count)| Self {
+            index: self.index + after,
+            first,
+            count,
+        })
+    }
+}
+
+impl PartTree {
+    pub fn new(elements: &Elements, range: std::ops::Range<u32>) -> Self {
+        let mut members: Vec<u32> = range.collect();
+        halve(elements, &mut members);
+        Self { members }
+    }
+
+    pub fn whole(&self) -> Part {
+        Part {
+            index: 0,
+            first: 0,
+            count: self.members.len(),
+        }
+    }
+
+    /// Places on a source, evenly by area; its eye if it has no members.
+    pub fn places(&self, elements: &Elements, source: &Source, count: usize) -> Vec<DVec3> {
+        if self.members.is_empty() {
+            return vec![source.eye; count];
+        }
+        let triangle = |m: u32| match source.contour.first().map(Vec::as_slice) {
+            // An element that is cut into several sources.
+            Some(&[a, b, c]) if self.members.len() == 1 => [a, b, c],
+            _ => elements.triangle(m as usize),
+        };
+        let area = |m: u32| elements.area[m as usize];
+        let all: f64 = self.members.iter().map(|&m| area(m)).sum();
+        let mut places = Vec::with_capacity(count);
+        let mut before = 0.0;
+        let mut m = 0;
+        for k in 0..count {
+            // Members follow one another along the tree, so that equal steps of area spread out.
+            let at = all * (k as f64 + 0.5) / count as f64;
+            while m + 1 < self.members.len() && before + area(self.members[m]) < at {
+                before += area(self.members[m]);
+                m += 1;
+            }
+            let [a, b, c] = triangle(self.members[m]);
+            // The R₂ sequence, folded into the triangle.
+            let [u, v] = R2.map(|step| (0.5 + step * k as f64).fract());
+            let [u, v] = if u + v > 1.0 {
+                [1.0 - u, 1.0 - v]
+            } else {
+                [u, v]
+            };
+            places.push(a + u * (b - a) + v * (c - a));
+        }
+        places
+    }
+
+    /// Parts of all sizes.
+    pub fn part_count(&self) -> usize {
+        (2 * self.members.len()).saturating_sub(1)
+    }
+
+    /// Sums of a value of the members over each part, `[part]`.
+    pub fn sums<T>(&self, of: impl Fn(u32) -> T) -> Vec<T>
+    where
+        T: Copy + Default + std::ops::Add<Output = T>,
+    {
+        let mut sums = vec![T::default(); self.part_count()];
+        if !self.members.is_empty() {
+            self.sum(self.whole(), &of, &mut sums);
+        }
+        sums
+    }
+
+    /// Gives each member the sum over the parts that hold it of `values` over `areas`, `[part]`.
+    pub fn share_out(&self, values: &[f64], areas: &[f64], mut to: impl FnMut(u32, f64)) {
+        let mut stack = vec![(self.whole(), 0.0)];
+        while let Some((part, above)) = stack.pop() {
+            let share = above + values[part.index] / areas[part.index];
+            match part.count {
+                0 => {}
+                1 => to(self.members[part.first], share),
+                _ => stack.extend(part.halves().map(|half| (half, share))),
+            }
+        }
+    }
+
+    fn sum<T>(&self, part: Part, of: &impl Fn(u32) -> T, sums: &mut [T]) -> T
+    where
+        T: Copy + std::ops::Add<Output = T>,
+    {
+        let sum = match part.count {
+            1 => of(self.members[part.first]),
+            _ => {
+                let [one, other] = part.halves();
+                self.sum(one, of, sums) + self.sum(other, of, sums)
+            }
+        };
+        sums[part.index] = sum;
+        sum
+    }
+}
+
+/// Orders members so that the halves of each part lie on two sides of its longest extent.
+fn halve(elements: &Elements, members: &mut [u32]) {
+    if members.len() < 2 {
+        return;
+    }
+    let centroid = |e: u32| elements.centroid[e as usize];
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for &e in members.iter() {
+        low = low.min(centroid(e));
+        high = high.max(centroid(e));
+    }
+    let extent = high - low;
+    let axis = (0..3).fold(0, |best, i| if extent[i] > extent[best] { i } else { best });
+    let half = members.len() / 2;
+    members.select_nth_unstable_by(half, |&a, &b| {
+        (centroid(a)[axis].total_cmp(&centroid(b)[axis])).then(a.cmp(&b))
+    });
+    let (one, other) = members.split_at_mut(half);
+    halve(elements, one);
+    halve(elements, other);
+}

@@ -1,0 +1,59 @@
+//! Whether occluders stand between two places: a walk through their tree on the CPU.
+
+use glam::{DVec3, Vec3};
+
+use crate::mesh::shadow_tree::ShadowTree;
+use crate::structs::ShadowOccluder;
+
+/// Height above a plane up to which a place counts as lying in it, internal units: corners are
+/// rounded to 2⁻²⁴, and outlines join what lies in one plane to 2·10⁻⁷.
+const IN_PLANE: f64 = 5e-7;
+
+/// Components of a way below this count as this, so that their reciprocals are finite.
+const LEAST_WAY: f32 = 1e-18;
+
+/// Whether an occluder crosses the way between two places. One whose plane holds either end does
+/// not.
+pub(super) fn blocked(tree: &ShadowTree<ShadowOccluder>, from: DVec3, to: DVec3) -> bool {
+    let way = to - from;
+    let start = from.as_vec3();
+    let short = way.as_vec3();
+    let sign = Vec3::select(short.cmplt(Vec3::ZERO), Vec3::NEG_ONE, Vec3::ONE);
+    let each = sign / short.abs().max(Vec3::splat(LEAST_WAY));
+    let nodes = tree.nodes();
+    let count = nodes[0].skip as usize;
+    let mut at = 0;
+    while at < count {
+        let node = &nodes[at];
+        let one = (node.low - start) * each;
+        let other = (node.high - start) * each;
+        let enter = one.min(other).max_element().max(0.0);
+        let leave = one.max(other).min_element().min(1.0);
+        if enter > leave {
+            at = node.skip as usize;
+            continue;
+        }
+        let leaf = &tree.triangles[node.triangles()];
+        if leaf.iter().any(|o| crosses(o, from, to, way)) {
+            return true;
+        }
+        at += 1;
+    }
+    false
+}
+
+/// Two triangles find the same volume over the edge that they share with opposite signs, to the
+/// bit: no way leads between them.
+fn crosses(o: &ShadowOccluder, from: DVec3, to: DVec3, way: DVec3) -> bool {
+    let normal = o.normal.as_dvec3();
+    let height = |p: DVec3| normal.dot(p) - f64::from(o.height);
+    let (start, end) = (height(from), height(to));
+    if start.min(end) > -IN_PLANE || start.max(end) < IN_PLANE {
+        return false;
+    }
+    let [a, b, c] = [o.a, o.b, o.c].map(|v| v.as_dvec3() - from);
+    let volumes = [b.cross(c), c.cross(a), a.cross(b)].map(|over| way.dot(over));
+    let least = volumes[0].min(volumes[1]).min(volumes[2]);
+    let most = volumes[0].max(volumes[1]).max(volumes[2]);
+    (least >= 0.0 || most <= 0.0) && least != most
+}
