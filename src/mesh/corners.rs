@@ -129,7 +129,7 @@ pub fn corner_irradiance(scene: &Scene, irradiance: &[Vec3], joined: Joined) -> 
     let left: Vec<Vec3> = (irradiance.iter().zip(&means))
         .map(|(whole, [a, b, c])| whole - (a + b + c) / 3.0)
         .collect();
-    let corrected = each(&|e, vertex| {
+    each(&|e, vertex| {
         let about = || {
             corners
                 .within(e, vertex, cosine)
@@ -139,6 +139,5 @@ pub fn corner_irradiance(scene: &Scene, irradiance: &[Vec3], joined: Joined) -> 
         let high = about().fold(Vec3::NEG_INFINITY, Vec3::max);
         let found = mean(irradiance, e, vertex) + mean(&left, e, vertex);
         found.clamp(low, high)
-    });
-    corrected
+    })
 }

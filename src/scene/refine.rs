@@ -16,8 +16,8 @@ use super::{Scene, Triangle};
 /// How finely a scene is cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Refinement {
-    /// Longest edge of a triangle, scene units; where other surfaces are close, less. None: of about
-    /// [`Refinement::EVEN`] triangles.
+    /// Longest edge of a triangle, scene units; where other surfaces are close, less. None: as if all
+    /// were cut to 6,000 triangles of one size.
     pub element_size: Option<f64>,
     /// Most triangles.
     pub max_elements: usize,

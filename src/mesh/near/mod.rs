@@ -51,7 +51,7 @@ pub struct Entry {
 #[derive(Debug, Clone, Default)]
 pub struct NearPairs {
     pub trees: Vec<PartTree>,
-    /// Whole form factors from elements to near sources, [`Self::of_source`].
+    /// Whole form factors from elements to near sources, one source after another.
     pub rows: Vec<NearFactor>,
     /// Where each source's factors begin; one more than the sources.
     pub row_starts: Vec<u32>,
