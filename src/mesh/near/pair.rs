@@ -291,9 +291,9 @@ impl Sight<'_> {
             element: e as u32,
             factor: kept,
         });
-        // A source of one member sends what that sends.
+        // A source of one member sends what that sends, and relief sends by direction.
         let mut count = found.entries.len() - first;
-        if seen.members.len() == 1 {
+        if seen.members.len() == 1 || elements.is_meso(seen.tree.members[0] as usize) {
             found.entries.truncate(first);
             count = 0;
         }
