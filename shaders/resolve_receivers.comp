@@ -1,6 +1,6 @@
-// Decides by rays about the elements of which the item buffer leaves open whether a source sees them,
-// and about those for which a silhouette may cut the source: they see the share of it from which
-// they are seen. Lists those that see any as sort_receivers.comp does. One slot a dispatch.
+// Decides by rays about the elements of which the item buffer leaves open whether a source sees
+// them, and about those for which a silhouette may cut the source: they see the share of it from
+// which they are seen. Lists those that see any as sort_receivers.comp does. One slot a dispatch.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #define SHADOW_OCCLUDERS 7
@@ -8,8 +8,8 @@
 #include "shared/receivers.glsl"
 #include "shared/receive_kinds.glsl"
 
-// RECEIVE_DOUBTFUL: from the eye of the source; RECEIVE_CROSSED: from EYES of the SOURCE_EYES places
-// on it, evenly chosen.
+// RECEIVE_DOUBTFUL: from the eye of the source; RECEIVE_CROSSED: from EYES of the SOURCE_EYES
+// places on it, evenly chosen.
 layout(constant_id = 0) const uint LIST = RECEIVE_DOUBTFUL;
 layout(constant_id = 1) const uint EYES = SOURCE_EYES;
 

@@ -37,16 +37,13 @@ fn scene(relief: bool) -> Build {
     build
 }
 
+/// Without near light, for which rows without memory are drawn more than twice.
 fn settings() -> Settings {
     Settings {
         hemicube: 32,
         batch: 6,
         residual: RESIDUAL,
-        // What near sources send part by part is settled only where rows are kept.
-        nearness: Nearness {
-            source: 2.0,
-            part: 2.0,
-        },
+        nearness: Nearness::NONE,
         relief: Options {
             transport: Transport::Physical,
             directions: Directions::new(32).expect("a number of the paper"),
@@ -114,6 +111,38 @@ fn light_does_not_depend_on_memory() {
     }
     assert_silent();
 }
+
+/// What near sources send part by part is settled by turns with the rest, and without memory for
+/// rows each turn draws again.
+#[test]
+fn near_light_does_not_depend_on_memory() {
+    for relief in [false, true] {
+        let scene = scene(relief).0.scene;
+        let solve = |visibility_memory| {
+            let settings = Settings {
+                visibility_memory,
+                nearness: Nearness::default(),
+                ..settings()
+            };
+            let solver = bake::solve(&device(), &scene, &settings, None, |_| true);
+            let solver = solver.expect("the scene is solved");
+            let report = solver.report().clone();
+            (solver.light().expect("it comes back"), report)
+        };
+        let ((kept, once), (drawn, twice)) = (solve(None), solve(Some(0)));
+        assert!(once.near.pairs > 0 && twice.kept_sources == 0);
+        let difference = largest_difference(&kept.irradiance, &drawn.irradiance);
+        println!(
+            "relief {relief}, without memory: {difference:.1e} of the mean, bound {:?}",
+            twice.error_bound
+        );
+        assert!(difference <= UNSETTLED);
+    }
+    assert_silent();
+}
+
+/// Measured: 8.9e-7. Before near light was solved again with what had been drawn again: 3e-3.
+const UNSETTLED: f32 = 2e-6;
 
 /// Without memory for the coupling, what sources send is found by gathering and measuring.
 #[test]

@@ -9,12 +9,6 @@ use mesolux::mesh::elements::Elements;
 use mesolux::mesh::near::Nearness;
 use mesolux::solver::{Settings, Solver};
 
-/// No source fills so much of a view.
-const NONE_NEAR: Nearness = Nearness {
-    source: 2.0,
-    part: 2.0,
-};
-
 /// A lit room of 2.4 m, its floor in cells of 7 cm, and a plate of 30 cm that hovers `gap` above
 /// it. The triangles of the plate's underside.
 fn plate(gap: f64) -> (Build, std::ops::Range<usize>) {
@@ -52,7 +46,7 @@ fn nothing_leaks_under_a_plate() {
         (solved.mean(&solved.irradiance, under.clone()) / all, solved)
     };
     let (by_parts, solved) = share(Nearness::default());
-    let (by_means, _) = share(NONE_NEAR);
+    let (by_means, _) = share(Nearness::NONE);
     let near = solved.report.near;
     println!("underside: {by_parts:.4} of the room's mean, {by_means:.4} by means; {near:?}");
     assert!(near.pairs > 0 && near.parts > near.pairs && near.rays > 0);
@@ -101,13 +95,11 @@ fn near_factors_are_what_is_seen() {
     let (elements, near) = (&solver.problem.elements, &solver.problem.near);
     let (mut compared, mut squares, mut apart) = (0, 0.0, 0.0_f64);
     for (s, source) in solver.problem.sources.list.iter().enumerate() {
-        let rows = near.row_starts[s] as usize..near.row_starts[s + 1] as usize;
         // Those that one place stands for.
-        for row in &near.rows[rows] {
+        for row in near.rows.of(s) {
             let e = row.element as usize;
             let (p, n) = (elements.centroid[e], elements.normal[e]);
-            let members = source.first_element as usize
-                ..(source.first_element + source.element_count) as usize;
+            let members = source.members();
             let gap = |m: usize| elements.centroid[m].distance(p) - elements.radius(m);
             if members.clone().any(|m| gap(m) <= 4.0 * elements.radius(e)) {
                 continue;
@@ -148,7 +140,7 @@ fn sixteen(triangle: [DVec3; 3]) -> impl Iterator<Item = [DVec3; 3]> {
     four(triangle).into_iter().flat_map(four)
 }
 
-/// Weights are areas shared out anew in each source: none is lost.
+/// Weights share the area of a source among its members: none is lost.
 #[test]
 fn weights_sum_to_the_area_of_their_source() {
     let (build, _) = plate(0.01);
@@ -162,8 +154,7 @@ fn weights_sum_to_the_area_of_their_source() {
     let (elements, near) = (&solver.problem.elements, &solver.problem.near);
     let mut changed = 0;
     for source in &solver.problem.sources.list {
-        let members =
-            source.first_element as usize..(source.first_element + source.element_count) as usize;
+        let members = source.members();
         let area: f64 = elements.area[members.clone()].iter().sum();
         let weights: f64 = near.weights[members.clone()].iter().sum();
         assert!((weights / area - 1.0).abs() < 1e-12);

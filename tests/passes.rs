@@ -14,16 +14,10 @@ use mesolux::mesh::sources::Source;
 use mesolux::passes::cull::Culling;
 use mesolux::passes::occluder_tree::shadow_occluders;
 use mesolux::reference;
-use mesolux::reference::form_factors::Sight;
+use mesolux::reference::form_factors::Verdict;
 use mesolux::solver::{Estimator, Report, Settings, Solver};
 
 const FACE: u32 = 32;
-
-/// No source fills so much of a view.
-const NONE_NEAR: Nearness = Nearness {
-    source: 2.0,
-    part: 2.0,
-};
 
 /// An open room with a sphere, a sheet seen from behind, an emitter and a point light.
 fn scene() -> Build {
@@ -77,7 +71,7 @@ fn settings() -> Settings {
         emitter_hemicube: Some(FACE),
         batch: 6,
         // The twins know one visibility a source: that of its eye.
-        nearness: NONE_NEAR,
+        nearness: Nearness::NONE,
         silhouettes: false,
         ..Settings::default()
     }
@@ -397,8 +391,8 @@ fn estimators_equal_their_twins() {
                             n: FACE,
                         };
                         let sees = |p| match drawn.sight(p, e) {
-                            Sight::Doubtful => by_ray(e, source, p),
-                            sight => sight == Sight::Seen,
+                            Verdict::Doubtful => by_ray(e, source, p),
+                            verdict => verdict == Verdict::Seen,
                         };
                         reference::form_factors::gather(elements, source, e, sees)
                     }

@@ -8,10 +8,17 @@ use mesolux::constants::{KIND_POINT, NONE};
 use mesolux::math::directions::Directions;
 use mesolux::mesh::sources::Grouping;
 use mesolux::meso::{Options, Transport};
+use mesolux::passes::buffers::{SceneBuffers, State, download};
+use mesolux::passes::gather::Part;
+use mesolux::passes::near_to_relief::NearToRelief;
+use mesolux::passes::relief_buffers::ReliefBuffers;
+use mesolux::passes::types::Reflected;
 use mesolux::reference;
+use mesolux::reference::near_to_relief::receive;
 use mesolux::reference::pixels_relief::{Light, Received};
 use mesolux::reference::send_relief::send_relief;
 use mesolux::solver::{Estimator, Settings, Solver};
+use mesolux::vk::Commands;
 
 const BATCH: u32 = 6;
 const FACE: u32 = 32;
@@ -230,6 +237,90 @@ fn wide_sources_fill_slots_as_their_twin() {
         println!("K = {k}: {wide} elements see the light wide, {worst:.1e} lies elsewhere");
         assert!(wide > 20 && worst < 1e-4);
     }
+    assert_silent();
+}
+
+/// Measured: 2.0e-7 and 2.3e-7. A device may round a point at the border of two slots to the other.
+const APART: f64 = 1e-6;
+const ELSEWHERE: f64 = 1e-3;
+
+/// Light of near parts, of some size and of either sign.
+#[test]
+fn near_parts_bring_light_as_their_twin() {
+    let k = 32;
+    let mut build = Build::new();
+    let floor = build.material(0.8, 0.0);
+    build.relief(floor, 8, |x, y| {
+        0.03 * (std::f64::consts::TAU * (x + y)).sin()
+    });
+    let sides = build.room(DVec3::ZERO, DVec3::ONE, 8, 0);
+    for t in &mut build.scene.triangles[sides[0].clone()] {
+        t.material = floor;
+    }
+    build.uv(sides[0].clone(), DVec3::X, DVec3::Z);
+    let settings = Settings {
+        relief: Options {
+            directions: Directions::new(k).expect("a number of the paper"),
+            ..Options::default()
+        },
+        ..Settings::default()
+    };
+    let device = device();
+    let elements = mesolux::bake::elements(&device, &build.scene, &settings).expect("it fits");
+    let solver = Solver::new(&device, elements, &[], &settings).expect("it fits");
+    let on = &solver.problem;
+    let relief = on.elements.relief.as_ref().expect("it has relief");
+    let (connections, occluders) = (&on.connections, &on.occluders);
+    let scene = SceneBuffers::new(
+        &device,
+        &on.elements,
+        &on.sources,
+        connections,
+        occluders,
+        &on.near,
+    )
+    .expect("it fits");
+    let state = State::new(&device, &scene).expect("it fits");
+    let buffers = ReliefBuffers::new(&device, &on.elements, relief, &on.sources, None, false)
+        .expect("it fits");
+    let pass = NearToRelief::new(&device, &on.near, &state, &buffers).expect("it is made");
+    let pass = pass.expect("relief sees near sources");
+    let light = |i: u32| Vec3::new((i % 7) as f32 - 2.0, (i % 5) as f32, 0.5 * (i % 3) as f32);
+    let beyond: Vec<Vec3> = (0..on.near.parts).map(light).collect();
+    pass.write(&device, Part::Reflected, &beyond)
+        .expect("it is written");
+    Commands::run(&device, "near to relief", |cmd| {
+        pass.record(cmd, Part::Reflected);
+        Ok(())
+    })
+    .expect("it runs");
+    let count = buffers.element_count as usize;
+    let moments: Vec<[Vec3; 3]> =
+        download(&device, &buffers.moments_indirect, count * k as usize).expect("it comes");
+    let reflected: Vec<Reflected> = download(&device, &buffers.reflected, count).expect("it comes");
+    let irradiance: Vec<Vec3> =
+        download(&device, &state.indirect, on.elements.len()).expect("it comes");
+    let (mut lit, mut worst, mut elsewhere) = (0, 0.0_f64, 0.0_f64);
+    for m in 0..count {
+        let e = on.elements.plain_count() + m;
+        let parts = on.near.relief_entries.of(m);
+        let twin = receive(relief, e, parts, &beyond);
+        lit += usize::from(!parts.is_empty());
+        let found = [irradiance[e], reflected[m].sum].map(|v| v.as_dvec3());
+        worst = worst.max(apart(
+            found.into_iter(),
+            [twin.irradiance, twin.reflected].iter(),
+        ));
+        // Rounding decides for points on the border of two slots.
+        let of = moments[m * k as usize..][..k as usize].iter();
+        let off = of
+            .zip(&twin.moments)
+            .flat_map(|(found, twin)| (0..3).map(|c| found[c].as_dvec3().distance(twin[c])));
+        let whole: f64 = twin.moments.iter().flatten().map(|v| v.length()).sum();
+        elsewhere = elsewhere.max(off.sum::<f64>() / whole.max(1e-9));
+    }
+    println!("{lit} elements: {worst:.1e} apart, {elsewhere:.1e} of the moments in other slots");
+    assert!(lit > 100 && worst < APART && elsewhere < ELSEWHERE);
     assert_silent();
 }
 

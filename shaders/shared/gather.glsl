@@ -77,6 +77,9 @@ layout(push_constant, scalar) uniform Parameters {
 #ifdef FROM_RELIEF
 #include "shared/sent.glsl"
 #endif
+#ifdef TO_RELIEF
+#include "shared/receive_relief.glsl"
+#endif
 
 // One element of this invocation, and what it has received.
 struct Receiver {
@@ -106,19 +109,7 @@ uint word_at(uint at) {
 void receive(inout Receiver receiver, FLUX f, vec3 light) {
 #ifdef TO_RELIEF
     receiver.irradiance += f.z * light;
-    uint directions = cells.x * cells.y;
-    // A near source fills many slots: it is spread over the disc that sends the same light.
-    Disc disc = disc_of(f);
-    for (uint j = 0; j < disc.points; j++) {
-        vec3 point = disc_point(disc, j);
-        uint k = direction_of(point * inversesqrt(dot(point, point)), cells);
-        uint at = 3 * (receiver.i * directions + k);
-        uint response = 3 * (receiver.response * directions + k);
-        for (uint c = 0; c < 3; c++) {
-            moments[at + c] += light[c] * point;
-            receiver.reflected[c] += dot(albedos[response + c], point) * light[c];
-        }
-    }
+    receiver.reflected += receive_by_direction(receiver.i, receiver.response, f, light);
 #else
     receiver.irradiance += f * light;
 #endif

@@ -96,6 +96,18 @@ struct NearFactor {
     float factor;
 };
 
+// The same for an element with a relief, numbered among those: a vector in its frame.
+struct NearVector {
+    uint element;
+    vec3 factor;
+};
+
+// What an element receives of a part of a near source: a vector in its frame.
+struct NearPart {
+    vec3 factor;
+    uint part;
+};
+
 // How far the memory for kept form factors is filled.
 struct KeptState {
     uint chunk;        // the one under way

@@ -52,7 +52,7 @@ impl CachedBake {
         let emitter_shadows = settings.emitter_shadows();
         let scene_hash = scene.hash();
         let key = format!(
-            "bake cache 5, layout {VERSION}\n{maker}\n{scene_hash}\n{estimator:?} {hemicube} {emitter_shadows:?} {residual:?} {shots:?} {seed} \
+            "bake cache 6, layout {VERSION}\n{maker}\n{scene_hash}\n{estimator:?} {hemicube} {emitter_shadows:?} {residual:?} {shots:?} {seed} \
              {grouping:?} {nearness:?} {silhouettes} {normalise} {culling:?} {merging} {batch} {visibility_memory:?} {coupling_memory} {:?} {:?}",
             relief.transport, relief.directions
         );

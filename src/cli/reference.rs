@@ -18,7 +18,9 @@ pub struct ReferenceOptions {
     /// Prints the picture's mean with its 95 % confidence interval. Ctrl-C, or --budget, keeps the
     /// paths so far.
     #[arg(long, conflicts_with_all = [
-        "estimator", "quality", "hemicube", "residual", "source_elements", "source_area", "source_power", "shots", "visibility_memory", "directions", "transport", "cache", "no_cache", "device", "validate",
+        "estimator", "quality", "hemicube", "residual", "source_elements", "source_area",
+        "source_power", "shots", "visibility_memory", "no_normalise", "directions", "transport",
+        "cache", "no_cache", "device", "validate",
     ])]
     pub reference: bool,
     /// Paths of each pixel [default: 256]

@@ -23,6 +23,13 @@ pub fn to_polygon(p: DVec3, n: DVec3, contour: &[DVec3]) -> f64 {
 
 /// [`to_polygon`] of a triangle.
 pub fn to_triangle(p: DVec3, n: DVec3, triangle: &[DVec3; 3]) -> f64 {
+    vector_to_triangle(p, n, triangle).dot(n)
+}
+
+/// Of what a triangle shows above the horizon of `n` the vector whose dot product with a normal is
+/// the form factor from a facet with that normal, as long as all of it lies above the facet's
+/// horizon.
+pub fn vector_to_triangle(p: DVec3, n: DVec3, triangle: &[DVec3; 3]) -> DVec3 {
     let corners = triangle.map(|v| v - p);
     let heights = corners.map(|v| v.dot(n));
     // One corner more than the triangle where the horizon cuts one off.
@@ -42,17 +49,41 @@ pub fn to_triangle(p: DVec3, n: DVec3, triangle: &[DVec3; 3]) -> f64 {
             push(a + (corners[next] - a) * (ha / (ha - hb)));
         }
     }
-    let mut sum = 0.0;
+    let mut sum = DVec3::ZERO;
     for i in 0..count {
         let (a, b) = (clipped[i], clipped[if i + 1 < count { i + 1 } else { 0 }]);
         let normal = a.cross(b);
         let length = normal.length();
         if length > 0.0 {
-            sum += length.atan2(a.dot(b)) * n.dot(normal) / length;
+            sum += normal * (length.atan2(a.dot(b)) / length);
         }
     }
     -sum / TAU
 }
+
+/// Sample points of a triangle (two barycentric coordinates, weight), by how close what it sees is:
+/// the centroid; degree 2; Radon's degree 5. `shaders/shared/form_factors.glsl` has the same.
+pub fn sample_points(near: bool, touching: bool) -> &'static [[f64; 3]] {
+    match (near, touching) {
+        (_, true) => &POINTS[4..],
+        (true, _) => &POINTS[1..4],
+        _ => &POINTS[..1],
+    }
+}
+
+const POINTS: [[f64; 3]; 11] = [
+    [1.0 / 3.0, 1.0 / 3.0, 1.0],
+    [1.0 / 6.0, 1.0 / 6.0, 1.0 / 3.0],
+    [2.0 / 3.0, 1.0 / 6.0, 1.0 / 3.0],
+    [1.0 / 6.0, 2.0 / 3.0, 1.0 / 3.0],
+    [1.0 / 3.0, 1.0 / 3.0, 0.225],
+    [0.470142064, 0.470142064, 0.132394153],
+    [0.059715872, 0.470142064, 0.132394153],
+    [0.470142064, 0.059715872, 0.132394153],
+    [0.101286507, 0.101286507, 0.125939181],
+    [0.797426985, 0.101286507, 0.125939181],
+    [0.101286507, 0.797426985, 0.125939181],
+];
 
 /// The contour relative to `p`, cut at the plane through `p` (Sutherland–Hodgman).
 fn clip_to_horizon(p: DVec3, n: DVec3, contour: &[DVec3]) -> Vec<DVec3> {

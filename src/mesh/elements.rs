@@ -201,6 +201,17 @@ impl Elements {
             .fold(0.0, f64::max)
     }
 
+    /// The axis along which the centroids of some elements lie furthest apart.
+    pub fn longest_axis(&self, elements: &[u32]) -> usize {
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for &e in elements {
+            low = low.min(self.centroid[e as usize]);
+            high = high.max(self.centroid[e as usize]);
+        }
+        let extent = high - low;
+        (0..3).fold(0, |best, i| if extent[i] > extent[best] { i } else { best })
+    }
+
     /// Largest reflectance of any element and colour; of an element with a relief, the largest
     /// share of light from any direction that is reflected.
     pub fn max_reflectance(&self) -> f32 {
@@ -237,6 +248,11 @@ impl Elements {
         self.relief
             .as_ref()
             .is_some_and(|relief| relief.is_meso(element))
+    }
+
+    /// Elements without relief: in a solver's order they come first.
+    pub fn plain_count(&self) -> usize {
+        self.len() - self.relief.as_ref().map_or(0, Relief::count)
     }
 
     /// Sets the elements' relief. Their emission becomes the mean of the light that leaves the

@@ -13,7 +13,7 @@ use crate::error::Result;
 use crate::mesh::charts::Connections;
 use crate::mesh::elements::Elements;
 use crate::mesh::meshlets;
-use crate::mesh::near::{NearPairs, PartTree};
+use crate::mesh::near::{NearPairs, PartTree, Rows};
 use crate::mesh::occluders::Occluders;
 use crate::mesh::sources::{self, Sources};
 use crate::vk::{Buffer, BufferUse, Commands, Device, Stage};
@@ -53,11 +53,29 @@ pub struct SceneBuffers {
     pub contours: Buffer,
     pub meshlets: Buffer,
     pub components: Buffer,
-    /// Form factors from near elements, one source after another, and where each begins.
-    pub near_factors: Buffer,
-    pub near_starts: Buffer,
+    /// Form factors from near elements without and with a relief.
+    pub near_rows: NearBuffers,
+    pub near_relief_rows: NearBuffers,
+}
+
+/// Form factors from near elements, one source after another.
+pub struct NearBuffers {
+    pub factors: Buffer,
+    /// Where those of each source begin; one more than the sources.
+    pub starts: Buffer,
     /// Of one source, at most.
-    pub most_near: u32,
+    pub most: u32,
+}
+
+impl NearBuffers {
+    fn new<T: Pod>(device: &Arc<Device>, rows: &Rows<T>) -> Result<Self> {
+        let storage = BufferUse::Storage;
+        Ok(Self {
+            factors: upload(device, "near factors", &rows.factors, storage)?,
+            starts: upload(device, "near starts", &rows.starts, storage)?,
+            most: rows.longest(),
+        })
+    }
 }
 
 impl SceneBuffers {
@@ -112,9 +130,8 @@ impl SceneBuffers {
             contours: upload(device, "contours", &contours, texels)?,
             meshlets: upload(device, "meshlets", &meshlets, storage)?,
             components: upload(device, "components", &components, storage)?,
-            near_factors: upload(device, "near factors", &near.rows, storage)?,
-            near_starts: upload(device, "near starts", &near.row_starts, storage)?,
-            most_near: near.longest_row(),
+            near_rows: NearBuffers::new(device, &near.rows)?,
+            near_relief_rows: NearBuffers::new(device, &near.relief_rows)?,
         })
     }
 }

@@ -4,7 +4,7 @@
 use glam::DVec3;
 
 use crate::constants::{KIND_POINT, NONE};
-use crate::math::form_factor::to_polygon;
+use crate::math::form_factor::{sample_points, to_polygon};
 use crate::math::hemicube::{Pixel, direction_of, pixel_of, texel_of};
 use crate::mesh::elements::Elements;
 use crate::mesh::sources::Source;
@@ -29,13 +29,7 @@ pub fn gather(
     if gap > 4.0 * size && lies_in_plane(centroid, elements.normal[element], source) {
         return 0.0;
     }
-    let points: &[[f64; 3]] = if gap > 4.0 * size {
-        &POINTS[..1]
-    } else if gap > size {
-        &POINTS[1..4]
-    } else {
-        &POINTS[4..]
-    };
+    let points = sample_points(gap <= 4.0 * size, gap <= size);
     points
         .iter()
         .map(|&[u, v, weight]| {
@@ -108,7 +102,7 @@ fn form_factor(elements: &Elements, source: &Source, p: DVec3, element: usize) -
 
 /// What an item buffer says of a place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Sight {
+pub enum Verdict {
     Hidden,
     Seen,
     /// The pixels about it do not agree.
@@ -142,16 +136,16 @@ impl Drawn<'_> {
     }
 
     /// What the four pixels about a place `p` on an element show.
-    pub fn sight(&self, p: DVec3, element: usize) -> Sight {
+    pub fn sight(&self, p: DVec3, element: usize) -> Verdict {
         let pixels = pixels_about(self.local(p), self.n);
         let open = |&pixel: &Pixel| {
             let item = self.item(pixel);
             item == NONE || item as usize == element || self.leaves_open(item, pixel, p, element)
         };
         match pixels.iter().filter(|pixel| open(pixel)).count() {
-            0 => Sight::Hidden,
-            4 => Sight::Seen,
-            _ => Sight::Doubtful,
+            0 => Verdict::Hidden,
+            4 => Verdict::Seen,
+            _ => Verdict::Doubtful,
         }
     }
 
@@ -203,19 +197,3 @@ fn pixels_about(local: DVec3, n: u32) -> [Pixel; 4] {
         row: row + y,
     })
 }
-
-/// Sample points of a triangle (two barycentric coordinates, weight): the centroid; degree 2;
-/// Radon's degree 5.
-const POINTS: [[f64; 3]; 11] = [
-    [1.0 / 3.0, 1.0 / 3.0, 1.0],
-    [1.0 / 6.0, 1.0 / 6.0, 1.0 / 3.0],
-    [2.0 / 3.0, 1.0 / 6.0, 1.0 / 3.0],
-    [1.0 / 6.0, 2.0 / 3.0, 1.0 / 3.0],
-    [1.0 / 3.0, 1.0 / 3.0, 0.225],
-    [0.470142064, 0.470142064, 0.132394153],
-    [0.059715872, 0.470142064, 0.132394153],
-    [0.470142064, 0.059715872, 0.132394153],
-    [0.101286507, 0.101286507, 0.125939181],
-    [0.797426985, 0.101286507, 0.125939181],
-    [0.101286507, 0.797426985, 0.125939181],
-];

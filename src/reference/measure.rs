@@ -6,7 +6,8 @@ use crate::constants::KIND_POINT;
 use crate::mesh::elements::Elements;
 use crate::mesh::sources::Source;
 
-/// Mean, by the weights of [`crate::mesh::near::NearPairs`], over a source's members of reflectance times irradiance, RGB, `[source]`.
+/// Mean, by the weights of [`crate::mesh::near::NearPairs`], over a source's members of reflectance
+/// times irradiance, RGB, `[source]`.
 pub fn measure(
     elements: &Elements,
     weights: &[f64],
@@ -17,8 +18,7 @@ pub fn measure(
         if source.kind == KIND_POINT {
             return DVec3::ZERO;
         }
-        let first = source.first_element as usize;
-        let range = first..first + source.element_count as usize;
+        let range = source.members();
         let area: f64 = range.clone().map(|e| weights[e]).sum();
         let reflected = |e: usize| elements.reflectance[e] * irradiance[e];
         let sum: DVec3 = range.map(|e| reflected(e).as_dvec3() * weights[e]).sum();

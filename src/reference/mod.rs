@@ -7,12 +7,12 @@ pub mod disc;
 pub mod form_factors;
 pub mod item_buffer;
 pub mod measure;
+pub mod near_to_relief;
 pub mod normalise;
 pub mod occluder_rays;
 pub mod pixels_relief;
 pub mod relief_rays;
 pub mod relief_visibility;
-
 pub mod send_relief;
 pub mod shade;
 pub mod shadow_rays;

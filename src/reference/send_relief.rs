@@ -28,8 +28,7 @@ pub fn send_relief(
 ) -> Sent {
     let directions = &relief.directions;
     let k = directions.count();
-    let first = source.first_element as usize;
-    let members = first..first + source.element_count as usize;
+    let members = source.members();
     // Respond: Σ_k R_jk m_k of each member.
     let responded: Vec<Vec<DVec3>> = members
         .clone()

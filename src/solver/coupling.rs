@@ -36,12 +36,8 @@ pub(super) struct Targets {
 impl Targets {
     pub fn new(elements: &Elements, sources: &[Source]) -> Self {
         let even = elements.even_reflectance();
-        let members = |source: &Source| {
-            let first = source.first_element as usize;
-            first..first + source.element_count as usize
-        };
         let one_reflectance = |source: &Source| {
-            let mut range = members(source);
+            let mut range = source.members();
             let first = even[range.start];
             range.all(|e| even[e] == first).then_some(first)
         };
@@ -50,7 +46,7 @@ impl Targets {
         let mut words = 0;
         let mut coloured = Vec::new();
         for (s, source) in sources.iter().enumerate() {
-            if source.kind == KIND_POINT || members(source).all(|e| even[e] == Vec3::ZERO) {
+            if source.kind == KIND_POINT || source.members().all(|e| even[e] == Vec3::ZERO) {
                 continue;
             }
             let Some(reflectance) = one_reflectance(source) else {
@@ -67,7 +63,8 @@ impl Targets {
         }
         let even_words = words;
         for s in coloured {
-            let largest = members(&sources[s])
+            let largest = sources[s]
+                .members()
                 .map(|e| even[e])
                 .fold(Vec3::ZERO, Vec3::max);
             receives[s] = Receives::ByColour {
@@ -102,9 +99,7 @@ impl Targets {
 }
 
 fn target(elements: &Elements, source: &Source, word: usize, word_count: u32) -> CouplingTarget {
-    let first = source.first_element as usize;
-    let members = first..first + source.element_count as usize;
-    let area: f64 = members.map(|e| elements.area[e]).sum();
+    let area: f64 = source.members().map(|e| elements.area[e]).sum();
     CouplingTarget {
         first_element: source.first_element,
         element_count: source.element_count,

@@ -19,7 +19,7 @@ use crate::vk::{Buffer, Commands, Device, Stage};
 pub(super) enum Evaluate {
     Receivers {
         form_factors: FormFactors,
-        near: Option<NearRows>,
+        near: NearRows,
         /// In enclosed scenes.
         normalise: Option<Normalise>,
     },
@@ -68,10 +68,8 @@ impl Evaluate {
                 normalise,
             } => {
                 form_factors.record(cmd);
-                if let Some(near) = near {
-                    cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-                    near.record(cmd);
-                }
+                cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+                near.record(cmd);
                 if let Some(normalise) = normalise {
                     cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
                     normalise.record(cmd);

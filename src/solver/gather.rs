@@ -6,12 +6,14 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use super::Problem;
+use super::near::ByLight;
 use crate::error::Result;
 use crate::passes::buffers::download;
 use crate::passes::gather::{ChunkSlots, Gather, GatherList, MOST_SLOTS, Part};
 use crate::passes::kept_rows::KeptRows;
 use crate::passes::measure::Measure;
 use crate::passes::measure_relief::MeasureRelief;
+use crate::passes::near_to_relief::NearToRelief;
 use crate::passes::relief_buffers::ReliefBuffers;
 use crate::passes::send_relief::SendRelief;
 use crate::passes::types::{KeptRow, Slot};
@@ -37,6 +39,8 @@ pub(super) struct Gathering {
     reflected: Buffer,
     sources: usize,
     relief: Option<ByDirection>,
+    /// Where relief receives near sources part by part.
+    near: Option<NearToRelief>,
 }
 
 /// What sources with a relief send, and what they reflect.
@@ -73,6 +77,10 @@ impl Gathering {
             gather: Gather::new(device, scene, state, kept, &list, relief)?,
             measure: Measure::new(device, scene, state)?,
             reflected: state.reflected.clone(),
+            near: relief
+                .map(|relief| NearToRelief::new(device, &on.near, state, relief))
+                .transpose()?
+                .flatten(),
             sources: scene.source_count as usize,
             relief: relief.map(by_direction).transpose()?,
             list,
@@ -131,6 +139,26 @@ impl Gathering {
         if directed.is_some() || rows.iter().any(|row| row.reflected != Vec3::ZERO) {
             self.gather.record(cmd, of, Part::Reflected);
         }
+    }
+
+    /// Adds what relief receives of the parts of near sources.
+    pub fn near(&self, light: &ByLight<Vec<Vec3>>) -> Result<()> {
+        let Some(near) = &self.near else {
+            return Ok(());
+        };
+        let ByLight { emitted, reflected } = light;
+        for (part, light) in [(Part::Emitted, emitted), (Part::Reflected, reflected)] {
+            if light.iter().all(|&of| of == Vec3::ZERO) {
+                continue;
+            }
+            near.write(&self.device, part, light)?;
+            Commands::run(&self.device, "near to relief", |cmd| {
+                cmd.barrier(&[Stage::Compute, Stage::Transfer], &[Stage::Compute]);
+                near.record(cmd, part);
+                Ok(())
+            })?;
+        }
+        Ok(())
     }
 
     /// Irradiance of each element, direct and indirect.

@@ -24,8 +24,7 @@ impl Solver {
         let mut of_element = vec![NONE; self.problem.elements.len()];
         for (s, source) in self.problem.sources.list.iter().enumerate().rev() {
             if source.kind != KIND_POINT {
-                let first = source.first_element as usize;
-                of_element[first..first + source.element_count as usize].fill(s as u32);
+                of_element[source.members()].fill(s as u32);
             }
         }
         self.problem.elements.to_input_order(&of_element)

@@ -1,11 +1,11 @@
 //! Light from near sources, part by part: what their members send differs from the mean that their
 //! rows bring. See [`crate::mesh::near`].
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::Problem;
-use crate::mesh::near::{NearPairs, Pair};
+use crate::constants::NONE;
 use crate::mesh::sources::Source;
 
 /// What a source has sent through its row, and the scale of its form factors.
@@ -20,22 +20,32 @@ pub(super) struct Sent {
 
 /// Irradiance from near sources beyond what their means bring.
 pub(super) struct NearLight {
-    /// `[element]`, W·m⁻², RGB: of what the members reflect, and of what they emit.
+    /// Of elements without relief, `[element]`, W·m⁻², RGB: of what the members reflect, and of what
+    /// they emit.
     pub indirect: Vec<DVec3>,
     pub direct: Vec<DVec3>,
-    /// Pairs of each element that has any, a range of [`NearPairs::pairs`].
-    of_element: Vec<std::ops::Range<usize>>,
-    /// Sources that are near an element, with the first of their parts among all.
+    /// What elements with a relief, `[meso element]`, received of it since it was last measured:
+    /// the device holds their light.
+    relief: Vec<DVec3>,
+    /// Radiosity of each part beyond its source's mean, of light that is emitted and reflected.
+    beyond: ByLight<Vec<DVec3>>,
+    /// Of this what relief has received.
+    given: ByLight<Vec<DVec3>>,
     sources: Vec<NearSource>,
-    /// The first part of each source, `[source]`.
-    first_part: Vec<usize>,
-    parts: usize,
     /// Of even light, `[element]`.
     reflectance: Vec<DVec3>,
     /// Sweeps so far.
     pub sweeps: u64,
 }
 
+/// Something of light that is emitted, and of light that is reflected.
+#[derive(Debug, Clone, Default)]
+pub(super) struct ByLight<T> {
+    pub emitted: T,
+    pub reflected: T,
+}
+
+/// A source that elements receive part by part.
 struct NearSource {
     source: usize,
     /// `[part]`
@@ -48,47 +58,34 @@ struct NearSource {
 const MOST_SWEEPS: usize = 500;
 
 /// Elements that a thread takes at once.
-const CHUNK: usize = 256;
+const CHUNK: usize = 1024;
 
 impl NearLight {
     pub fn new(on: &Problem) -> Self {
-        let NearPairs { trees, pairs, .. } = &on.near;
-        let even = on.elements.even_reflectance();
-        let mut start = 0;
-        let of_element = (pairs.chunk_by(|a, b| a.element == b.element))
-            .map(|pairs| {
-                start += pairs.len();
-                start - pairs.len()..start
-            })
-            .collect();
-        let mut is_near = vec![false; trees.len()];
-        pairs
-            .iter()
-            .for_each(|pair| is_near[pair.source as usize] = true);
-        let mut first_part = vec![0; trees.len()];
-        let mut sources = Vec::new();
-        let mut parts = 0;
-        for (source, tree) in trees.iter().enumerate().filter(|&(s, _)| is_near[s]) {
-            first_part[source] = parts;
-            parts += tree.part_count();
-            let areas = tree.sums(|e| on.elements.area[e as usize]);
-            let emitted = emitted_beyond(on, source, &areas);
-            sources.push(NearSource {
+        let near_source = |(source, _): (usize, &u32)| {
+            let areas = on.near.trees[source].sums(|e| on.elements.area[e as usize]);
+            NearSource {
                 source,
+                emitted: emitted_beyond(on, source, &areas),
                 areas,
-                emitted,
-            });
-        }
-        Self {
-            indirect: vec![DVec3::ZERO; on.elements.len()],
-            direct: vec![DVec3::ZERO; on.elements.len()],
-            of_element,
-            sources,
-            first_part,
-            parts,
-            reflectance: even.iter().map(|r| r.as_dvec3()).collect(),
+            }
+        };
+        let firsts = on.near.first_part.iter().enumerate();
+        let plain = on.elements.plain_count();
+        let mut light = Self {
+            indirect: vec![DVec3::ZERO; plain],
+            direct: vec![DVec3::ZERO; plain],
+            relief: vec![DVec3::ZERO; on.elements.len() - plain],
+            beyond: ByLight::default(),
+            given: ByLight::default(),
+            sources: firsts.filter(|of| *of.1 != NONE).map(near_source).collect(),
+            reflectance: (on.elements.even_reflectance().iter())
+                .map(|r| r.as_dvec3())
+                .collect(),
             sweeps: 0,
-        }
+        };
+        light.forget(on);
+        light
     }
 
     pub fn is_empty(&self) -> bool {
@@ -97,16 +94,21 @@ impl NearLight {
 
     /// Takes the emission of `on`, and forgets all light.
     pub fn relight(&mut self, on: &Problem) {
-        self.indirect.fill(DVec3::ZERO);
-        self.direct.fill(DVec3::ZERO);
         for near in &mut self.sources {
             near.emitted = emitted_beyond(on, near.source, &near.areas);
         }
+        self.forget(on);
     }
 
-    /// Irradiance of an element.
-    fn irradiance(&self, e: usize) -> DVec3 {
-        self.direct[e] + self.indirect[e]
+    fn forget(&mut self, on: &Problem) {
+        let none = || vec![DVec3::ZERO; on.near.parts as usize];
+        for light in [&mut self.beyond, &mut self.given] {
+            (light.emitted, light.reflected) = (none(), none());
+        }
+        for light in [&mut self.indirect, &mut self.direct, &mut self.relief] {
+            light.fill(DVec3::ZERO);
+        }
+        self.sweeps = 0;
     }
 
     /// Solves E' = N (ρ (E + E') − B), where E is the irradiance that rows have `brought`,
@@ -115,85 +117,134 @@ impl NearLight {
     /// are a small part of a scene, and light between two close surfaces settles slowly.
     pub fn solve(&mut self, on: &Problem, brought: &[DVec3], sent: &[Option<Sent>], most: f64) {
         if self.sources.iter().any(|near| near.emitted.is_some()) {
-            let emitted = |near: &NearSource| match &near.emitted {
-                Some(emitted) if sent[near.source].is_some_and(|sent| sent.emission) => {
-                    let scale = sent[near.source].map_or(1.0, |sent| sent.scale);
-                    emitted.iter().map(|&m| scale * m).collect()
-                }
-                _ => vec![DVec3::ZERO; near.areas.len()],
-            };
-            let received = self.received(on, emitted);
-            for (e, now) in received {
-                self.direct[e] = now;
-            }
+            self.beyond.emitted = self.of_parts(on, |near| {
+                let sent = sent[near.source].filter(|sent| sent.emission)?;
+                let emitted = near.emitted.as_ref()?.iter();
+                Some(emitted.map(|&m| sent.scale * m).collect())
+            });
+            self.direct = received(on, &self.beyond.emitted);
         }
+        let area = &on.elements.area;
         for _ in 0..MOST_SWEEPS {
             self.sweeps += 1;
-            if self.sweep(on, brought, sent) <= most {
+            self.beyond.reflected = self.of_parts(on, |near| {
+                let sent = sent[near.source]?;
+                let power = on.near.trees[near.source].sums(|e| {
+                    let e = e as usize;
+                    let irradiance = brought[e] + self.direct[e] + self.indirect[e];
+                    area[e] * self.reflectance[e] * irradiance
+                });
+                let parts = power.iter().zip(&near.areas);
+                let beyond = |(&power, &area)| (power / area - sent.reflected) * sent.scale;
+                Some(parts.map(beyond).collect())
+            });
+            let now = received(on, &self.beyond.reflected);
+            let change = |(now, before): (&DVec3, &DVec3)| (*now - *before).abs().max_element();
+            let changed = now.iter().zip(&self.indirect).map(change);
+            let changed = changed.fold(0.0, f64::max);
+            self.indirect = now;
+            if changed <= most {
                 break;
             }
         }
     }
 
-    /// One sweep of Jacobi's. The largest change of an element's irradiance.
-    fn sweep(&mut self, on: &Problem, brought: &[DVec3], sent: &[Option<Sent>]) -> f64 {
-        let (near, area, reflectance) = (&on.near, &on.elements.area, &self.reflectance);
-        let beyond = |of: &NearSource| -> Vec<DVec3> {
-            let Some(sent) = sent[of.source] else {
-                return vec![DVec3::ZERO; of.areas.len()];
-            };
-            let power = near.trees[of.source].sums(|e| {
-                let e = e as usize;
-                area[e] * reflectance[e] * (brought[e] + self.irradiance(e))
-            });
-            (power.iter().zip(&of.areas))
-                .map(|(&power, &area)| (power / area - sent.reflected) * sent.scale)
-                .collect()
-        };
-        let mut changed = 0.0_f64;
-        for (e, now) in self.received(on, beyond) {
-            let before = std::mem::replace(&mut self.indirect[e], now);
-            changed = changed.max((now - before).abs().max_element());
-        }
-        changed
-    }
-
-    /// What the elements receive where each part sends so much beyond its source's mean.
-    fn received(
+    /// A value of each part of each near source, `[part]`; zero of the sources that have none.
+    fn of_parts(
         &self,
         on: &Problem,
-        beyond: impl Fn(&NearSource) -> Vec<DVec3> + Send + Sync,
-    ) -> Vec<(usize, DVec3)> {
-        let near = &on.near;
-        let by_source: Vec<Vec<DVec3>> = self.sources.par_iter().map(beyond).collect();
-        let mut beyond: Vec<DVec3> = Vec::with_capacity(self.parts);
-        by_source.iter().for_each(|parts| beyond.extend(parts));
-        let of_pair = |pair: &Pair| -> DVec3 {
-            let first = self.first_part[pair.source as usize];
-            let entries = pair.first_entry as usize..(pair.first_entry + pair.entry_count) as usize;
-            (near.entries[entries].iter())
-                .map(|entry| f64::from(entry.factor) * beyond[first + entry.part as usize])
-                .sum()
-        };
-        (self.of_element.par_iter().with_min_len(CHUNK))
-            .map(|pairs| {
-                let element = near.pairs[pairs.start].element as usize;
-                (element, near.pairs[pairs.clone()].iter().map(of_pair).sum())
-            })
-            .collect()
+        of: impl Fn(&NearSource) -> Option<Vec<DVec3>> + Send + Sync,
+    ) -> Vec<DVec3> {
+        let by_source: Vec<Vec<DVec3>> = (self.sources.par_iter())
+            .map(|near| of(near).unwrap_or_else(|| vec![DVec3::ZERO; near.areas.len()]))
+            .collect();
+        let mut parts = Vec::with_capacity(on.near.parts as usize);
+        for of in by_source {
+            parts.extend(of);
+            // The source itself sends no more than its row brings.
+            parts.push(DVec3::ZERO);
+        }
+        parts
     }
 
-    /// Radiosity that a source reflects of this light.
+    /// What relief is to receive of each part since the last time, `[part]`: what parts send, in
+    /// place of what the row of their source has brought from the direction of its middle.
+    pub fn to_relief(&mut self, on: &Problem, sent: &[Option<Sent>]) -> ByLight<Vec<Vec3>> {
+        let mut whole = self.beyond.clone();
+        for near in &self.sources {
+            let Some(sent) = sent[near.source] else {
+                continue;
+            };
+            let first = on.near.first_part[near.source] as usize;
+            let end = first + near.areas.len();
+            let redirect = |light: &mut [DVec3], mean: DVec3| {
+                light[first..end].iter_mut().for_each(|part| *part += mean);
+                light[end] = -mean;
+            };
+            redirect(&mut whole.reflected, sent.scale * sent.reflected);
+            if sent.emission {
+                let emitted = on.sources.list[near.source].emitted.as_dvec3();
+                redirect(&mut whole.emitted, sent.scale * emitted);
+            }
+        }
+        let news = |whole: &[DVec3], given: &mut [DVec3]| -> Vec<Vec3> {
+            (whole.iter().zip(given))
+                .map(|(&whole, given)| {
+                    let new = (whole - *given).as_vec3();
+                    *given += new.as_dvec3();
+                    new
+                })
+                .collect()
+        };
+        let given = &mut self.given;
+        let news = ByLight {
+            emitted: news(&whole.emitted, &mut given.emitted),
+            reflected: news(&whole.reflected, &mut given.reflected),
+        };
+        for (m, light) in self.relief.iter_mut().enumerate() {
+            for of in on.near.relief_entries.of(m) {
+                let part = of.part as usize;
+                let new = news.emitted[part] + news.reflected[part];
+                *light += f64::from(of.factor.z) * new.as_dvec3();
+            }
+        }
+        news
+    }
+
+    /// What relief reflects of all that it has received was measured.
+    pub fn measured(&mut self) {
+        self.relief.fill(DVec3::ZERO);
+    }
+
+    /// Radiosity that a source reflects of this light beside what was measured.
     pub fn reflected(&self, on: &Problem, source: &Source) -> DVec3 {
-        let first = source.first_element as usize;
+        let plain = self.direct.len();
+        let irradiance = |e: usize| match e.checked_sub(plain) {
+            None => self.direct[e] + self.indirect[e],
+            Some(meso) => self.relief[meso],
+        };
         let (mut power, mut area) = (DVec3::ZERO, 0.0);
-        for e in first..first + source.element_count as usize {
+        for e in source.members() {
             let weight = on.near.weights[e];
-            power += weight * self.reflectance[e] * self.irradiance(e);
+            power += weight * self.reflectance[e] * irradiance(e);
             area += weight;
         }
         power / area
     }
+}
+
+/// What the elements without relief receive where each part sends so much beyond its source's mean.
+fn received(on: &Problem, beyond: &[DVec3]) -> Vec<DVec3> {
+    let entries = &on.near.entries;
+    (0..on.elements.plain_count())
+        .into_par_iter()
+        .with_min_len(CHUNK)
+        .map(|e| {
+            (entries.of(e).iter())
+                .map(|entry| f64::from(entry.factor) * beyond[entry.part as usize])
+                .sum()
+        })
+        .collect()
 }
 
 /// See [`NearSource::emitted`].

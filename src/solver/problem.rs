@@ -78,7 +78,11 @@ impl Problem {
         let (occluder_tree, near) = match settings.estimator {
             Estimator::Receiver => {
                 let tree = ShadowTree::new(shadow_occluders(&elements, &connections, &occluders));
-                let near = NearPairs::new(&elements, &sources.list, &tree, &settings.nearness);
+                let list = &sources.list;
+                let near = match kept {
+                    Some(kept) => kept.near(&elements, list)?,
+                    None => NearPairs::new(&elements, list, &tree, &settings.nearness),
+                };
                 (tree, near)
             }
             Estimator::Pixel => {

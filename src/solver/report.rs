@@ -219,8 +219,8 @@ impl Report {
                 ..Skipped::default()
             },
             near: Near {
-                pairs: problem.near.rows.len() as u64,
-                parts: problem.near.entries.len() as u64,
+                pairs: problem.near.pair_count() as u64,
+                parts: problem.near.entry_count() as u64,
                 rays: problem.near.rays,
                 sweeps: 0,
             },

@@ -37,6 +37,8 @@ pub(super) struct Spine {
     pub kept: KeptRows,
     gathering: Gathering,
     pub near: NearLight,
+    /// Whether rows have brought light since `near` was solved.
+    brought: bool,
 }
 
 /// What is drawn.
@@ -51,8 +53,9 @@ enum Phase {
 /// Of the unshot power that turns into what may be missing: what sweeps may leave.
 const UNSOLVED: f64 = 0.01;
 
-/// What a last sweep over near sources may change of an element's light, over the mean of all.
-const UNSETTLED: f64 = 1e-4;
+/// What a last sweep over near sources may change of an element's light, over the mean of all, as a
+/// share of the residual.
+const UNSETTLED: f64 = 0.01;
 
 /// Of the unshot power that turns into what may be missing: what near sources may still move.
 const UNMOVED: f64 = 0.05;
@@ -104,6 +107,7 @@ impl Spine {
         Ok(Self {
             gathering: Gathering::new(device, on, &kept)?,
             near: NearLight::new(on),
+            brought: true,
             devices: devices.to_vec(),
             team: None,
             ledger: ledger(device, on, bound, rows, coupling),
@@ -126,6 +130,7 @@ impl Spine {
         let dropped: Vec<KeptRow> = dropped.filter_map(|(drawn, _)| drawn.row).collect();
         let coupling = |s, _| before.system.take_row(s);
         self.near.relight(on);
+        self.brought = true;
         self.ledger = ledger(&self.devices[0], on, bound, |s| rows[s], coupling);
         // Other devices hold lights where they were, and those that were drawn first may have been
         // all that emitted strongly.
@@ -140,7 +145,7 @@ impl Spine {
     /// Goes on until the solution is done, which the elements have then, or the watch says stop.
     pub fn run(&mut self, on: &Problem, report: &mut Report, watch: &mut Watch<'_>) -> Result<()> {
         let limit = on.settings.shots.unwrap_or(u32::MAX);
-        let mut corrections = 0;
+        let (mut corrections, mut turns) = (0, 0);
         while self.draw(on, Phase::First, report, watch)? {
             self.solve(
                 UNSOLVED * self.ledger.bound.stop_power(),
@@ -157,12 +162,17 @@ impl Spine {
             if !self.draw(on, Phase::Again, report, watch)? {
                 break;
             }
+            // What rows without room have brought moves near light once more.
+            if !self.is_settled(on, false, report)? && turns < MOST_TURNS {
+                turns += 1;
+                continue;
+            }
             // By coupling alone the light is solved where every source has its row, and sends
             // evenly.
             if on.relief.is_none() && self.ledger.system.is_whole() {
                 break;
             }
-            self.measure()?;
+            self.measure(on)?;
             let left = self.ledger.missing();
             if corrections > u32::from(on.relief.is_some())
                 && left <= self.ledger.bound.most_missing()
@@ -323,39 +333,60 @@ impl Spine {
     /// The power that the sources reflect more or less for it, internal units.
     pub fn bring(&mut self, on: &Problem, by_direction: bool, report: &mut Report) -> Result<f64> {
         self.gather_kept(by_direction, report)?;
-        if self.near.is_empty() {
+        if self.near.is_empty() || !std::mem::replace(&mut self.brought, false) {
             return Ok(0.0);
         }
         let start = Instant::now();
         let brought = self.gathering.irradiance(on)?;
         let sum: DVec3 = brought.iter().sum();
-        let most = UNSETTLED * sum.max_element() / brought.len() as f64;
-        self.near.solve(on, &brought, &self.ledger.sent(), most);
-        let near = on.sources.list.iter().map(|source| match source.kind {
-            KIND_POINT => DVec3::ZERO,
-            _ => self.near.reflected(on, source),
-        });
-        let moved = self.ledger.system.set_near(near);
+        let mean = sum.max_element() / brought.len() as f64;
+        let most = UNSETTLED * on.settings.residual * mean;
+        let sent = self.ledger.sent();
+        self.near.solve(on, &brought, &sent, most);
+        self.gathering.near(&self.near.to_relief(on, &sent))?;
+        let moved = self.take_near(on);
         report.seconds.near += start.elapsed().as_secs_f64();
         report.near.sweeps = self.near.sweeps;
         Ok(moved)
     }
 
+    /// Takes what the sources reflect of light from near ones. The power by which it changed.
+    fn take_near(&mut self, on: &Problem) -> f64 {
+        let near = on.sources.list.iter().map(|source| match source.kind {
+            KIND_POINT => DVec3::ZERO,
+            _ => self.near.reflected(on, source),
+        });
+        self.ledger.system.set_near(near)
+    }
+
     /// Brings light and solves by turns, until what near sources send fits the rest.
     fn settle(&mut self, on: &Problem, by_direction: bool, report: &mut Report) -> Result<()> {
-        for _ in 0..MOST_TURNS {
-            let moved = self.bring(on, by_direction, report)?;
-            if moved <= UNMOVED * self.ledger.bound.stop_power() {
-                break;
-            }
-            let most = UNSOLVED * self.ledger.bound.stop_power();
-            self.solve(most, MOST_SWEEPS, report);
+        let mut turns = 0;
+        while turns < MOST_TURNS && !self.is_settled(on, by_direction, report)? {
+            turns += 1;
         }
         Ok(())
     }
 
-    fn gather(&self, rows: &[LitRow], report: &mut Report) -> Result<()> {
+    /// Brings light, and solves if what near sources send has moved the rest.
+    fn is_settled(
+        &mut self,
+        on: &Problem,
+        by_direction: bool,
+        report: &mut Report,
+    ) -> Result<bool> {
+        let moved = self.bring(on, by_direction, report)?;
+        let settled = moved <= UNMOVED * self.ledger.bound.stop_power();
+        if !settled {
+            let most = UNSOLVED * self.ledger.bound.stop_power();
+            self.solve(most, MOST_SWEEPS, report);
+        }
+        Ok(settled)
+    }
+
+    fn gather(&mut self, rows: &[LitRow], report: &mut Report) -> Result<()> {
         let start = Instant::now();
+        self.brought |= !rows.is_empty();
         self.gathering.run(rows)?;
         report.gathered_rows += rows.len() as u64;
         report.seconds.gather += start.elapsed().as_secs_f64();
@@ -369,7 +400,7 @@ impl Spine {
     }
 
     /// Goes on from the light that the elements have.
-    fn measure(&mut self) -> Result<()> {
+    fn measure(&mut self, on: &Problem) -> Result<()> {
         let reflected = self.gathering.measure()?;
         let sent: Vec<DVec3> = self
             .ledger
@@ -378,6 +409,8 @@ impl Spine {
             .map(|drawn| drawn.gathered)
             .collect();
         self.ledger.system.measured(&reflected, &sent);
+        self.near.measured();
+        self.take_near(on);
         Ok(())
     }
 

@@ -13,6 +13,8 @@ use super::{Problem, Settings};
 use crate::atomic_file::write_atomically;
 use crate::constants::{KIND_POINT, NONE};
 use crate::error::{Error, Result};
+use crate::mesh::elements::Elements;
+use crate::mesh::near::NearPairs;
 use crate::mesh::sources::Source;
 use crate::meso::Transport;
 use crate::passes::kept_rows::RestoredSize;
@@ -53,6 +55,8 @@ struct Header {
     runs: usize,
     values: usize,
     words: Vec<usize>,
+    /// Lengths of [`NearPairs::lists`].
+    near: Vec<usize>,
     /// Of this header without it, and of the lists.
     sha256: String,
 }
@@ -77,7 +81,7 @@ fn key(scene: &Scene, settings: &Settings) -> String {
     let (seed, grouping) = (settings.seed, settings.grouping);
     let near = (settings.nearness, settings.silhouettes, settings.normalise);
     hash.update(format!(
-        "7 {estimator:?} {sizes:?} {seed} {grouping:?} {near:?} {flat}"
+        "8 {estimator:?} {sizes:?} {seed} {grouping:?} {near:?} {flat}"
     ));
     hexadecimal(hash)
 }
@@ -92,17 +96,21 @@ struct Lists {
     runs: Vec<[u32; 2]>,
     values: Vec<f32>,
     chunks: Vec<Vec<u32>>,
+    /// See [`NearPairs::lists`].
+    near: Vec<Vec<u32>>,
 }
 
 impl Lists {
     /// Of the lengths that a header says, to be read.
     fn of(header: &Header) -> Self {
+        let zeros = |lengths: &[usize]| lengths.iter().map(|&count| vec![0; count]).collect();
         Self {
             rows: vec![KeptRow::default(); header.rows],
             counts: vec![[0; 2]; header.rows],
             runs: vec![[0; 2]; header.runs],
             values: vec![0.0; header.values],
-            chunks: header.words.iter().map(|&count| vec![0; count]).collect(),
+            chunks: zeros(&header.words),
+            near: zeros(&header.near),
         }
     }
 
@@ -113,8 +121,10 @@ impl Lists {
             bytemuck::cast_slice(&self.runs),
             bytemuck::cast_slice(&self.values),
         ];
-        let chunks = self.chunks.iter().map(|chunk| bytemuck::cast_slice(chunk));
-        lists.into_iter().chain(chunks)
+        let words = self.chunks.iter().chain(&self.near);
+        lists
+            .into_iter()
+            .chain(words.map(|words| bytemuck::cast_slice(words)))
     }
 
     fn bytes_mut(&mut self) -> impl Iterator<Item = &mut [u8]> {
@@ -124,10 +134,10 @@ impl Lists {
             bytemuck::cast_slice_mut(&mut self.runs),
             bytemuck::cast_slice_mut(&mut self.values),
         ];
-        let chunks = self.chunks.iter_mut();
+        let words = self.chunks.iter_mut().chain(&mut self.near);
         lists
             .into_iter()
-            .chain(chunks.map(|chunk| bytemuck::cast_slice_mut(chunk)))
+            .chain(words.map(|words| bytemuck::cast_slice_mut(words)))
     }
 
     fn digest(&self, header: &Header) -> String {
@@ -141,7 +151,7 @@ impl Lists {
             ..
         } = header;
         let lengths = (header.surfaces, header.rows, header.runs, header.values);
-        let numbers = (chunk_words, state, lengths, &header.words);
+        let numbers = (chunk_words, state, lengths, &header.words, &header.near);
         hash.update(format!("{key} {emitted:?} {lights:?} {numbers:?}"));
         self.bytes().for_each(|bytes| hash.update(bytes));
         hexadecimal(hash)
@@ -172,7 +182,8 @@ impl Header {
     /// Bytes of the lists; no more than `u64::MAX` of a damaged one.
     fn list_bytes(&self) -> u64 {
         let row_bytes = size_of::<KeptRow>() + size_of::<[u32; 2]>();
-        let words = self.words.iter().map(|&words| (words, 4));
+        let words = self.words.iter().chain(&self.near);
+        let words = words.map(|&words| (words, 4));
         let lists = [(self.rows, row_bytes), (self.runs, 8), (self.values, 4)];
         (words.chain(lists))
             .map(|(count, bytes)| (count as u64).saturating_mul(bytes as u64))
@@ -189,9 +200,12 @@ impl Visibility {
         };
         let mut chunks = kept.chunks;
         while chunks.pop_if(|chunk| chunk.is_empty()).is_some() {}
+        let surface = |source: &&Source| source.kind != KIND_POINT;
+        let surfaces = problem.sources.list.iter().filter(surface).count();
         let mut lists = Lists {
             rows: kept.rows.iter().map(|row| row.unwrap_or(none)).collect(),
             chunks,
+            near: problem.near.lists(surfaces).into(),
             ..Lists::default()
         };
         for row in &kept.coupling {
@@ -201,20 +215,20 @@ impl Visibility {
             lists.values.extend(values);
         }
         let GroupedBy { emitted, lights } = &problem.grouped_by;
-        let surface = |source: &&Source| source.kind != KIND_POINT;
         let mut header = Header {
             key: key(scene, &problem.settings),
             emitted: emitted.iter().map(Vec3::to_array).collect(),
             lights: (lights.iter())
                 .map(|l| (l.position.to_array(), l.intensity))
                 .collect(),
-            surfaces: problem.sources.list.iter().filter(surface).count(),
+            surfaces,
             chunk_words: kept.chunk_words,
             state: [kept.state.chunk, kept.state.used, kept.state.rows],
             rows: lists.rows.len(),
             runs: lists.runs.len(),
             values: lists.values.len(),
             words: lists.chunks.iter().map(Vec::len).collect(),
+            near: lists.near.iter().map(Vec::len).collect(),
             sha256: String::new(),
         };
         header.sha256 = lists.digest(&header);
@@ -223,6 +237,15 @@ impl Visibility {
             starts: lists.starts(),
             lists,
         }
+    }
+
+    /// The near sources of these elements, which were found then.
+    pub(super) fn near(&self, elements: &Elements, sources: &[Source]) -> Result<NearPairs> {
+        let near = NearPairs::from_lists(elements, sources, &self.lists.near);
+        near.ok_or_else(|| {
+            let what = "kept form factors are of other elements: bake again with --keep-visibility";
+            Error::Usage(what.into())
+        })
     }
 
     /// What the chunks of the device hold.

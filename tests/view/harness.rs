@@ -10,6 +10,9 @@ use image::RgbImage;
 /// Pixels of the tests' windows.
 pub const SIZE: &str = "320x240";
 
+/// How the room is lit: with the elements of its squares, so that outlines are seen.
+const DRAFT: [&str; 5] = ["--quality", "draft", "--directions", "16", "--no-refine"];
+
 /// A display in memory, gone with the test.
 pub struct Display {
     server: Child,
@@ -140,7 +143,8 @@ pub fn start(display: &Display, size: &str, folder: &Path, input: &str, script: 
     std::fs::write(folder.join("script"), script).expect("written");
     let args = ["view", input, "--script", "script", "--size", size];
     mesolux(folder, &args)
-        .args(["--validate", "--quality", "draft", "--directions", "16"])
+        .args(["--validate"])
+        .args(DRAFT)
         .args(device())
         .env("DISPLAY", &display.name)
         .stderr(Stdio::piped())
@@ -244,13 +248,8 @@ impl Room {
         let room = Self::new();
         let (toml, bake) = (format!("{scene}.toml"), format!("{scene}.safetensors"));
         let output = mesolux(room.path(), &["bake", &toml, "-o", &bake])
-            .args([
-                "--keep-visibility",
-                "--quality",
-                "draft",
-                "--directions",
-                "16",
-            ])
+            .arg("--keep-visibility")
+            .args(DRAFT)
             .args(device())
             .output()
             .expect("the program runs");

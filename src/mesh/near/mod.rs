@@ -6,19 +6,25 @@
 //! where the second sum is over the parts m of the sources that fill much of the view of element j.
 //! The form factors here have their own visibility, by rays to each part.
 
+mod lists;
 mod pair;
 mod parts;
 mod rays;
+mod receivers;
+mod seen;
 
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::constants::KIND_POINT;
+use crate::constants::{KIND_POINT, NONE};
 use crate::mesh::elements::Elements;
 use crate::mesh::shadow_tree::ShadowTree;
 use crate::mesh::sources::Source;
-use crate::structs::{NearFactor, ShadowOccluder};
-use pair::{Receiver, Sight};
+use crate::structs::{NearFactor, NearPart, NearVector, ShadowOccluder};
+use pair::Search;
 pub use parts::PartTree;
+use receivers::Receiver;
 
 /// What counts as near.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,6 +33,14 @@ pub struct Nearness {
     pub source: f64,
     /// A part of a source fills no more than this share of a view, unless it is one member.
     pub part: f64,
+}
+
+impl Nearness {
+    /// No source is near any element.
+    pub const NONE: Self = Self {
+        source: 2.0,
+        part: 2.0,
+    };
 }
 
 impl Default for Nearness {
@@ -38,26 +52,47 @@ impl Default for Nearness {
     }
 }
 
-/// What an element receives of a part of a source.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// What an element without relief receives of a part of a source.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
 pub struct Entry {
-    /// See [`PartTree`].
+    /// Among the parts of all near sources.
     pub part: u32,
     /// Form factor from the element to the part, with visibility.
     pub factor: f32,
+}
+
+/// Form factors from elements to whole near sources, one source after another.
+#[derive(Debug, Clone, Default)]
+pub struct Rows<T> {
+    pub factors: Vec<T>,
+    /// Where each source's factors begin; one more than the sources.
+    pub starts: Vec<u32>,
+}
+
+/// What elements receive of the parts of near sources, one element after another.
+#[derive(Debug, Clone, Default)]
+pub struct Entries<T> {
+    pub list: Vec<T>,
+    /// Where each element's begin; one more than the elements.
+    pub starts: Vec<u32>,
 }
 
 /// The near sources of all elements.
 #[derive(Debug, Clone, Default)]
 pub struct NearPairs {
     pub trees: Vec<PartTree>,
-    /// Whole form factors from elements to near sources, one source after another.
-    pub rows: Vec<NearFactor>,
-    /// Where each source's factors begin; one more than the sources.
-    pub row_starts: Vec<u32>,
-    /// Pairs in the order of their elements: the source of each and where its entries begin.
-    pub pairs: Vec<Pair>,
-    pub entries: Vec<Entry>,
+    /// Number of the first part of each source among those of all near ones, the source itself as
+    /// the last of its parts; NONE of a source that no element receives part by part.
+    pub first_part: Vec<u32>,
+    pub parts: u32,
+    /// To elements without relief.
+    pub rows: Rows<NearFactor>,
+    pub entries: Entries<Entry>,
+    /// To elements with a relief, numbered among themselves; form factors as vectors in the
+    /// element's frame. What the source sends by its row is listed too, after its parts.
+    pub relief_rows: Rows<NearVector>,
+    pub relief_entries: Entries<NearPart>,
     /// Area of each element as it counts in the mean that its source sends, `[element]`: less what
     /// near elements see of it, which they receive part by part; together that of the source.
     pub weights: Vec<f64>,
@@ -66,26 +101,37 @@ pub struct NearPairs {
 }
 
 /// An element and a near source.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pair {
-    pub element: u32,
-    pub source: u32,
-    pub first_entry: u32,
-    pub entry_count: u32,
+struct Pair {
+    element: u32,
+    /// As a vector in the element's frame; without relief of its height alone.
+    factor: Vec3,
+    /// Parts that it receives.
+    entries: u32,
 }
 
-/// The pairs of one source.
+/// The pairs of one source by element, and of each the parts, with numbers of the source's own.
 #[derive(Default)]
 struct OfSource {
     tree: PartTree,
-    factors: Vec<NearFactor>,
-    counts: Vec<u32>,
-    entries: Vec<Entry>,
+    pairs: Vec<Pair>,
+    entries: Vec<NearPart>,
     rays: u64,
 }
 
+impl OfSource {
+    /// Each pair with its parts.
+    fn each(&self) -> impl Iterator<Item = (&Pair, &[NearPart])> {
+        let mut left = self.entries.as_slice();
+        self.pairs.iter().map(move |pair| {
+            let (parts, rest) = left.split_at(pair.entries as usize);
+            left = rest;
+            (pair, parts)
+        })
+    }
+}
+
 impl NearPairs {
-    /// By rays among `occluders`. Elements with relief receive no source part by part.
+    /// By rays among `occluders`.
     pub fn new(
         elements: &Elements,
         sources: &[Source],
@@ -93,7 +139,7 @@ impl NearPairs {
         nearness: &Nearness,
     ) -> Self {
         let receivers = Receiver::all(elements);
-        let sight = Sight {
+        let search = Search {
             elements,
             occluders,
             nearness: *nearness,
@@ -101,78 +147,154 @@ impl NearPairs {
         let found: Vec<OfSource> = (sources.par_iter())
             .map(|source| match source.kind {
                 KIND_POINT => OfSource::default(),
-                _ => sight.source(source, &receivers),
+                _ => search.source(source, &receivers),
             })
             .collect();
         let weights = weights(elements, sources, &found);
-        let near = Self::assembled(found, elements.len());
+        let near = Self::assembled(found, elements.plain_count(), elements.len());
         Self { weights, ..near }
     }
 
     /// Of sources that are near no element.
     pub fn none(elements: &Elements, sources: usize) -> Self {
+        let none = (0..sources).map(|_| OfSource::default()).collect();
+        let near = Self::assembled(none, elements.plain_count(), elements.len());
         Self {
-            trees: vec![PartTree::default(); sources],
-            row_starts: vec![0; sources + 1],
             weights: elements.area.clone(),
-            ..Self::default()
+            ..near
         }
+    }
+
+    /// Pairs of elements and near sources.
+    pub fn pair_count(&self) -> usize {
+        self.rows.factors.len() + self.relief_rows.factors.len()
+    }
+
+    /// Parts that elements receive, over all elements.
+    pub fn entry_count(&self) -> usize {
+        self.entries.list.len() + self.relief_entries.list.len()
+    }
+
+    /// Of `elements`, the first `plain` of which have no relief.
+    fn assembled(found: Vec<OfSource>, plain: usize, elements: usize) -> Self {
+        let mut near = Self {
+            rays: found.iter().map(|of| of.rays).sum(),
+            ..Self::default()
+        };
+        for of in &found {
+            let first = match of.entries.is_empty() {
+                true => NONE,
+                false => near.parts,
+            };
+            near.first_part.push(first);
+            if first != NONE {
+                near.parts += of.tree.part_count() as u32 + 1;
+            }
+            near.rows.begin();
+            near.relief_rows.begin();
+            for &Pair {
+                element, factor, ..
+            } in &of.pairs
+            {
+                match (element as usize).checked_sub(plain) {
+                    None => near.rows.factors.push(NearFactor {
+                        element,
+                        factor: factor.z,
+                    }),
+                    Some(relief) => near.relief_rows.factors.push(NearVector {
+                        element: relief as u32,
+                        factor,
+                    }),
+                }
+            }
+        }
+        near.rows.begin();
+        near.relief_rows.begin();
+        let of_plain = |_: &OfSource, _: &Pair, parts: &[NearPart], first: u32| {
+            let entry = |of: &NearPart| Entry {
+                part: first + of.part,
+                factor: of.factor.z,
+            };
+            parts.iter().map(entry).collect()
+        };
+        let of_relief = |of: &OfSource, pair: &Pair, parts: &[NearPart], first: u32| {
+            let whole = NearPart {
+                part: of.tree.part_count() as u32,
+                factor: pair.factor,
+            };
+            let parts = parts.iter().chain((!parts.is_empty()).then_some(&whole));
+            let entry = |of: &NearPart| NearPart {
+                part: first + of.part,
+                ..*of
+            };
+            parts.map(entry).collect()
+        };
+        near.entries = Entries::new(&found, &near.first_part, 0..plain, of_plain);
+        near.relief_entries = Entries::new(&found, &near.first_part, plain..elements, of_relief);
+        near.trees = found.into_iter().map(|of| of.tree).collect();
+        near
+    }
+}
+
+impl<T> Rows<T> {
+    /// The factors of the next source begin here.
+    fn begin(&mut self) {
+        self.starts.push(self.factors.len() as u32);
+    }
+
+    /// Factors of one source.
+    pub fn of(&self, source: usize) -> &[T] {
+        &self.factors[self.starts[source] as usize..self.starts[source + 1] as usize]
     }
 
     /// Factors of one source, at most.
-    pub fn longest_row(&self) -> u32 {
-        let rows = self.row_starts.windows(2).map(|of| of[1] - of[0]);
+    pub fn longest(&self) -> u32 {
+        let rows = self.starts.windows(2).map(|of| of[1] - of[0]);
         rows.max().unwrap_or(0)
     }
+}
 
-    fn assembled(found: Vec<OfSource>, elements: usize) -> Self {
-        let mut near = Self::default();
-        // Pairs by element: how many each has, and then where they begin.
-        let mut counts = vec![0_u32; elements + 1];
-        for of in &found {
-            near.row_starts.push(near.rows.len() as u32);
-            near.rows.extend(&of.factors);
-            near.rays += of.rays;
-            of.factors
-                .iter()
-                .for_each(|f| counts[f.element as usize + 1] += 1);
+impl<T: Copy + Default> Entries<T> {
+    /// Sorts what becomes of the parts of `found` by element, source after source.
+    fn new(
+        found: &[OfSource],
+        first_part: &[u32],
+        elements: std::ops::Range<usize>,
+        entries: impl Fn(&OfSource, &Pair, &[NearPart], u32) -> Vec<T>,
+    ) -> Self {
+        let pairs = || {
+            let sources = found.iter().zip(first_part);
+            let of_source = |(of, &first)| {
+                let of: &OfSource = of;
+                of.each().map(move |(pair, parts)| (of, pair, parts, first))
+            };
+            let own =
+                |(_, pair, ..): &(_, &Pair, _, _)| elements.contains(&(pair.element as usize));
+            sources.flat_map(of_source).filter(own)
+        };
+        // How many each element has, then where they begin.
+        let mut starts = vec![0_u32; elements.len() + 1];
+        for (of, pair, parts, first) in pairs() {
+            let e = pair.element as usize - elements.start;
+            starts[e + 1] += entries(of, pair, parts, first).len() as u32;
         }
-        near.row_starts.push(near.rows.len() as u32);
-        for e in 0..elements {
-            counts[e + 1] += counts[e];
+        for e in 0..elements.len() {
+            starts[e + 1] += starts[e];
         }
-        let mut order = vec![[0_u32; 2]; near.rows.len()];
-        let mut firsts = Vec::with_capacity(found.len());
-        for (s, of) in (0..).zip(&found) {
-            let mut first = 0;
-            let mut starts = Vec::with_capacity(of.factors.len());
-            for (i, factor) in (0..).zip(&of.factors) {
-                let at = &mut counts[factor.element as usize];
-                order[*at as usize] = [s, i];
-                *at += 1;
-                starts.push(first);
-                first += of.counts[i as usize];
-            }
-            firsts.push(starts);
+        let mut next = starts.clone();
+        let mut list: Vec<T> = vec![T::default(); starts[elements.len()] as usize];
+        for (of, pair, parts, first) in pairs() {
+            let at = &mut next[pair.element as usize - elements.start];
+            let new = entries(of, pair, parts, first);
+            list[*at as usize..][..new.len()].copy_from_slice(&new);
+            *at += new.len() as u32;
         }
-        for [s, i] in order {
-            let of = &found[s as usize];
-            let count = of.counts[i as usize];
-            if count == 0 {
-                continue;
-            }
-            let first = firsts[s as usize][i as usize] as usize;
-            near.pairs.push(Pair {
-                element: of.factors[i as usize].element,
-                source: s,
-                first_entry: near.entries.len() as u32,
-                entry_count: count,
-            });
-            near.entries
-                .extend(&of.entries[first..first + count as usize]);
-        }
-        near.trees = found.into_iter().map(|of| of.tree).collect();
-        near
+        Self { list, starts }
+    }
+
+    /// Of an element.
+    pub fn of(&self, element: usize) -> &[T] {
+        &self.list[self.starts[element] as usize..self.starts[element + 1] as usize]
     }
 }
 
@@ -188,18 +310,17 @@ fn weights(elements: &Elements, sources: &[Source], found: &[OfSource]) -> Vec<f
         }
         // Area of each part that near elements see, by reciprocity.
         let mut near = vec![0.0; of.tree.part_count()];
-        let mut entries = of.entries.iter();
-        for (factor, &count) in of.factors.iter().zip(&of.counts) {
-            let area = elements.area[factor.element as usize];
-            for entry in entries.by_ref().take(count as usize) {
-                near[entry.part as usize] += area * f64::from(entry.factor);
+        for (pair, parts) in of.each() {
+            let area = elements.area[pair.element as usize];
+            for of in parts {
+                near[of.part as usize] += area * f64::from(of.factor.z);
             }
         }
         let areas = of.tree.sums(|e| elements.area[e as usize]);
         of.tree.share_out(&near, &areas, |e, share| {
             weights[e as usize] *= (1.0 - share).max(LEAST_FAR);
         });
-        let members = || of.tree.members.iter().map(|&e| e as usize);
+        let members = || source.members();
         let all: f64 = members().map(|e| weights[e]).sum();
         members().for_each(|e| weights[e] *= areas[0] / all);
     }

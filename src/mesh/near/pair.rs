@@ -1,19 +1,18 @@
 //! What one element receives of a near source, part by part.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
-use super::parts::{Part, PartTree};
+use super::parts::Part;
 use super::rays::blocked;
-use super::{Entry, Nearness, OfSource};
-use crate::math::form_factor::to_triangle;
-use crate::math::kept::as_kept;
+use super::receivers::Receiver;
+use super::seen::Seen;
+use super::{Nearness, OfSource, Pair};
+use crate::math::form_factor::{sample_points, to_triangle};
+use crate::math::kept::{as_kept, direction_code, kept_direction};
 use crate::mesh::elements::Elements;
 use crate::mesh::shadow_tree::ShadowTree;
 use crate::mesh::sources::Source;
-use crate::structs::{NearFactor, ShadowOccluder};
-
-/// Elements of a block, which is passed over as a whole where it lies far off.
-const BLOCK: usize = 64;
+use crate::structs::{NearPart, ShadowOccluder};
 
 /// An element this many of its radii from a member, or less, has several samples; at most one
 /// radius off, more.
@@ -23,136 +22,44 @@ const CLOSE: f64 = 4.0;
 /// about an element nearly touches, since a part of it may see what the source's eye does not.
 const BESIDE: f64 = 0.1;
 
-/// A member further off than this many of its radii, and as high above the receiver's horizon,
-/// counts as a disc seen along its axis: off by less than 1 %.
-const AS_DISC: f64 = 5.0;
-
-/// Height above a member's plane from which on a place sees its front, internal units.
+/// Height above a plane source from which on a place sees its front, internal units.
 const ABOVE: f64 = 1e-7;
 
 /// Times that a single member is cut in four for its visibility.
 const CUTS: u32 = 3;
 
-/// Elements as receivers: a ball about the centroids of consecutive ones.
-pub(super) struct Receiver {
-    elements: std::ops::Range<usize>,
-    centre: DVec3,
-    radius: f64,
-    /// Radius of an element.
-    largest: f64,
-}
-
-impl Receiver {
-    /// Blocks of all elements without relief.
-    pub fn all(elements: &Elements) -> Vec<Self> {
-        let plain = (0..elements.len()).position(|e| elements.is_meso(e));
-        let end = plain.unwrap_or(elements.len());
-        (0..end)
-            .step_by(BLOCK)
-            .map(|first| {
-                let of = first..(first + BLOCK).min(end);
-                let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-                for c in &elements.centroid[of.clone()] {
-                    low = low.min(*c);
-                    high = high.max(*c);
-                }
-                let centre = 0.5 * (low + high);
-                let distances = elements.centroid[of.clone()].iter();
-                let radii = of.clone().map(|e| elements.radius(e));
-                Self {
-                    largest: radii.fold(0.0, f64::max),
-                    elements: of,
-                    centre,
-                    radius: distances.map(|c| c.distance(centre)).fold(0.0, f64::max),
-                }
-            })
-            .collect()
-    }
-}
-
-/// A scene in which elements look at sources.
-pub(super) struct Sight<'a> {
+/// A scene in which elements look for near sources.
+pub(super) struct Search<'a> {
     pub elements: &'a Elements,
     pub occluders: &'a ShadowTree<ShadowOccluder>,
     pub nearness: Nearness,
 }
 
-/// A source as its near receivers see it.
-struct Seen {
-    /// Of the ball that holds the source.
-    middle: DVec3,
-    radius: f64,
-    tree: PartTree,
-    members: Vec<Member>,
-}
-
-struct Member {
-    triangle: [DVec3; 3],
-    centroid: DVec3,
+/// A receiver before a source.
+struct Before<'a> {
+    element: usize,
     normal: DVec3,
-    area: f64,
-    radius: f64,
+    /// Places on it, and their weights.
+    samples: &'a [(DVec3, f64)],
+    seen: &'a Seen,
+    /// Form factors to the members as if nothing stood between, `[member]`.
+    factors: &'a [f64],
 }
 
-impl Member {
-    fn new(triangle: [DVec3; 3], normal: DVec3) -> Self {
-        let [a, b, c] = triangle;
-        let centroid = (a + b + c) / 3.0;
-        Self {
-            triangle,
-            centroid,
-            normal,
-            area: 0.5 * (b - a).cross(c - a).length(),
-            radius: triangle
-                .map(|v| v.distance(centroid))
-                .into_iter()
-                .fold(0.0, f64::max),
-        }
-    }
-
-    /// Form factor from a place, as if nothing stood between.
-    fn form_factor(&self, p: DVec3, n: DVec3) -> f64 {
-        let way = self.centroid - p;
-        let facing = -way.dot(self.normal);
-        let height = way.dot(n);
-        if facing <= ABOVE || height <= -self.radius {
-            return 0.0;
-        }
-        let square = way.length_squared();
-        if height >= self.radius && square > AS_DISC * AS_DISC * self.radius * self.radius {
-            let disc = std::f64::consts::PI * square + self.area;
-            return facing * height * self.area / (square * disc);
-        }
-        to_triangle(p, n, &self.triangle).max(0.0)
-    }
+/// Room for the members and the parts of a source, `[member]` and `[part]`.
+struct Room {
+    factors: Vec<f64>,
+    sums: Vec<f64>,
 }
 
-/// A sample of a receiver: place and weight.
-type Sample = (DVec3, f64);
-
-impl Sight<'_> {
+impl Search<'_> {
     pub fn source(&self, source: &Source, receivers: &[Receiver]) -> OfSource {
-        let first = source.first_element;
-        let tree = PartTree::new(self.elements, first..first + source.element_count);
-        // An element that is cut into several sources.
-        let cut = source.element_count == 1;
-        let member = |&e: &u32| {
-            let own = self.elements.triangle(e as usize);
-            let triangle = match source.contour.first().map(Vec::as_slice) {
-                Some(&[a, b, c]) if cut => [a, b, c],
-                _ => own,
-            };
-            Member::new(triangle, self.elements.normal[e as usize])
-        };
-        let seen = Seen {
-            middle: source.centroid,
-            radius: source.radius,
-            members: tree.members.iter().map(member).collect(),
-            tree,
-        };
+        let seen = Seen::new(self.elements, source);
         let mut found = OfSource::default();
-        let mut factors = vec![0.0; seen.members.len()];
-        let mut sums = vec![0.0; seen.tree.part_count()];
+        let mut room = Room {
+            factors: vec![0.0; seen.members.len()],
+            sums: vec![0.0; seen.tree.part_count()],
+        };
         // Where it is seen under that share of a view at most, however it is turned.
         let reach =
             (source.area / (std::f64::consts::PI * self.nearness.source)).sqrt() + source.radius;
@@ -163,7 +70,7 @@ impl Sight<'_> {
             }
             for e in block.elements.clone() {
                 if self.may_be_near(e, source) {
-                    self.pair(e, &seen, &mut factors, &mut sums, &mut found);
+                    self.pair(e, &seen, &mut room, &mut found);
                 }
             }
         }
@@ -196,20 +103,13 @@ impl Sight<'_> {
         most > self.nearness.source * std::f64::consts::PI * gap * gap
     }
 
-    fn pair(
-        &self,
-        e: usize,
-        seen: &Seen,
-        factors: &mut [f64],
-        sums: &mut [f64],
-        found: &mut OfSource,
-    ) {
+    fn pair(&self, e: usize, seen: &Seen, room: &mut Room, found: &mut OfSource) {
         let (elements, n) = (self.elements, self.elements.normal[e]);
         let centroid = elements.centroid[e];
         let own = |m: usize| seen.tree.members[m] as usize == e;
         let mut all = 0.0;
         let mut nearest = f64::INFINITY;
-        for (m, (member, factor)) in seen.members.iter().zip(factors.iter_mut()).enumerate() {
+        for (m, (member, factor)) in seen.members.iter().zip(&mut room.factors).enumerate() {
             *factor = match own(m) {
                 true => 0.0,
                 false => member.form_factor(centroid, n),
@@ -231,33 +131,41 @@ impl Sight<'_> {
             return;
         }
         let [a, b, c] = elements.triangle(e);
-        let points: &[[f64; 3]] = match close {
-            false => &POINTS[..1],
-            true if nearest > size => &POINTS[1..4],
-            true => &POINTS[4..],
-        };
-        let place = |&[u, v, weight]: &[f64; 3]| (a + u * (b - a) + v * (c - a), weight);
+        let points = sample_points(close, close && nearest <= size);
         let mut samples = [(DVec3::ZERO, 0.0); 7];
-        for (sample, point) in samples.iter_mut().zip(points) {
-            *sample = place(point);
+        for (sample, &[u, v, weight]) in samples.iter_mut().zip(points) {
+            *sample = (a + u * (b - a) + v * (c - a), weight);
         }
         let samples = &samples[..points.len()];
         if close {
-            for (m, (member, factor)) in seen.members.iter().zip(factors.iter_mut()).enumerate() {
-                let of = |&(p, weight): &Sample| weight * member.form_factor(p, n);
+            for (m, (member, factor)) in seen.members.iter().zip(&mut room.factors).enumerate() {
+                let of = |&(p, weight): &(DVec3, f64)| weight * member.form_factor(p, n);
                 *factor = match own(m) {
                     true => 0.0,
                     false => samples.iter().map(of).sum(),
                 };
             }
         }
-        let whole = seen.tree.whole();
-        sum_parts(whole, factors, sums);
-        if sums[0] <= least {
+        sum_parts(seen.tree.whole(), &room.factors, &mut room.sums);
+        if room.sums[0] <= least {
             return;
         }
+        let before = Before {
+            element: e,
+            normal: n,
+            samples,
+            seen,
+            factors: &room.factors,
+        };
+        self.parts(&before, &room.sums, found);
+    }
+
+    /// Adds a pair with its parts.
+    fn parts(&self, before: &Before, sums: &[f64], found: &mut OfSource) {
+        let (elements, seen) = (self.elements, before.seen);
+        let e = before.element;
         let first = found.entries.len();
-        let mut stack = vec![whole];
+        let mut stack = vec![seen.tree.whole()];
         while let Some(part) = stack.pop() {
             let all = sums[part.index];
             if all <= 0.0 {
@@ -267,53 +175,75 @@ impl Sight<'_> {
                 stack.extend(part.halves());
                 continue;
             }
-            let factor = self.seen_factor(n, samples, seen, factors, part, &mut found.rays);
+            let factor = self.seen_factor(before, part, &mut found.rays);
             if factor > 0.0 {
-                found.entries.push(Entry {
-                    part: part.index as u32,
-                    factor: factor as f32,
-                });
+                let factor = match elements.is_meso(e) {
+                    true => self.by_direction(before, part, factor),
+                    false => Vec3::new(0.0, 0.0, factor as f32),
+                };
+                let part = part.index as u32;
+                found.entries.push(NearPart { factor, part });
             }
         }
         let entries = &mut found.entries[first..];
-        let whole: f64 = entries.iter().map(|entry| f64::from(entry.factor)).sum();
-        let kept = as_kept(whole as f32);
+        let whole: DVec3 = entries.iter().map(|entry| entry.factor.as_dvec3()).sum();
+        let size = as_kept(whole.length() as f32);
+        let factor = match elements.is_meso(e) && size > 0.0 {
+            true => size * kept_direction(direction_code(whole.normalize().as_vec3())),
+            false => Vec3::new(0.0, 0.0, size),
+        };
         // The parts sum to what is kept of the whole, so that no light is made of the difference.
-        let scale = if whole > 0.0 {
-            f64::from(kept) / whole
-        } else {
-            0.0
+        let scale = match size > 0.0 {
+            true => f64::from(size) / whole.length(),
+            false => 0.0,
         };
         for entry in entries.iter_mut() {
-            entry.factor = (f64::from(entry.factor) * scale) as f32;
+            entry.factor = (entry.factor.as_dvec3() * scale).as_vec3();
         }
-        found.factors.push(NearFactor {
-            element: e as u32,
-            factor: kept,
-        });
         // A source of one member sends what that sends, and relief sends by direction.
-        let mut count = found.entries.len() - first;
         if seen.members.len() == 1 || elements.is_meso(seen.tree.members[0] as usize) {
             found.entries.truncate(first);
-            count = 0;
         }
-        found.counts.push(count as u32);
+        found.pairs.push(Pair {
+            element: e as u32,
+            factor,
+            entries: (found.entries.len() - first) as u32,
+        });
+    }
+
+    /// A form factor to a part as a vector in the frame of an element with relief.
+    fn by_direction(&self, before: &Before, part: Part, factor: f64) -> Vec3 {
+        let (e, n) = (before.element, before.normal);
+        let Some(relief) = &self.elements.relief else {
+            return Vec3::new(0.0, 0.0, factor as f32);
+        };
+        let centroid = self.elements.centroid[e];
+        let members = before.seen.members[part.first..part.first + part.count].iter();
+        let sum: DVec3 = members.map(|m| m.form_factor_vector(centroid, n)).sum();
+        let height = sum.dot(n);
+        // Other places of the element see what its centroid does not.
+        let vector = match height > LEAST_HEIGHT * sum.length() {
+            true => sum * (factor / height),
+            false => n * factor,
+        };
+        let along = |axis: Vec3| axis.as_dvec3().dot(vector);
+        let (x, y) = (along(relief.tangent[e]), along(relief.bitangent[e]));
+        DVec3::new(x, y, factor).as_vec3()
     }
 
     /// Form factor to a part with visibility, as a mean over the samples.
-    fn seen_factor(
-        &self,
-        n: DVec3,
-        samples: &[Sample],
-        seen: &Seen,
-        factors: &[f64],
-        part: Part,
-        rays: &mut u64,
-    ) -> f64 {
+    fn seen_factor(&self, before: &Before, part: Part, rays: &mut u64) -> f64 {
+        let Before {
+            normal: n,
+            samples,
+            seen,
+            factors,
+            ..
+        } = *before;
         let range = part.first..part.first + part.count;
         if part.count == 1 {
             let member = &seen.members[part.first];
-            let open = |&(p, weight): &Sample| {
+            let open = |&(p, weight): &(DVec3, f64)| {
                 let factor = match samples.len() {
                     1 => factors[part.first],
                     _ => member.form_factor(p, n),
@@ -324,31 +254,25 @@ impl Sight<'_> {
         }
         // A ray to the member that half of the part's form factor lies before.
         let all: f64 = factors[range.clone()].iter().sum();
-        let mut before = 0.0;
+        let mut passed = 0.0;
         let middle = range.clone().find(|&m| {
-            before += factors[m];
-            before >= 0.5 * all
+            passed += factors[m];
+            passed >= 0.5 * all
         });
         let member = &seen.members[middle.unwrap_or(range.start)];
-        if let [(p, _)] = samples {
-            *rays += 1;
-            return if blocked(self.occluders, *p, member.centroid) {
-                0.0
-            } else {
-                all
-            };
-        }
-        let open = |&(p, weight): &Sample| {
+        let open = |&(p, weight): &(DVec3, f64)| {
             let of_members = seen.members[range.clone()].iter();
-            let factor: f64 = of_members.map(|m| m.form_factor(p, n)).sum();
+            let factor: f64 = match samples.len() {
+                1 => all,
+                _ => of_members.map(|m| m.form_factor(p, n)).sum(),
+            };
             if factor <= 0.0 {
                 return 0.0;
             }
             *rays += 1;
-            if blocked(self.occluders, p, member.centroid) {
-                0.0
-            } else {
-                weight * factor
+            match blocked(self.occluders, p, member.centroid) {
+                true => 0.0,
+                false => weight * factor,
             }
         };
         samples.iter().map(open).sum()
@@ -372,10 +296,9 @@ impl Sight<'_> {
         if cuts == 0 || factor <= self.nearness.part {
             *rays += 1;
             let middle = (a + b + c) / 3.0;
-            return if blocked(self.occluders, p, middle) {
-                0.0
-            } else {
-                factor
+            return match blocked(self.occluders, p, middle) {
+                true => 0.0,
+                false => factor,
             };
         }
         let [ab, bc, ca] = [0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)];
@@ -389,6 +312,9 @@ impl Sight<'_> {
     }
 }
 
+/// Sine of the lowest light that a part's direction is taken from.
+const LEAST_HEIGHT: f64 = 1e-3;
+
 fn sum_parts(part: Part, factors: &[f64], sums: &mut [f64]) -> f64 {
     let sum = match part.count {
         1 => factors[part.first],
@@ -400,19 +326,3 @@ fn sum_parts(part: Part, factors: &[f64], sums: &mut [f64]) -> f64 {
     sums[part.index] = sum;
     sum
 }
-
-/// Sample points of a triangle (two barycentric coordinates, weight): the centroid; degree 2;
-/// Radon's degree 5.
-const POINTS: [[f64; 3]; 11] = [
-    [1.0 / 3.0, 1.0 / 3.0, 1.0],
-    [1.0 / 6.0, 1.0 / 6.0, 1.0 / 3.0],
-    [2.0 / 3.0, 1.0 / 6.0, 1.0 / 3.0],
-    [1.0 / 6.0, 2.0 / 3.0, 1.0 / 3.0],
-    [1.0 / 3.0, 1.0 / 3.0, 0.225],
-    [0.470142064, 0.470142064, 0.132394153],
-    [0.059715872, 0.470142064, 0.132394153],
-    [0.470142064, 0.059715872, 0.132394153],
-    [0.101286507, 0.101286507, 0.125939181],
-    [0.797426985, 0.101286507, 0.125939181],
-    [0.101286507, 0.797426985, 0.125939181],
-];

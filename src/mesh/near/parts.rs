@@ -42,8 +42,8 @@ impl Part {
 }
 
 impl PartTree {
-    pub fn new(elements: &Elements, range: std::ops::Range<u32>) -> Self {
-        let mut members: Vec<u32> = range.collect();
+    pub fn of(elements: &Elements, source: &Source) -> Self {
+        let mut members: Vec<u32> = source.members().map(|e| e as u32).collect();
         halve(elements, &mut members);
         Self { members }
     }
@@ -143,13 +143,7 @@ fn halve(elements: &Elements, members: &mut [u32]) {
         return;
     }
     let centroid = |e: u32| elements.centroid[e as usize];
-    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for &e in members.iter() {
-        low = low.min(centroid(e));
-        high = high.max(centroid(e));
-    }
-    let extent = high - low;
-    let axis = (0..3).fold(0, |best, i| if extent[i] > extent[best] { i } else { best });
+    let axis = elements.longest_axis(members);
     let half = members.len() / 2;
     members.select_nth_unstable_by(half, |&a, &b| {
         (centroid(a)[axis].total_cmp(&centroid(b)[axis])).then(a.cmp(&b))

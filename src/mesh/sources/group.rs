@@ -58,13 +58,7 @@ impl Shape {
 /// between neighbours in the middle third, which on a grid is a line of the grid.
 pub(super) fn bisect(elements: &Elements, members: &mut [u32]) -> usize {
     let centroid = |e: u32| elements.centroid[e as usize];
-    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for &e in members.iter() {
-        low = low.min(centroid(e));
-        high = high.max(centroid(e));
-    }
-    let extent = high - low;
-    let axis = (0..3).fold(0, |best, i| if extent[i] > extent[best] { i } else { best });
+    let axis = elements.longest_axis(members);
     members.sort_by(|&a, &b| centroid(a)[axis].total_cmp(&centroid(b)[axis]));
     let count = members.len();
     let middle = (count / 3).max(1)..=(count - count / 3).min(count - 1);

@@ -103,6 +103,12 @@ pub struct Part {
 }
 
 impl Source {
+    /// Its elements; of a point light none.
+    pub fn members(&self) -> std::ops::Range<usize> {
+        let first = self.first_element as usize;
+        first..first + self.element_count as usize
+    }
+
     /// Emitted power, internal units, summed over the colours.
     pub fn emitted_power(&self) -> f64 {
         let sum = f64::from(self.emitted.element_sum());
@@ -135,8 +141,7 @@ impl Sources {
         self.list.retain(|s| s.kind != KIND_POINT);
         let mut covered = vec![false; elements.len()];
         for source in &mut self.list {
-            let first = source.first_element as usize;
-            let members = first..first + source.element_count as usize;
+            let members = source.members();
             let area: f64 = members.clone().map(|e| elements.area[e]).sum();
             let emitted = members
                 .clone()

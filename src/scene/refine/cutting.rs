@@ -1,0 +1,163 @@
+//! Triangles while they are cut through the middles of their longest edges.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+
+use super::{OnInput, RefinedFrom, Scene};
+
+/// An edge by its vertices, the lower first.
+type Edge = [u32; 2];
+
+/// Triangles while they are cut.
+pub(super) struct Cutting {
+    pub scene: Scene,
+    pub on_input: Vec<OnInput>,
+    /// Triangles on each edge.
+    about: HashMap<Edge, Vec<u32>>,
+    middles: HashMap<Edge, u32>,
+}
+
+impl Cutting {
+    /// Cuts a scene until every triangle is fine enough. None where there would be more than `most`
+    /// triangles.
+    pub fn of(input: &Scene, is_fine: impl Fn(&Self, usize) -> bool, most: usize) -> Option<Scene> {
+        let count = input.triangles.len() as u32;
+        let mut cutting = Self {
+            scene: input.clone(),
+            on_input: (0..count).map(OnInput::whole).collect(),
+            about: HashMap::new(),
+            middles: HashMap::new(),
+        };
+        let mut wanted: Vec<u32> = (0..count)
+            .filter(|&t| !is_fine(&cutting, t as usize))
+            .collect();
+        if !wanted.is_empty() {
+            (0..count).for_each(|t| cutting.enter(t));
+        }
+        while let Some(t) = wanted.pop() {
+            if cutting.scene.triangles.len() > most {
+                return None;
+            }
+            if !is_fine(&cutting, t as usize) {
+                cutting.cut(t, &mut wanted);
+            }
+        }
+        let mut scene = cutting.scene;
+        scene.refined_from = Some(RefinedFrom {
+            hash: input.hash(),
+            on_input: cutting.on_input,
+        });
+        Some(scene)
+    }
+
+    /// Cuts a triangle through the middle of its longest edge, with all that share the edge, after
+    /// those have been cut of which it is not the longest.
+    fn cut(&mut self, first: u32, wanted: &mut Vec<u32>) {
+        let mut stack = vec![first];
+        while let Some(&t) = stack.last() {
+            let edge = self.longest_edge(t);
+            let longer = self.about[&edge]
+                .iter()
+                .find(|&&o| self.longest_edge(o) != edge);
+            if let Some(&other) = longer {
+                stack.push(other);
+                continue;
+            }
+            stack.pop();
+            let all = self.about[&edge].clone();
+            let middle = self.middle(edge);
+            for t in all {
+                let half = self.halve(t, edge, middle);
+                wanted.extend([t, half]);
+            }
+        }
+    }
+
+    fn longest_edge(&self, t: u32) -> Edge {
+        let triangle = &self.scene.triangles[t as usize];
+        let vertices = triangle.vertices;
+        let k = longest(self.scene.corners(triangle), vertices);
+        edge(vertices[k], vertices[(k + 1) % 3])
+    }
+
+    fn middle(&mut self, edge: Edge) -> u32 {
+        if let Some(&middle) = self.middles.get(&edge) {
+            return middle;
+        }
+        let [a, b] = edge.map(|v| self.scene.vertices[v as usize]);
+        let middle = self.scene.vertices.len() as u32;
+        self.scene.vertices.push(0.5 * (a + b));
+        self.middles.insert(edge, middle);
+        middle
+    }
+
+    /// Cuts a triangle at the middle of one of its edges; returns the new half.
+    fn halve(&mut self, t: u32, cut: Edge, middle: u32) -> u32 {
+        self.leave(t);
+        let old = self.scene.triangles[t as usize];
+        let on = self.on_input[t as usize];
+        let k = (0..3)
+            .find(|&k| edge(old.vertices[k], old.vertices[(k + 1) % 3]) == cut)
+            .expect("the edge is one of the triangle's");
+        let next = (k + 1) % 3;
+        let uv = [0, 1].map(|i| 0.5 * (old.uv[k][i] + old.uv[next][i]));
+        let at = [0, 1].map(|i| 0.5 * (on.corners[k][i] + on.corners[next][i]));
+        let mut halves = [(old, on), (old, on)];
+        for ((triangle, on), corner) in halves.iter_mut().zip([next, k]) {
+            triangle.vertices[corner] = middle;
+            triangle.uv[corner] = uv;
+            on.corners[corner] = at;
+        }
+        let half = self.scene.triangles.len() as u32;
+        let [(one, on_one), (other, on_other)] = halves;
+        self.scene.triangles[t as usize] = one;
+        self.on_input[t as usize] = on_one;
+        self.scene.triangles.push(other);
+        self.on_input.push(on_other);
+        self.enter(t);
+        self.enter(half);
+        half
+    }
+
+    fn edges(&self, t: u32) -> [Edge; 3] {
+        let v = self.scene.triangles[t as usize].vertices;
+        [edge(v[0], v[1]), edge(v[1], v[2]), edge(v[2], v[0])]
+    }
+
+    fn enter(&mut self, t: u32) {
+        for edge in self.edges(t) {
+            self.about.entry(edge).or_default().push(t);
+        }
+    }
+
+    fn leave(&mut self, t: u32) {
+        for edge in self.edges(t) {
+            if let Some(about) = self.about.get_mut(&edge) {
+                about.retain(|&o| o != t);
+            }
+        }
+    }
+}
+
+fn edge(a: u32, b: u32) -> Edge {
+    [a.min(b), a.max(b)]
+}
+
+pub(super) fn length(corners: [DVec3; 3], k: usize) -> f64 {
+    corners[k].distance(corners[(k + 1) % 3])
+}
+
+/// The longest edge, from corner k to the next; of equals the one with the highest vertices, so that
+/// both triangles of an edge agree.
+pub(super) fn longest(corners: [DVec3; 3], vertices: [u32; 3]) -> usize {
+    let key = |k: usize| (length(corners, k), edge(vertices[k], vertices[(k + 1) % 3]));
+    (0..3).fold(0, |best, k| {
+        let (a, b) = (key(k), key(best));
+        if a.0 > b.0 || a.0 == b.0 && a.1 > b.1 {
+            k
+        } else {
+            best
+        }
+    })
+}

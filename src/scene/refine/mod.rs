@@ -1,0 +1,212 @@
+//! Cuts triangles where light needs finer ones: those that are large, and those with other surfaces
+//! close in front of them. A cut goes through all triangles that share the edge (Rivara 1984), so
+//! that where the input has no T-junction, the result has none.
+
+mod cutting;
+mod surroundings;
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+
+use super::{Scene, Triangle};
+use cutting::{Cutting, length, longest};
+use surroundings::Surroundings;
+
+/// How finely a scene is cut.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Refinement {
+    /// Longest edge of a triangle, scene units; where other surfaces are close, less. None: as if all
+    /// were cut to 6,000 triangles of one size.
+    pub element_size: Option<f64>,
+    /// Most triangles.
+    pub max_elements: usize,
+}
+
+impl Refinement {
+    /// Triangles of the whole scene if all were cut to one size.
+    const EVEN: f64 = 6000.0;
+}
+
+impl Default for Refinement {
+    fn default() -> Self {
+        Self {
+            element_size: None,
+            max_elements: 200_000,
+        }
+    }
+}
+
+/// Where a triangle lies in a triangle of the input.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OnInput {
+    pub triangle: u32,
+    /// Barycentric coordinates of each corner: weights of the input's second and third corner.
+    pub corners: [[f64; 2]; 3],
+}
+
+impl OnInput {
+    /// The whole of a triangle.
+    pub fn whole(triangle: u32) -> Self {
+        Self {
+            triangle,
+            corners: [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]],
+        }
+    }
+}
+
+/// What a scene was refined from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RefinedFrom {
+    /// [`Scene::hash`] of the input.
+    pub hash: String,
+    /// `[triangle]`
+    pub on_input: Vec<OnInput>,
+}
+
+/// Of the size that is asked for: the least that close surfaces lead to, of one shell and of two.
+const LEAST_OF_SHELL: f64 = 0.5;
+const LEAST: f64 = 0.125;
+
+/// Of the diagonal of a shell: no triangle of it is longer.
+const OF_SHELL: f64 = 0.25;
+
+/// Over the size by which it grows where there would be too many triangles.
+const COARSER: f64 = 1.25;
+
+impl Scene {
+    /// [`Self::hash`] of the scene as it was read.
+    pub fn input_hash(&self) -> String {
+        match &self.refined_from {
+            Some(from) => from.hash.clone(),
+            None => self.hash(),
+        }
+    }
+
+    /// Where each triangle lies in the input.
+    pub fn on_input(&self) -> Vec<OnInput> {
+        match &self.refined_from {
+            Some(from) => from.on_input.clone(),
+            None => (0..self.triangles.len() as u32)
+                .map(OnInput::whole)
+                .collect(),
+        }
+    }
+
+    /// Cuts triangles as `refinement` says. The result has [`Scene::refined_from`].
+    pub fn refined(&self, refinement: &Refinement) -> Self {
+        let area: f64 = self.triangles.iter().map(|t| area(self.corners(t))).sum();
+        let even = 2.0 * (area / Refinement::EVEN).sqrt();
+        let mut size = refinement.element_size.unwrap_or(even);
+        let most = refinement.max_elements.max(self.triangles.len());
+        let surroundings = Surroundings::new(self);
+        let wanted = size;
+        loop {
+            let wish = Wish {
+                input: self,
+                surroundings: &surroundings,
+                size,
+                of_shell: OF_SHELL * size / wanted,
+            };
+            let is_fine = |cut: &Cutting, t: usize| wish.is_met(cut, t);
+            if let Some(mut cut) = Cutting::of(self, is_fine, most) {
+                if size > wanted {
+                    cut.notes.push(format!(
+                        "elements are cut to {size:.3} scene units, not {wanted:.3}: \
+                         --max-elements {most}"
+                    ));
+                }
+                return cut;
+            }
+            size *= COARSER;
+        }
+    }
+
+    /// The triangles of this scene cut as they were in a scene that was refined from it.
+    pub fn cut_as(&self, on_input: &[OnInput]) -> Self {
+        let mut cut = self.clone();
+        let mut known: HashMap<[u64; 3], u32> = HashMap::new();
+        for (v, place) in (0..).zip(&self.vertices) {
+            known.entry(place.to_array().map(f64::to_bits)).or_insert(v);
+        }
+        cut.triangles = (on_input.iter())
+            .map(|on| {
+                let whole = &self.triangles[on.triangle as usize];
+                let corners = self.corners(whole);
+                let vertices = on.corners.map(|at| {
+                    let place = at_place(corners, at);
+                    let key = place.to_array().map(f64::to_bits);
+                    *known.entry(key).or_insert_with(|| {
+                        cut.vertices.push(place);
+                        (cut.vertices.len() - 1) as u32
+                    })
+                });
+                Triangle {
+                    vertices,
+                    uv: on.corners.map(|at| at_uv(whole.uv, at)),
+                    material: whole.material,
+                }
+            })
+            .collect();
+        cut.refined_from = Some(RefinedFrom {
+            hash: self.hash(),
+            on_input: on_input.to_vec(),
+        });
+        cut
+    }
+}
+
+/// The place with these barycentric coordinates. A corner and the middle of an edge are found from
+/// that edge alone, to the bit, in either triangle that shares it.
+fn at_place([a, b, c]: [DVec3; 3], [v, w]: [f64; 2]) -> DVec3 {
+    let u = 1.0 - v - w;
+    let mut sum = DVec3::ZERO;
+    let mut terms = [(u, a), (v, b), (w, c)];
+    // In an order that both triangles agree on.
+    terms.sort_by(|(_, a), (_, b)| {
+        a.to_array()
+            .partial_cmp(&b.to_array())
+            .unwrap_or(std::cmp::Ordering::Equal)
+    });
+    for (weight, place) in terms {
+        sum += weight * place;
+    }
+    sum
+}
+
+fn at_uv(uv: [[f32; 2]; 3], [v, w]: [f64; 2]) -> [f32; 2] {
+    let u = 1.0 - v - w;
+    [0, 1].map(|i| {
+        let [a, b, c] = uv.map(|corner| f64::from(corner[i]));
+        (u * a + v * b + w * c) as f32
+    })
+}
+
+fn area([a, b, c]: [DVec3; 3]) -> f64 {
+    0.5 * (b - a).cross(c - a).length()
+}
+
+/// How long the edges of triangles may be.
+struct Wish<'a> {
+    input: &'a Scene,
+    surroundings: &'a Surroundings,
+    size: f64,
+    /// Of the diagonal of a shell.
+    of_shell: f64,
+}
+
+impl Wish<'_> {
+    fn is_met(&self, cut: &Cutting, t: usize) -> bool {
+        let triangle = &cut.scene.triangles[t];
+        let corners = cut.scene.corners(triangle);
+        let longest = length(corners, longest(corners, triangle.vertices));
+        let input = cut.on_input[t].triangle as usize;
+        let of_shell = self.of_shell * self.surroundings.diagonal(input);
+        let size = self.size.min(of_shell);
+        if longest > size {
+            return false;
+        }
+        let close = || self.surroundings.size_at(self.input, input, corners, size);
+        longest <= LEAST * size || longest <= close()
+    }
+}
