@@ -57,6 +57,54 @@ fn nothing_leaks_under_a_plate() {
 /// Measured: 0.124, by means 0.60. Cells of the floor that lie half under the plate have one mean.
 const UNDERSIDE: f64 = 0.2;
 
+/// Under a box without a bottom that stands on a floor of cells which its sides do not follow: an
+/// item buffer shows a side a pixel aside, and does not say before or behind it.
+#[test]
+fn nothing_leaks_below_the_sides_of_a_box() {
+    let mut build = Build::new();
+    let lamp = build.material(0.0, 8.0);
+    let sides = build.room(DVec3::ZERO, DVec3::ONE, 40, 0);
+    let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+    build.quad(DVec3::new(0.35, 0.99, 0.35), 0.3 * x, 0.3 * z, (4, 4), lamp);
+    let (u, v, up) = (0.25 * x + 0.1 * z, 0.25 * z - 0.1 * x, 0.3 * y);
+    let low = DVec3::new(0.45, 0.0, 0.3);
+    build.quad(low + up, v, u, (4, 4), 0);
+    for (corner, along) in [(low, u), (low + u, v), (low + u + v, -u), (low + v, -v)] {
+        build.quad(corner, up, along, (4, 4), 0);
+    }
+    build.weld();
+    let solved = build.solve(&Settings::default());
+    let elements = Elements::new(&build.scene);
+    let mean = solved.mean(&solved.irradiance, 0..solved.area.len());
+    // Wholly under the box, by as much as half a cell.
+    let (mut most, mut sum, mut count) = (0.0_f64, 0.0, 0);
+    for e in sides[0].clone() {
+        let [a, b, c] = build.scene.corners(&build.scene.triangles[e]);
+        let place = |p: DVec3| {
+            let d = p - low;
+            [d.dot(u), d.dot(v)].map(|along| along / u.length_squared())
+        };
+        let within = |p: DVec3| {
+            place(p)
+                .into_iter()
+                .all(|along| (0.0..=1.0).contains(&along))
+        };
+        if [a, b, c].into_iter().all(within) {
+            let share = f64::from(solved.irradiance[e].x) / mean;
+            (most, sum, count) = (most.max(share), sum + share, count + 1);
+        }
+    }
+    assert_eq!(elements.len(), solved.area.len());
+    println!(
+        "{count} elements: mean {:.1e}, most {most:.1e}",
+        sum / f64::from(count)
+    );
+    assert!(count > 100 && sum / f64::from(count) <= UNDER_A_BOX[0] && most <= UNDER_A_BOX[1]);
+}
+
+/// Measured: nothing. Where items at a sharp edge are trusted, 2.2e-2 and 0.24.
+const UNDER_A_BOX: [f64; 2] = [1e-3, 1e-2];
+
 /// Whether a triangle other than two stands between two places (Möller and Trumbore 1997).
 fn blocked(elements: &Elements, p: DVec3, q: DVec3, but: [usize; 2]) -> bool {
     (0..elements.len()).filter(|t| !but.contains(t)).any(|t| {

@@ -61,14 +61,23 @@ const float NEAR = 4.0;
 #endif
 
 #ifdef ITEM_BUFFER
-// Whether an item that a pixel shows leaves p, on a surface with normal n, open to the source's eye.
-bool leaves_open(uint item, ivec2 pixel, vec3 p, vec3 n, Source s) {
+// What an item buffer says of a place.
+const uint HIDDEN_FROM = 0;
+const uint SEEN = 1;
+const uint DOUBTFUL = 2;
+
+// Sine of the angle up to which two surfaces that meet pass for one smooth surface, which does not
+// hide itself a pixel aside. What meets at a sharper edge may hide one from the other.
+const float SMOOTH = 0.35;
+
+// Whether p, on a surface with normal n, is seen from the source's eye where a pixel shows an item.
+uint leaves_open(uint item, ivec2 pixel, vec3 p, vec3 n, Source s) {
     vec4 plane = fetch(planes, item == NONE ? 0 : item);
     float eye_height = dot(plane.xyz, s.eye) - plane.w;
     float height = dot(plane.xyz, p) - plane.w;
     float depth = eye_height >= 0.0 ? -height : height;
     if (depth <= HEIGHT_EPSILON) {
-        return true;
+        return SEEN;
     }
     // The item's plane lies in front of p. It is still the same surface, seen a pixel aside, where
     // the two planes' angle and the distance between the points explain the height.
@@ -84,10 +93,11 @@ bool leaves_open(uint item, ivec2 pixel, vec3 p, vec3 n, Source s) {
     // The item is farther off than p by more than the pixel explains: of two parallel sheets with a
     // thin gap between them, the near one is seen beyond p in half of the pixels.
     if (dot(seen - s.eye, d) > distance_p * (distance_p + REACH * footprint)) {
-        return true;
+        return SEEN;
     }
     float sine = length(cross(n, plane.xyz));
-    return apart <= REACH * footprint && depth <= apart * sine + HEIGHT_EPSILON;
+    bool open = apart <= REACH * footprint && depth <= apart * sine + HEIGHT_EPSILON;
+    return !open ? HIDDEN_FROM : sine <= SMOOTH ? SEEN : DOUBTFUL;
 }
 
 // Whether a place is seen from the source's eye, by its pixel alone.
@@ -96,16 +106,11 @@ bool shown(vec3 p, vec3 n, uint slot, Source s) {
     vec3 local = vec3(dot(d, s.tangent), dot(d, s.bitangent), dot(d, s.normal));
     ivec2 pixel = hemicube_pixel(hemicube_texel(local, face_size), face_size);
     uint item = texelFetch(items, ivec2(slot * face_size, 0) + pixel, 0).r;
-    return item == NONE || leaves_open(item, pixel, p, n, s);
+    return item == NONE || leaves_open(item, pixel, p, n, s) != HIDDEN_FROM;
 }
 
-// What the item buffer says of a place.
-const uint HIDDEN_FROM = 0;
-const uint SEEN = 1;
-const uint DOUBTFUL = 2;
-
-// What the four pixels about p show: it is doubtful where they do not agree. The answer of a lane is
-// the same in any company.
+// What the four pixels about p show: it is doubtful where they do not agree. The answer of a lane
+// is the same in any company.
 uint sight_of(vec3 p, vec3 n, uint element, uint slot, Source s, bool asks) {
     vec3 d = p - s.eye;
     vec3 local = vec3(dot(d, s.tangent), dot(d, s.bitangent), dot(d, s.normal));
@@ -129,16 +134,19 @@ uint sight_of(vec3 p, vec3 n, uint element, uint slot, Source s, bool asks) {
     bool certain = same && (item[0] == NONE || item[0] == element || before);
     uint open = asks && certain ? 1 : 0;
     uint looked = open;
+    bool doubtful = false;
     for (uint k = 0; k < 4; k++) {
         bool looks = asks && !certain;
         // A software device works through what any lane needs.
         if (subgroupBallot(looks) != uvec4(0)) {
-            bool opens = item[k] == NONE || item[k] == element || leaves_open(item[k], pixel[k], p, n, s);
-            open += looks && opens ? 1 : 0;
+            bool own_item = item[k] == NONE || item[k] == element;
+            uint says = own_item ? SEEN : leaves_open(item[k], pixel[k], p, n, s);
+            open += looks && says != HIDDEN_FROM ? 1 : 0;
+            doubtful = doubtful || looks && says == DOUBTFUL;
             looked += looks ? 1 : 0;
         }
     }
-    return open == 0 ? HIDDEN_FROM : open == looked ? SEEN : DOUBTFUL;
+    return open == 0 ? HIDDEN_FROM : open == looked && !doubtful ? SEEN : DOUBTFUL;
 }
 #endif
 

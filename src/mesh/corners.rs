@@ -89,6 +89,10 @@ fn angle(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     u.cross(v).length().atan2(u.dot(v))
 }
 
+/// Of two elements of one plane, the least light of one over the other's with which it is one
+/// light: beneath what stands on it a floor is dark up to an edge.
+const LEAST_ALIKE: f32 = 0.25;
+
 /// What elements about a vertex have light in common there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Joined {
@@ -114,9 +118,18 @@ pub fn corner_irradiance(scene: &Scene, irradiance: &[Vec3], joined: Joined) -> 
             .map(|(e, triangle)| triangle.vertices.map(|v| find(e, v)))
             .collect()
     };
+    let brightness = |e: usize| irradiance[e].max_element();
+    // What is covered is no part of the surface beside it.
+    let about = |e: usize, vertex: u32| {
+        let alike = move |&(other, _): &(usize, f64)| {
+            let (one, other) = (brightness(e), brightness(other));
+            joined == Joined::Smooth || one.min(other) >= LEAST_ALIKE * one.max(other)
+        };
+        corners.within(e, vertex, cosine).filter(alike)
+    };
     let mean = |values: &[Vec3], e: usize, vertex: u32| -> Vec3 {
         let (mut sum, mut weight) = (DVec3::ZERO, 0.0);
-        for (other, angle) in corners.within(e, vertex, cosine) {
+        for (other, angle) in about(e, vertex) {
             sum += values[other].as_dvec3() * angle;
             weight += angle;
         }
@@ -130,13 +143,9 @@ pub fn corner_irradiance(scene: &Scene, irradiance: &[Vec3], joined: Joined) -> 
         .map(|(whole, [a, b, c])| whole - (a + b + c) / 3.0)
         .collect();
     each(&|e, vertex| {
-        let about = || {
-            corners
-                .within(e, vertex, cosine)
-                .map(|(other, _)| irradiance[other])
-        };
-        let low = about().fold(Vec3::INFINITY, Vec3::min);
-        let high = about().fold(Vec3::NEG_INFINITY, Vec3::max);
+        let values = || about(e, vertex).map(|(other, _)| irradiance[other]);
+        let low = values().fold(Vec3::INFINITY, Vec3::min);
+        let high = values().fold(Vec3::NEG_INFINITY, Vec3::max);
         let found = mean(irradiance, e, vertex) + mean(&left, e, vertex);
         found.clamp(low, high)
     })

@@ -10,6 +10,7 @@ pub mod meshlets;
 pub mod meso_vertices;
 pub mod near;
 pub mod occluders;
+pub mod open_eyes;
 pub mod relief;
 pub mod shadow_tree;
 pub mod sources;

@@ -13,7 +13,7 @@ use crate::error::Result;
 use crate::mesh::charts::Connections;
 use crate::mesh::elements::Elements;
 use crate::mesh::meshlets;
-use crate::mesh::near::{NearPairs, PartTree, Rows};
+use crate::mesh::near::{NearPairs, Rows};
 use crate::mesh::occluders::Occluders;
 use crate::mesh::sources::{self, Sources};
 use crate::vk::{Buffer, BufferUse, Commands, Device, Stage};
@@ -126,7 +126,7 @@ impl SceneBuffers {
             weights: upload(device, "weights", &weights, storage)?,
             reflectance: upload(device, "reflectance", &reflectance, storage)?,
             sources: upload(device, "sources", &list, texels)?,
-            eyes: upload(device, "eyes", &eyes(elements, sources, near), texels)?,
+            eyes: upload(device, "eyes", &eyes(sources), texels)?,
             contours: upload(device, "contours", &contours, texels)?,
             meshlets: upload(device, "meshlets", &meshlets, storage)?,
             components: upload(device, "components", &components, storage)?,
@@ -144,19 +144,14 @@ impl SceneBuffers {
 }
 
 /// Places on each source, `[source][SOURCE_EYES]`.
-fn eyes(elements: &Elements, sources: &Sources, near: &NearPairs) -> Vec<[f32; 4]> {
-    let of_source = |(source, tree): (&sources::Source, &PartTree)| {
-        let places = tree.places(elements, source, SOURCE_EYES as usize);
-        places
-            .into_iter()
-            .map(|place| place.as_vec3().extend(0.0).to_array())
+fn eyes(sources: &Sources) -> Vec<[f32; 4]> {
+    let of_source = |source: &sources::Source| {
+        // A point light sees from one place, and so does a source whose light is not cut.
+        let places = (0..SOURCE_EYES as usize).map(|k| source.places.get(k).unwrap_or(&source.eye));
+        let texels = places.map(|place| place.as_vec3().extend(0.0).to_array());
+        texels.collect::<Vec<_>>()
     };
-    sources
-        .list
-        .iter()
-        .zip(&near.trees)
-        .flat_map(of_source)
-        .collect()
+    sources.list.iter().flat_map(of_source).collect()
 }
 
 /// Normal n and n · x, `[element]`.

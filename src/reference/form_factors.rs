@@ -13,6 +13,8 @@ use crate::mesh::sources::Source;
 const HEIGHT_EPSILON: f64 = 1e-6;
 /// Largest distance between two points of one surface, in footprints of a pixel, as in the shader.
 const REACH: f64 = 1.5;
+/// Sine of the angle up to which two surfaces that meet are one smooth surface, as in the shader.
+const SMOOTH: f64 = 0.35;
 
 /// Mean over an element of form factor times visibility: irradiance from a unit of the source's
 /// radiosity. `seen` says whether the source sees a place.
@@ -138,19 +140,20 @@ impl Drawn<'_> {
     /// What the four pixels about a place `p` on an element show.
     pub fn sight(&self, p: DVec3, element: usize) -> Verdict {
         let pixels = pixels_about(self.local(p), self.n);
-        let open = |&pixel: &Pixel| {
-            let item = self.item(pixel);
-            item == NONE || item as usize == element || self.leaves_open(item, pixel, p, element)
-        };
-        match pixels.iter().filter(|pixel| open(pixel)).count() {
-            0 => Verdict::Hidden,
-            4 => Verdict::Seen,
+        let says = pixels.map(|pixel| match self.item(pixel) {
+            NONE => Verdict::Seen,
+            item if item as usize == element => Verdict::Seen,
+            item => self.leaves_open(item, pixel, p, element),
+        });
+        // In front of what they all show, a place is open whatever the pixel.
+        match says {
+            [first, ..] if says.iter().all(|&other| other == first) => first,
             _ => Verdict::Doubtful,
         }
     }
 
-    /// Whether an item that a pixel shows leaves a place on an element open.
-    fn leaves_open(&self, item: u32, pixel: Pixel, p: DVec3, element: usize) -> bool {
+    /// Whether a place on an element is seen where a pixel shows an item.
+    fn leaves_open(&self, item: u32, pixel: Pixel, p: DVec3, element: usize) -> Verdict {
         let Self {
             elements,
             source,
@@ -164,7 +167,7 @@ impl Drawn<'_> {
         let height = (p - on_plane).dot(plane);
         let depth = if eye_height >= 0.0 { -height } else { height };
         if depth <= HEIGHT_EPSILON {
-            return true;
+            return Verdict::Seen;
         }
         let ray = direction_of(pixel, n);
         let ray = source.tangent * ray.x + source.bitangent * ray.y + source.normal * ray.z;
@@ -174,9 +177,15 @@ impl Drawn<'_> {
         let grazing = normal.dot(d).abs().min(plane.dot(d).abs()) / d.length();
         let footprint = d.length() * 2.0 / f64::from(n) / grazing.max(0.05);
         if (seen - source.eye).dot(d) > d.length() * (d.length() + REACH * footprint) {
-            return true;
+            return Verdict::Seen;
         }
-        apart <= REACH * footprint && depth <= apart * normal.cross(plane).length() + HEIGHT_EPSILON
+        let sine = normal.cross(plane).length();
+        let open = apart <= REACH * footprint && depth <= apart * sine + HEIGHT_EPSILON;
+        match open {
+            false => Verdict::Hidden,
+            true if sine <= SMOOTH => Verdict::Seen,
+            true => Verdict::Doubtful,
+        }
     }
 }
 

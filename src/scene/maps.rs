@@ -23,7 +23,7 @@ pub struct HeightMap {
 }
 
 /// Luminance of linear RGB, Rec. 709.
-const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
+pub(super) const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
 
 impl HeightMap {
     /// Reads PNG (8 and 16 bit), JPEG or OpenEXR (with R, G and B). The height is the luminance of

@@ -11,6 +11,7 @@ use crate::mesh::charts::Connections;
 use crate::mesh::elements::Elements;
 use crate::mesh::near::NearPairs;
 use crate::mesh::occluders::Occluders;
+use crate::mesh::open_eyes::open_eyes;
 use crate::mesh::shadow_tree::ShadowTree;
 use crate::mesh::sources::{self, Sources};
 use crate::passes::batch::Hemicubes;
@@ -62,7 +63,7 @@ impl Problem {
                 lights: lights.to_vec(),
             },
         };
-        let (sources, connections) = match kept {
+        let (mut sources, connections) = match kept {
             Some(_) => group(&mut elements, lights, settings, &grouped_by)?,
             None => sources::build(&mut elements, lights, &settings.grouping, settings.seed),
         };
@@ -78,6 +79,7 @@ impl Problem {
         let (occluder_tree, near) = match settings.estimator {
             Estimator::Receiver => {
                 let tree = ShadowTree::new(shadow_occluders(&elements, &connections, &occluders));
+                open_eyes(&elements, &mut sources.list, &tree);
                 let list = &sources.list;
                 let near = match kept {
                     Some(kept) => kept.near(&elements, list)?,

@@ -24,6 +24,7 @@ use crate::mesh::sources::Source;
 use crate::structs::{NearFactor, NearPart, NearVector, ShadowOccluder};
 use pair::Search;
 pub use parts::PartTree;
+pub(super) use rays::blocked;
 use receivers::Receiver;
 
 /// What counts as near.

@@ -14,7 +14,7 @@ const LEAST_WAY: f32 = 1e-18;
 
 /// Whether an occluder crosses the way between two places. One whose plane holds either end does
 /// not.
-pub(super) fn blocked(tree: &ShadowTree<ShadowOccluder>, from: DVec3, to: DVec3) -> bool {
+pub fn blocked(tree: &ShadowTree<ShadowOccluder>, from: DVec3, to: DVec3) -> bool {
     let way = to - from;
     let start = from.as_vec3();
     let short = way.as_vec3();

@@ -129,6 +129,7 @@ pub(super) fn group(
         emitted: emitted.as_vec3(),
         first_element: range.start as u32,
         element_count: range.len() as u32,
+        places: Vec::new(),
         contour: contour(elements, range.clone()),
         component: connections.component[range.start],
     }

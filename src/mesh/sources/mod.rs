@@ -66,6 +66,9 @@ pub struct Source {
     pub kind: u32,
     /// The hemicube's centre: on the surface, or at the point light.
     pub eye: DVec3,
+    /// Places on it, evenly by area, from which silhouettes cut it; none before
+    /// [`crate::mesh::open_eyes`].
+    pub places: Vec<DVec3>,
     /// Centroid of the area.
     pub centroid: DVec3,
     /// Mean normal, and the hemicube's other two axes.

@@ -34,6 +34,7 @@ pub(super) fn part(
         emitted: elements.emitted[e],
         first_element: e as u32,
         element_count: 1,
+        places: Vec::new(),
         contour: vec![triangle.to_vec()],
         component: connections.component[e],
     }
@@ -68,6 +69,7 @@ pub(super) fn point(light: &PointLight, elements: &Elements) -> [Source; 2] {
             .as_vec3(),
         first_element: 0,
         element_count: 0,
+        places: Vec::new(),
         contour: Vec::new(),
         component: NONE,
     };

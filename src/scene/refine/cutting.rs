@@ -19,41 +19,47 @@ pub(super) struct Cutting {
 }
 
 impl Cutting {
-    /// Cuts a scene until every triangle is fine enough. None where there would be more than `most`
-    /// triangles.
-    pub fn of(input: &Scene, is_fine: impl Fn(&Self, usize) -> bool, most: usize) -> Option<Scene> {
+    pub fn new(input: &Scene) -> Self {
         let count = input.triangles.len() as u32;
-        let mut cutting = Self {
+        Self {
             scene: input.clone(),
             on_input: (0..count).map(OnInput::whole).collect(),
             about: HashMap::new(),
             middles: HashMap::new(),
-        };
-        let mut wanted: Vec<u32> = (0..count)
-            .filter(|&t| !is_fine(&cutting, t as usize))
-            .collect();
-        if !wanted.is_empty() {
-            (0..count).for_each(|t| cutting.enter(t));
         }
+    }
+
+    /// Cuts until every triangle is fine enough; false where there would be more than `most`.
+    pub fn until(&mut self, is_fine: impl Fn(&Self, usize) -> bool, most: usize) -> bool {
+        let all = 0..self.scene.triangles.len() as u32;
+        let mut wanted: Vec<u32> = all.filter(|&t| !is_fine(self, t as usize)).collect();
         while let Some(t) = wanted.pop() {
-            if cutting.scene.triangles.len() > most {
-                return None;
+            if self.scene.triangles.len() > most {
+                return false;
             }
-            if !is_fine(&cutting, t as usize) {
-                cutting.cut(t, &mut wanted);
+            if !is_fine(self, t as usize) {
+                self.cut(t, &mut wanted);
             }
         }
-        let mut scene = cutting.scene;
+        true
+    }
+
+    pub fn into_scene(self, input: &Scene) -> Scene {
+        let mut scene = self.scene;
         scene.refined_from = Some(RefinedFrom {
             hash: input.hash(),
-            on_input: cutting.on_input,
+            on_input: self.on_input,
         });
-        Some(scene)
+        scene
     }
 
     /// Cuts a triangle through the middle of its longest edge, with all that share the edge, after
     /// those have been cut of which it is not the longest.
-    fn cut(&mut self, first: u32, wanted: &mut Vec<u32>) {
+    /// Those that changed are added to `changed`.
+    pub fn cut(&mut self, first: u32, changed: &mut Vec<u32>) {
+        if self.about.is_empty() {
+            (0..self.scene.triangles.len() as u32).for_each(|t| self.enter(t));
+        }
         let mut stack = vec![first];
         while let Some(&t) = stack.last() {
             let edge = self.longest_edge(t);
@@ -69,7 +75,7 @@ impl Cutting {
             let middle = self.middle(edge);
             for t in all {
                 let half = self.halve(t, edge, middle);
-                wanted.extend([t, half]);
+                changed.extend([t, half]);
             }
         }
     }

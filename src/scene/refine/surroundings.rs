@@ -9,17 +9,17 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::{Boundable, BvhBuildParams};
 
-use super::{LEAST, LEAST_OF_SHELL, Scene};
+use super::{LEAST, Scene};
 
 /// Surfaces about a place.
 pub(super) struct Surroundings {
-    bvh: Bvh2,
+    pub bvh: Bvh2,
     /// Of each triangle of the input: its shell, which holds all that it is joined to.
     shell: Vec<u32>,
     /// Diagonal of the box of each shell.
     diagonals: Vec<f64>,
     /// Height above a plane below which a place lies in it.
-    flat: f64,
+    pub flat: f64,
 }
 
 struct Bounds([DVec3; 3]);
@@ -70,9 +70,9 @@ impl Surroundings {
         self.diagonals[self.shell[input] as usize]
     }
 
-    /// The size of a triangle on triangle `input` that what lies in front of it asks for, `size` at
+    /// The size of a triangle that what lies in front of it asks for, `size` at
     /// most: no longer than other surfaces are off.
-    pub fn size_at(&self, scene: &Scene, input: usize, [a, b, c]: [DVec3; 3], size: f64) -> f64 {
+    pub fn size_at(&self, scene: &Scene, [a, b, c]: [DVec3; 3], size: f64) -> f64 {
         let middle = (a + b + c) / 3.0;
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let mut found = size;
@@ -94,13 +94,9 @@ impl Surroundings {
             for &o in &self.bvh.primitive_indices[first..first + node.prim_count as usize] {
                 let o = o as usize;
                 let other = scene.corners(&scene.triangles[o]);
-                let least = match self.shell[o] == self.shell[input] {
-                    true => LEAST_OF_SHELL,
-                    false => LEAST,
-                };
                 if self.faces(middle, normal, other) {
                     let distance = middle.distance(nearest(middle, other));
-                    found = found.min(distance.max(least * size));
+                    found = found.min(distance.max(LEAST * size));
                 }
             }
         }

@@ -1,0 +1,87 @@
+//! Eyes of sources that are partly covered: what lies under another surface is dark, and the light
+//! of a source comes from the rest of it.
+
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::elements::Elements;
+use super::near::{PartTree, blocked};
+use super::shadow_tree::ShadowTree;
+use super::sources::Source;
+use crate::constants::{KIND_POINT, SOURCE_EYES};
+use crate::structs::ShadowOccluder;
+
+/// Directions that a place looks in, evenly by what a surface receives from them.
+const LOOKS: usize = 8;
+
+/// How far it looks, in radii of its source.
+const REACH: f64 = 1.0;
+
+/// Over the places of a source: those among which open ones are looked for where some are covered.
+const MORE: usize = 8;
+
+/// Golden angle.
+const TURN: f64 = 2.399_963_23;
+
+/// Gives each surface source [`Source::places`], and moves an eye that is covered, both to places
+/// that are as open as others of the source. How many eyes were moved.
+pub fn open_eyes(
+    elements: &Elements,
+    sources: &mut [Source],
+    occluders: &ShadowTree<ShadowOccluder>,
+) -> usize {
+    let moved = sources.par_iter_mut().map(|source| {
+        if source.kind == KIND_POINT {
+            return 0;
+        }
+        let tree = PartTree::of(elements, source);
+        let count = SOURCE_EYES as usize;
+        source.places = tree.places(elements, source, count);
+        if source.element_count == 1 {
+            return 0;
+        }
+        let open = |place: DVec3| openness(source, place, occluders);
+        let most = LOOKS / 2;
+        let covered = |place: &DVec3| open(*place) < most;
+        let eye = covered(&source.eye);
+        if !eye && !source.places.iter().any(covered) {
+            return 0;
+        }
+        let places = tree.places(elements, source, MORE * count);
+        let openness: Vec<usize> = places.iter().map(|&place| open(place)).collect();
+        let best = openness.iter().copied().max().unwrap_or(0);
+        let open: Vec<DVec3> = (places.iter().zip(&openness))
+            .filter(|(_, open)| 2 * **open >= best)
+            .map(|(&place, _)| place)
+            .collect();
+        let nearest = |to: DVec3| {
+            let distance = |place: &&DVec3| place.distance_squared(to);
+            open.iter()
+                .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+                .copied()
+        };
+        let middle = open.iter().sum::<DVec3>() / open.len() as f64;
+        let moved = eye && best >= most;
+        if let Some(place) = nearest(middle).filter(|_| moved) {
+            source.eye = place;
+        }
+        let spread = |k: usize| open[(2 * k + 1) * open.len() / (2 * count)];
+        source.places = (0..count).map(spread).collect();
+        usize::from(moved)
+    });
+    moved.sum()
+}
+
+/// Directions, of [`LOOKS`], in which a place on a source sees as far as the source is wide.
+fn openness(source: &Source, place: DVec3, occluders: &ShadowTree<ShadowOccluder>) -> usize {
+    let is_open = |k: &usize| {
+        let r = ((*k as f64 + 0.5) / LOOKS as f64).sqrt();
+        let (sin, cos) = (TURN * *k as f64 % TAU).sin_cos();
+        let up = (1.0 - r * r).sqrt();
+        let way = r * cos * source.tangent + r * sin * source.bitangent + up * source.normal;
+        !blocked(occluders, place, place + REACH * source.radius * way)
+    };
+    (0..LOOKS).filter(is_open).count()
+}
