@@ -169,7 +169,7 @@ impl NearLight {
 
     /// What relief is to receive of each part since the last time, `[part]`: what parts send, in
     /// place of what the row of their source has brought from the direction of its middle.
-    pub fn to_relief(&mut self, on: &Problem, sent: &[Option<Sent>]) -> ByLight<Vec<Vec3>> {
+    pub fn send_to_relief(&mut self, on: &Problem, sent: &[Option<Sent>]) -> ByLight<Vec<Vec3>> {
         let mut whole = self.beyond.clone();
         for near in &self.sources {
             let Some(sent) = sent[near.source] else {

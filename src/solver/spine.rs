@@ -343,7 +343,7 @@ impl Spine {
         let most = UNSETTLED * on.settings.residual * mean;
         let sent = self.ledger.sent();
         self.near.solve(on, &brought, &sent, most);
-        self.gathering.near(&self.near.to_relief(on, &sent))?;
+        self.gathering.near(&self.near.send_to_relief(on, &sent))?;
         let moved = self.take_near(on);
         report.seconds.near += start.elapsed().as_secs_f64();
         report.near.sweeps = self.near.sweeps;
