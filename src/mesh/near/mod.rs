@@ -9,6 +9,7 @@
 mod lists;
 mod pair;
 mod parts;
+mod places;
 mod rays;
 mod receivers;
 mod seen;
@@ -24,6 +25,7 @@ use crate::mesh::sources::Source;
 use crate::structs::{NearFactor, NearPart, NearVector, ShadowOccluder};
 use pair::Search;
 pub use parts::PartTree;
+pub use places::Outlook;
 pub(super) use rays::blocked;
 use receivers::Receiver;
 

@@ -47,19 +47,26 @@ struct Before<'a> {
 }
 
 /// Room for the members and the parts of a source, `[member]` and `[part]`.
-struct Room {
+pub(super) struct Room {
     factors: Vec<f64>,
     sums: Vec<f64>,
+}
+
+impl Room {
+    /// For sources of so many members at most.
+    pub fn of(members: usize) -> Self {
+        Self {
+            factors: vec![0.0; members],
+            sums: vec![0.0; (2 * members).saturating_sub(1)],
+        }
+    }
 }
 
 impl Search<'_> {
     pub fn source(&self, source: &Source, receivers: &[Receiver]) -> OfSource {
         let seen = Seen::new(self.elements, source);
         let mut found = OfSource::default();
-        let mut room = Room {
-            factors: vec![0.0; seen.members.len()],
-            sums: vec![0.0; seen.tree.part_count()],
-        };
+        let mut room = Room::of(seen.members.len());
         // Where it is seen under that share of a view at most, however it is turned.
         let reach =
             (source.area / (std::f64::consts::PI * self.nearness.source)).sqrt() + source.radius;
@@ -165,26 +172,15 @@ impl Search<'_> {
         let (elements, seen) = (self.elements, before.seen);
         let e = before.element;
         let first = found.entries.len();
-        let mut stack = vec![seen.tree.whole()];
-        while let Some(part) = stack.pop() {
-            let all = sums[part.index];
-            if all <= 0.0 {
-                continue;
-            }
-            if all > self.nearness.part && part.count > 1 {
-                stack.extend(part.halves());
-                continue;
-            }
-            let factor = self.seen_factor(before, part, &mut found.rays);
-            if factor > 0.0 {
-                let factor = match elements.is_meso(e) {
-                    true => self.by_direction(before, part, factor),
-                    false => Vec3::new(0.0, 0.0, factor as f32),
-                };
-                let part = part.index as u32;
-                found.entries.push(NearPart { factor, part });
-            }
-        }
+        let OfSource { entries, rays, .. } = found;
+        self.seen_parts(before, sums, rays, |part, factor| {
+            let factor = match elements.is_meso(e) {
+                true => self.by_direction(before, part, factor),
+                false => Vec3::new(0.0, 0.0, factor as f32),
+            };
+            let part = part.index as u32;
+            entries.push(NearPart { factor, part });
+        });
         let entries = &mut found.entries[first..];
         let whole: DVec3 = entries.iter().map(|entry| entry.factor.as_dvec3()).sum();
         let size = as_kept(whole.length() as f32);
@@ -209,6 +205,59 @@ impl Search<'_> {
             factor,
             entries: (found.entries.len() - first) as u32,
         });
+    }
+
+    /// Each part that a receiver sees any of, with its form factor.
+    fn seen_parts(
+        &self,
+        before: &Before,
+        sums: &[f64],
+        rays: &mut u64,
+        mut each: impl FnMut(Part, f64),
+    ) {
+        let mut stack = vec![before.seen.tree.whole()];
+        while let Some(part) = stack.pop() {
+            let all = sums[part.index];
+            if all <= 0.0 {
+                continue;
+            }
+            if all > self.nearness.part && part.count > 1 {
+                stack.extend(part.halves());
+                continue;
+            }
+            let factor = self.seen_factor(before, part, rays);
+            if factor > 0.0 {
+                each(part, factor);
+            }
+        }
+    }
+
+    /// What a place sees of a source: each part with its form factor.
+    pub fn from_place(
+        &self,
+        place: DVec3,
+        normal: DVec3,
+        seen: &Seen,
+        room: &mut Room,
+        each: impl FnMut(Part, f64),
+    ) {
+        if (seen.middle - place).dot(normal) <= -seen.radius {
+            return;
+        }
+        for (member, factor) in seen.members.iter().zip(&mut room.factors) {
+            *factor = member.form_factor(place, normal);
+        }
+        if sum_parts(seen.tree.whole(), &room.factors, &mut room.sums) <= 0.0 {
+            return;
+        }
+        let before = Before {
+            element: usize::MAX,
+            normal,
+            samples: &[(place, 1.0)],
+            seen,
+            factors: &room.factors,
+        };
+        self.seen_parts(&before, &room.sums, &mut 0, each);
     }
 
     /// A form factor to a part as a vector in the frame of an element with relief.

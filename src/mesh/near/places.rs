@@ -1,0 +1,104 @@
+//! What any place sees of all sources, part by part.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::pair::{Room, Search};
+use super::parts::Part;
+use super::rays::blocked;
+use super::seen::Seen;
+use super::{Nearness, PartTree};
+use crate::constants::KIND_POINT;
+use crate::mesh::elements::Elements;
+use crate::mesh::shadow_tree::ShadowTree;
+use crate::mesh::sources::Source;
+use crate::structs::ShadowOccluder;
+
+/// Of the view of a place: the share that a part fills at most, unless it is one member.
+const PART: f64 = 1.0 / 192.0;
+
+/// The sources of a scene, to be looked at from places.
+pub struct Outlook<'a> {
+    search: Search<'a>,
+    sources: &'a [Source],
+    /// `[source]`; none of a point light.
+    seen: Vec<Option<Seen>>,
+    most_members: usize,
+}
+
+/// Room for the members of one source after another.
+pub struct Looking(Room);
+
+impl<'a> Outlook<'a> {
+    pub fn new(
+        elements: &'a Elements,
+        sources: &'a [Source],
+        occluders: &'a ShadowTree<ShadowOccluder>,
+    ) -> Self {
+        let seen = |source: &Source| match source.kind {
+            KIND_POINT => None,
+            _ => Some(Seen::new(elements, source)),
+        };
+        let counts = sources.iter().map(|source| source.element_count as usize);
+        Self {
+            search: Search {
+                elements,
+                occluders,
+                nearness: Nearness {
+                    source: 0.0,
+                    part: PART,
+                },
+            },
+            sources,
+            seen: sources.par_iter().map(seen).collect(),
+            most_members: counts.max().unwrap_or(0),
+        }
+    }
+
+    pub fn looking(&self) -> Looking {
+        Looking(Room::of(self.most_members))
+    }
+
+    /// The parts of a source, if it is a surface.
+    pub fn tree(&self, source: usize) -> Option<&PartTree> {
+        self.seen[source].as_ref().map(|seen| &seen.tree)
+    }
+
+    /// Each part of a surface that a place with this normal sees any of: source, part and form
+    /// factor. Internal units.
+    pub fn parts(
+        &self,
+        place: DVec3,
+        normal: DVec3,
+        looking: &mut Looking,
+        mut each: impl FnMut(usize, Part, f64),
+    ) {
+        for (s, seen) in self.seen.iter().enumerate() {
+            if let Some(seen) = seen {
+                let room = &mut looking.0;
+                let part = |part: Part, factor: f64| each(s, part, factor);
+                self.search.from_place(place, normal, seen, room, part);
+            }
+        }
+    }
+
+    /// Each point light that a place sees: source, and irradiance for a unit of intensity.
+    pub fn points(&self, place: DVec3, normal: DVec3, mut each: impl FnMut(usize, f64)) {
+        for (s, source) in self.sources.iter().enumerate() {
+            let way = source.eye - place;
+            let cosine = way.dot(normal);
+            let side = -way.dot(source.normal);
+            // Each of the two sources of a point light serves its own side; the upper one has the
+            // plane between them.
+            let is_upper = source.cone == 0.0;
+            let serves = side > 0.0 || is_upper && side == 0.0;
+            if source.kind == KIND_POINT
+                && serves
+                && cosine > 0.0
+                && !blocked(self.search.occluders, place, source.eye)
+            {
+                each(s, cosine / way.length().powi(3));
+            }
+        }
+    }
+}
