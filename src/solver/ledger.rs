@@ -2,11 +2,15 @@
 
 use glam::{DVec3, Vec3};
 
+use super::Problem;
+use super::coupling::{CouplingRow, Targets};
 use super::gather::LitRow;
 use super::near::Sent;
 use super::progress::Bound;
+use super::rows::looks_closer;
 use super::system::System;
 use crate::passes::types::KeptRow;
+use crate::vk::Device;
 
 /// The system of the sources, and how far the elements have its light.
 pub(super) struct Ledger {
@@ -52,7 +56,54 @@ const UNGATHERED: f64 = 0.04;
 /// About the share of a relief's light that leaves in other directions than if it left evenly.
 const UNEVEN: f64 = 0.1;
 
+/// How often the importance of sources is lowered before the first is drawn, for those with rows.
+const RESTORED_WEIGHINGS: usize = 8;
+
 impl Ledger {
+    /// Begins with the rows that there are, and with what is known of their coupling, by source and
+    /// number of words.
+    pub fn new(
+        device: &Device,
+        on: &Problem,
+        bound: Bound,
+        row: impl Fn(usize) -> Option<KeptRow>,
+        mut coupling: impl FnMut(usize, usize) -> Option<CouplingRow>,
+    ) -> Self {
+        let list = &on.sources.list;
+        let targets = Targets::new(&on.elements, list);
+        let words = targets.words();
+        let memory = on.settings.coupling_memory;
+        let mut system = System::new(targets, list, memory, bound.importance());
+        let looks = looks_closer(device, &on.settings);
+        let drawn = |(s, strong): (usize, bool)| Drawn {
+            strong: looks && strong,
+            relief: on.sources.relief.contains(&s),
+            row: row(s),
+            ..Drawn::default()
+        };
+        let sources: Vec<Drawn> = on.strong().into_iter().enumerate().map(drawn).collect();
+        for (s, drawn) in sources.iter().enumerate() {
+            if drawn.row.is_some() {
+                system.draw(s, coupling(s, words));
+            }
+        }
+        let mut ledger = Self {
+            system,
+            sources,
+            bound,
+        };
+        (0..RESTORED_WEIGHINGS).for_each(|_| ledger.weigh(on));
+        ledger
+    }
+
+    /// Lowers the importance of sources. Relief may send to other places than its row says, which
+    /// is of even light, and may reflect more of what it receives.
+    pub fn weigh(&mut self, on: &Problem) {
+        if on.relief.is_none() {
+            self.system.weigh();
+        }
+    }
+
     /// Sources that are to be drawn, with their unshot power, and whether they are strong: the
     /// strong emitters; after them all others, until little is left; and then what still emits.
     pub fn undrawn(&self) -> Option<Candidates> {

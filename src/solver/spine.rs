@@ -9,14 +9,13 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use super::coupling::{CouplingRow, Targets};
+use super::coupling::CouplingRow;
 use super::gather::{Gathering, LitRow};
 use super::ledger::{Candidates, Drawn, Ledger};
 use super::makers::{Batch, TeamParts};
 use super::near::NearLight;
 use super::progress::{Bound, Watch};
-use super::rows::{Factors, Made, looks_closer};
-use super::system::System;
+use super::rows::{Factors, Made};
 use super::team::Team;
 use super::visibility::Visibility;
 use super::{DrawnBatch, Problem, Report, StopReason, VISIBILITY_MEMORY};
@@ -74,9 +73,6 @@ const MOST_SWEEPS: usize = 1000;
 /// Over what may be missing, what is missing when the importance of sources is first lowered.
 const NEAR_THE_END: f64 = 8.0;
 
-/// How often the importance of sources is lowered before the first is drawn, for those with rows.
-const RESTORED_WEIGHINGS: usize = 8;
-
 /// Times that light is measured and corrected, at most.
 const CORRECTIONS: u32 = 50;
 
@@ -110,7 +106,7 @@ impl Spine {
             brought: true,
             devices: devices.to_vec(),
             team: None,
-            ledger: ledger(device, on, bound, rows, coupling),
+            ledger: Ledger::new(device, on, bound, rows, coupling),
             kept,
         })
     }
@@ -131,7 +127,7 @@ impl Spine {
         let coupling = |s, _| before.system.take_row(s);
         self.near.relight(on);
         self.brought = true;
-        self.ledger = ledger(&self.devices[0], on, bound, |s| rows[s], coupling);
+        self.ledger = Ledger::new(&self.devices[0], on, bound, |s| rows[s], coupling);
         // Other devices hold lights where they were, and those that were drawn first may have been
         // all that emitted strongly.
         let to_draw = |drawn: &Drawn| drawn.strong && drawn.row.is_none();
@@ -256,7 +252,7 @@ impl Spine {
             self.solve(most, ORDERING_SWEEPS, report);
             // Importance matters once the end is near.
             if self.ledger.missing() <= NEAR_THE_END * self.ledger.bound.most_missing() {
-                weigh(&mut self.ledger, on);
+                self.ledger.weigh(on);
             }
         }
         Ok(true)
@@ -460,49 +456,5 @@ impl Spine {
     /// The last rows that were gathered with their light, for comparison with the twins.
     pub fn gathered_slots(&self, count: usize) -> Result<Vec<crate::passes::types::Slot>> {
         self.gathering.slots(count)
-    }
-}
-
-/// A solution that begins with the rows that there are, and with what is known of their coupling,
-/// by source and number of words.
-fn ledger(
-    device: &Device,
-    on: &Problem,
-    bound: Bound,
-    row: impl Fn(usize) -> Option<KeptRow>,
-    mut coupling: impl FnMut(usize, usize) -> Option<CouplingRow>,
-) -> Ledger {
-    let list = &on.sources.list;
-    let targets = Targets::new(&on.elements, list);
-    let words = targets.words();
-    let memory = on.settings.coupling_memory;
-    let mut system = System::new(targets, list, memory, bound.importance());
-    let looks = looks_closer(device, &on.settings);
-    let drawn = |(s, strong): (usize, bool)| Drawn {
-        strong: looks && strong,
-        relief: on.sources.relief.contains(&s),
-        row: row(s),
-        ..Drawn::default()
-    };
-    let sources: Vec<Drawn> = on.strong().into_iter().enumerate().map(drawn).collect();
-    for (s, drawn) in sources.iter().enumerate() {
-        if drawn.row.is_some() {
-            system.draw(s, coupling(s, words));
-        }
-    }
-    let mut ledger = Ledger {
-        system,
-        sources,
-        bound,
-    };
-    (0..RESTORED_WEIGHINGS).for_each(|_| weigh(&mut ledger, on));
-    ledger
-}
-
-/// Lowers the importance of sources. Relief may send to other places than its row says, which is of
-/// even light, and may reflect more of what it receives.
-fn weigh(ledger: &mut Ledger, on: &Problem) {
-    if on.relief.is_none() {
-        ledger.system.weigh();
     }
 }
