@@ -59,8 +59,8 @@ pub struct Options {
     /// Most seconds of a bake
     #[arg(long, value_name = "SECONDS", default_value_t = 120.0)]
     limit: f64,
-    /// Most seconds of the places of one measurement of another method
-    #[arg(long, value_name = "SECONDS", default_value_t = 20.0)]
+    /// Most seconds of one measurement of another method, at as many places as a bake has elements
+    #[arg(long, value_name = "SECONDS", default_value_t = 120.0)]
     peer_limit: f64,
     /// Leave out instant radiosity, the path tracer and Mitsuba
     #[arg(long)]

@@ -1,8 +1,8 @@
 //! The same irradiance by other methods: the path tracer, instant radiosity, and Mitsuba 3 where it
 //! is installed.
 //!
-//! They compute only the places, a small part of the elements. Their time is scaled to all
-//! elements; work that is done once, such as tracing light paths, counts once.
+//! They compute the centroid of every element, as a bake does, and take the time that this takes;
+//! errors are compared at the reference's places.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -41,27 +41,25 @@ pub(super) struct Job<'a> {
     pub scene: &'a Scene,
     pub fine: &'a Scene,
     pub truth: &'a Truth,
-    /// No measurement is begun that would probably take longer for the places.
+    /// No measurement is begun that would probably take longer.
     pub limit: Duration,
 }
 
 impl Job<'_> {
-    /// Number of elements per place.
-    fn share(&self) -> f64 {
-        self.scene.triangles.len() as f64 / self.truth.triangles.len() as f64
-    }
-
+    /// Of irradiance `found` at every element, `[triangle]`.
     fn row(&self, method: Method, paths: u32, seconds: f64, found: &[Vec3]) -> Row {
+        let at_places = self.truth.at_places(found);
         Row {
             paths: Some(paths),
             seconds,
-            ..Row::new(method, Measure::new(found, self.truth))
+            ..Row::new(method, Measure::new(&at_places, self.truth))
         }
     }
 
-    fn each(&self, find: impl Fn(usize, usize) -> Vec3 + Sync) -> Vec<Vec3> {
-        let places = self.truth.triangles.par_iter().enumerate();
-        places.map(|(i, &e)| find(i, e)).collect()
+    /// Irradiance at every element.
+    fn each(&self, find: impl Fn(usize) -> Vec3 + Send + Sync) -> Vec<Vec3> {
+        let elements = 0..self.scene.triangles.len();
+        elements.into_par_iter().map(find).collect()
     }
 
     /// The project's own path tracer.
@@ -72,15 +70,15 @@ impl Job<'_> {
         let mut paths = FIRST_PATHS;
         loop {
             let turn = Instant::now();
-            let found = self.each(|i, e| {
+            let found = self.each(|e| {
                 let (place, normal) = place_of(self.scene, e);
-                let seed = SEED | i as u64;
+                let seed = SEED | e as u64;
                 tracer
                     .irradiance(place, normal, paths, seed, Light::Global)
                     .0
             });
             let taken = turn.elapsed();
-            let seconds = once + self.share() * taken.as_secs_f64();
+            let seconds = once + taken.as_secs_f64();
             add(self.row(Method::PathTracer, paths, seconds, &found));
             paths *= 4;
             if 4 * taken > self.limit || paths > MOST_PATHS || !go_on() {
@@ -104,12 +102,12 @@ impl Job<'_> {
             let lights = VirtualLights::new(&tracer, paths, SEED);
             let once = built + turn.elapsed().as_secs_f64();
             let turn = Instant::now();
-            let found = self.each(|_, e| {
+            let found = self.each(|e| {
                 let (place, normal) = place_of(self.scene, e);
                 lights.irradiance(place, normal)
             });
             let taken = turn.elapsed();
-            let seconds = once + self.share() * taken.as_secs_f64();
+            let seconds = once + taken.as_secs_f64();
             add(self.row(Method::InstantRadiosity, paths, seconds, &found));
             paths *= 4;
             if 4 * taken > self.limit || paths > MOST_PATHS || !go_on() {
@@ -157,11 +155,10 @@ impl Job<'_> {
                 .into_iter()
                 .map(Vec3::from_array)
                 .collect();
-            if found.len() != self.truth.triangles.len() {
+            if found.len() != self.scene.triangles.len() {
                 return Ok(Some("not one answer for each place".into()));
             }
-            let seconds = self.share() * answer.seconds;
-            add(self.row(Method::Mitsuba, answer.paths, seconds, &found));
+            add(self.row(Method::Mitsuba, answer.paths, answer.seconds, &found));
         }
         let said = String::from_utf8_lossy(&output.stderr);
         let last = said.lines().rfind(|line| !line.trim().is_empty());
@@ -208,7 +205,7 @@ struct Answer {
 
 impl Ask {
     fn new(job: &Job<'_>) -> Self {
-        let places = job.truth.triangles.iter().map(|&e| place_of(job.scene, e));
+        let places = (0..job.scene.triangles.len()).map(|e| place_of(job.scene, e));
         let (places, normals) = places.map(|(p, n)| (p.to_array(), n.to_array())).unzip();
         let paths = std::iter::successors(Some(FIRST_PATHS), |p| p.checked_mul(4));
         Self {

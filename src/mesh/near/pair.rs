@@ -233,7 +233,7 @@ impl Search<'_> {
     }
 
     /// What a place sees of a source: each part with its form factor.
-    pub fn from_place(
+    pub fn seen_from(
         &self,
         place: DVec3,
         normal: DVec3,

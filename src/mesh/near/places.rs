@@ -77,7 +77,7 @@ impl<'a> Outlook<'a> {
             if let Some(seen) = seen {
                 let room = &mut looking.0;
                 let part = |part: Part, factor: f64| each(s, part, factor);
-                self.search.from_place(place, normal, seen, room, part);
+                self.search.seen_from(place, normal, seen, room, part);
             }
         }
     }
