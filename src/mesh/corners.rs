@@ -93,6 +93,10 @@ fn angle(a: DVec3, b: DVec3, c: DVec3) -> f64 {
 /// light: beneath what stands on it a floor is dark up to an edge.
 const LEAST_ALIKE: f32 = 0.25;
 
+/// Of the elements about a vertex, the least light of one over the brightest's with which it counts
+/// in pictures: what is covered is not seen, and would darken what it is joined to.
+const LEAST_OPEN: f32 = 0.02;
+
 /// What elements about a vertex have light in common there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Joined {
@@ -121,11 +125,18 @@ pub fn corner_irradiance(scene: &Scene, irradiance: &[Vec3], joined: Joined) -> 
     let brightness = |e: usize| irradiance[e].max_element();
     // What is covered is no part of the surface beside it.
     let about = |e: usize, vertex: u32| {
-        let alike = move |&(other, _): &(usize, f64)| {
-            let (one, other) = (brightness(e), brightness(other));
-            joined == Joined::Smooth || one.min(other) >= LEAST_ALIKE * one.max(other)
+        let all = || corners.within(e, vertex, cosine);
+        let brightest = all()
+            .map(|(other, _)| brightness(other))
+            .fold(0.0, f32::max);
+        let alike = move |&(other, _): &(usize, f64)| match joined {
+            Joined::Smooth => brightness(other) >= LEAST_OPEN * brightest,
+            Joined::Plane => {
+                let (one, other) = (brightness(e), brightness(other));
+                one.min(other) >= LEAST_ALIKE * one.max(other)
+            }
         };
-        corners.within(e, vertex, cosine).filter(alike)
+        all().filter(alike)
     };
     let mean = |values: &[Vec3], e: usize, vertex: u32| -> Vec3 {
         let (mut sum, mut weight) = (DVec3::ZERO, 0.0);
