@@ -67,8 +67,8 @@ struct Builtin {
     /// Built-in scenes: this mesh as the statue
     #[arg(long, value_name = "MESH.obj")]
     statue: Option<PathBuf>,
-    /// Cut triangles whose edges are longer than this, in scene units, and where other surfaces are
-    /// close, shorter ones [default: by the area of the scene; built-in scenes are not cut]
+    /// Cut triangles whose edges are longer than this, in scene units, and shorter ones where
+    /// surfaces are close or shadows end [default: by the scene's area; built-in scenes are not cut]
     #[arg(long, value_name = "X")]
     element_size: Option<f64>,
     /// Cut to no more triangles than this

@@ -71,6 +71,17 @@ pub fn sample_points(near: bool, touching: bool) -> &'static [[f64; 3]] {
     }
 }
 
+/// Barycentric coordinates (weights of the second and third corner) of the k-th of places that
+/// spread evenly in a triangle: the R₂ sequence (Roberts 2018), folded.
+pub fn spread_in_triangle(k: usize) -> [f64; 2] {
+    const STEPS: [f64; 2] = [0.754_877_666_246_693, 0.569_840_290_998_053];
+    let [u, v] = STEPS.map(|step| (0.5 + step * k as f64).fract());
+    match u + v > 1.0 {
+        true => [1.0 - u, 1.0 - v],
+        false => [u, v],
+    }
+}
+
 const POINTS: [[f64; 3]; 11] = [
     [1.0 / 3.0, 1.0 / 3.0, 1.0],
     [1.0 / 6.0, 1.0 / 6.0, 1.0 / 3.0],

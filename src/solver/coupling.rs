@@ -1,6 +1,7 @@
 //! How much of what a source sends each other source reflects:
 //! G[s,t] = Σ_{j∈t} ρ_j w_j F_js / A_t, by colour, where F_js is the form factor from element j to
-//! source s, and w_j its area as it counts in its source's mean. One sparse row a source, found while its form factors are at hand.
+//! source s, and w_j its area as it counts in its source's mean. One sparse row a source, found
+//! while its form factors are at hand.
 //!
 //! A target whose members have one reflectance takes one number a pair, its mean form factor
 //! Σ w_j F_js / A_t; the reflectance is applied to the sum over all sources. Any other takes three.

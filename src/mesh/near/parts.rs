@@ -2,11 +2,9 @@
 
 use glam::DVec3;
 
+use crate::math::form_factor::spread_in_triangle;
 use crate::mesh::elements::Elements;
 use crate::mesh::sources::Source;
-
-/// Steps of the R₂ sequence (Roberts 2018).
-const R2: [f64; 2] = [0.754_877_666_246_693, 0.569_840_290_998_053];
 
 /// A binary tree over the members of a source, in depth-first order: part 0 is the whole source. A
 /// part of `count` members from `first` on has the first half of them as its next part, and the
@@ -79,13 +77,7 @@ impl PartTree {
                 m += 1;
             }
             let [a, b, c] = triangle(self.members[m]);
-            // The R₂ sequence, folded into the triangle.
-            let [u, v] = R2.map(|step| (0.5 + step * k as f64).fract());
-            let [u, v] = if u + v > 1.0 {
-                [1.0 - u, 1.0 - v]
-            } else {
-                [u, v]
-            };
+            let [u, v] = spread_in_triangle(k);
             places.push(a + u * (b - a) + v * (c - a));
         }
         places

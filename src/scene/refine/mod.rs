@@ -128,9 +128,15 @@ impl Scene {
                 size *= COARSER;
                 continue;
             }
-            if let Some(shadows) = Shadows::new(self, &surroundings) {
-                let even = 4.0 * area / (size * size);
-                let most = most.min((MOST_FOR_SHADOWS * even) as usize);
+            let even = 4.0 * area / (size * size);
+            let most_for_shadows = most.min((MOST_FOR_SHADOWS * even) as usize);
+            // A mesh that is as fine already is not looked at.
+            let has_room = cutting.scene.triangles.len() < most_for_shadows;
+            if let Some(shadows) = has_room
+                .then(|| Shadows::new(self, &surroundings))
+                .flatten()
+            {
+                let most = most_for_shadows;
                 cut_shadows(&mut cutting, &shadows, size, most);
             }
             let mut cut = cutting.into_scene(self);

@@ -6,13 +6,11 @@ use obvhs::ray::Ray;
 use super::cutting::Cutting;
 use super::surroundings::Surroundings;
 use super::{Scene, area, at_place};
+use crate::math::form_factor::spread_in_triangle;
 use crate::scene::maps::LUMINANCE;
 
 /// Places on the lights, evenly by power, and on all surfaces, evenly by what they reflect.
 const PLACES: usize = 48;
-
-/// Steps of the R₂ sequence (Roberts 2018).
-const R2: [f64; 2] = [0.754_877_666_246_693, 0.569_840_290_998_053];
 
 /// How far from a triangle's corners it is looked from, as a share of the way to its middle.
 const INSIDE: f64 = 0.02;
@@ -150,12 +148,7 @@ fn spread(input: &Scene, areas: &[f64], powers: &[f64]) -> Vec<Place> {
     for (t, power) in powers.iter().enumerate() {
         before += power;
         while places.len() < PLACES && (places.len() as f64 + 0.5) * all < before * PLACES as f64 {
-            // The R₂ sequence, folded into the triangle.
-            let [u, v] = R2.map(|step| (0.5 + step * places.len() as f64).fract());
-            let at = match u + v > 1.0 {
-                true => [1.0 - u, 1.0 - v],
-                false => [u, v],
-            };
+            let at = spread_in_triangle(places.len());
             let corners @ [a, b, c] = input.corners(&input.triangles[t]);
             let share = all / PLACES as f64;
             places.push(Place {

@@ -70,8 +70,8 @@ impl Surroundings {
         self.diagonals[self.shell[input] as usize]
     }
 
-    /// The size of a triangle that what lies in front of it asks for, `size` at
-    /// most: no longer than other surfaces are off.
+    /// The size of a triangle that what lies in front of it asks for, `size` at most: no longer than
+    /// other surfaces are off.
     pub fn size_at(&self, scene: &Scene, [a, b, c]: [DVec3; 3], size: f64) -> f64 {
         let middle = (a + b + c) / 3.0;
         let normal = (b - a).cross(c - a).normalize_or_zero();
