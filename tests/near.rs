@@ -57,6 +57,20 @@ fn nothing_leaks_under_a_plate() {
 /// Measured: 0.124, by means 0.60. Cells of the floor that lie half under the plate have one mean.
 const UNDERSIDE: f64 = 0.2;
 
+/// A box without a bottom, each side in n × n cells, on the square of `u` and `v` from `low` on.
+fn bell(build: &mut Build, low: DVec3, [u, v, up]: [DVec3; 3], n: u32) {
+    build.quad(low + up, v, u, (n, n), 0);
+    for (corner, along) in [(low, u), (low + u, v), (low + u + v, -u), (low + v, -v)] {
+        build.quad(corner, up, along, (n, n), 0);
+    }
+}
+
+/// Whether a place lies above or below that square.
+fn is_within(p: DVec3, low: DVec3, sides: [DVec3; 2]) -> bool {
+    let along = sides.map(|side| (p - low).dot(side) / side.length_squared());
+    along.into_iter().all(|along| (0.0..=1.0).contains(&along))
+}
+
 /// Under a box without a bottom that stands on a floor of cells which its sides do not follow: an
 /// item buffer shows a side a pixel aside, and does not say before or behind it.
 #[test]
@@ -68,10 +82,7 @@ fn nothing_leaks_below_the_sides_of_a_box() {
     build.quad(DVec3::new(0.35, 0.99, 0.35), 0.3 * x, 0.3 * z, (4, 4), lamp);
     let (u, v, up) = (0.25 * x + 0.1 * z, 0.25 * z - 0.1 * x, 0.3 * y);
     let low = DVec3::new(0.45, 0.0, 0.3);
-    build.quad(low + up, v, u, (4, 4), 0);
-    for (corner, along) in [(low, u), (low + u, v), (low + u + v, -u), (low + v, -v)] {
-        build.quad(corner, up, along, (4, 4), 0);
-    }
+    bell(&mut build, low, [u, v, up], 4);
     build.weld();
     let solved = build.solve(&Settings::default());
     let elements = Elements::new(&build.scene);
@@ -80,16 +91,7 @@ fn nothing_leaks_below_the_sides_of_a_box() {
     let (mut most, mut sum, mut count) = (0.0_f64, 0.0, 0);
     for e in sides[0].clone() {
         let [a, b, c] = build.scene.corners(&build.scene.triangles[e]);
-        let place = |p: DVec3| {
-            let d = p - low;
-            [d.dot(u), d.dot(v)].map(|along| along / u.length_squared())
-        };
-        let within = |p: DVec3| {
-            place(p)
-                .into_iter()
-                .all(|along| (0.0..=1.0).contains(&along))
-        };
-        if [a, b, c].into_iter().all(within) {
+        if [a, b, c].into_iter().all(|p| is_within(p, low, [u, v])) {
             let share = f64::from(solved.irradiance[e].x) / mean;
             (most, sum, count) = (most.max(share), sum + share, count + 1);
         }
@@ -138,21 +140,14 @@ fn little_leaks_beneath_a_box_that_hovers() {
         build.quad(DVec3::new(0.7, 1.99, 0.7), 0.6 * x, 0.6 * z, (6, 6), lamp);
         let (u, v, up) = (0.5 * x + 0.2 * z, 0.5 * z - 0.2 * x, 0.4 * y);
         let low = DVec3::new(0.8, gap, 0.6);
-        build.quad(low + up, v, u, (20, 20), 0);
+        bell(&mut build, low, [u, v, up], 20);
         let under = build.quad(low, u, v, (20, 20), 0);
-        for (corner, along) in [(low, u), (low + u, v), (low + u + v, -u), (low + v, -v)] {
-            build.quad(corner, up, along, (20, 20), 0);
-        }
         build.weld();
         let solved = build.solve(&Settings::default());
         let mean = solved.mean(&solved.irradiance, 0..solved.area.len());
-        let within = |p: &DVec3| {
-            let along = [(*p - low).dot(u), (*p - low).dot(v)].map(|d| d / u.length_squared());
-            along.into_iter().all(|along| (0.0..=1.0).contains(&along))
-        };
         let beneath = sides[0].clone().filter(|&e| {
             let corners = build.scene.corners(&build.scene.triangles[e]);
-            corners.iter().all(within)
+            corners.iter().all(|&p| is_within(p, low, [u, v]))
         });
         let lit: Vec<f64> = beneath
             .map(|e| f64::from(solved.irradiance[e].x) / mean)
