@@ -2,17 +2,30 @@
 
 use std::collections::HashMap;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
-use super::{OnInput, RefinedFrom, Scene};
+use super::{OnInput, RefinedFrom, Scene, at_place, at_uv};
 
 /// An edge by its vertices, the lower first.
-type Edge = [u32; 2];
+pub(super) type Edge = [u32; 2];
+
+/// A corner of a piece of a triangle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Corner {
+    /// The corner of that number.
+    Old(usize),
+    /// A new one on an edge by its number there, and its barycentric coordinates.
+    OnEdge(Edge, u32, DVec2),
+    /// A new one by its barycentric coordinates.
+    Within(DVec2),
+}
 
 /// Triangles while they are cut.
 pub(super) struct Cutting {
     pub scene: Scene,
     pub on_input: Vec<OnInput>,
+    /// Of each triangle of the input.
+    input_corners: Vec<[DVec3; 3]>,
     /// Triangles on each edge.
     about: HashMap<Edge, Vec<u32>>,
     middles: HashMap<Edge, u32>,
@@ -24,6 +37,7 @@ impl Cutting {
         Self {
             scene: input.clone(),
             on_input: (0..count).map(OnInput::whole).collect(),
+            input_corners: (input.triangles.iter()).map(|t| input.corners(t)).collect(),
             about: HashMap::new(),
             middles: HashMap::new(),
         }
@@ -57,9 +71,7 @@ impl Cutting {
     /// those have been cut of which it is not the longest.
     /// Those that changed are added to `changed`.
     pub fn cut(&mut self, first: u32, changed: &mut Vec<u32>) {
-        if self.about.is_empty() {
-            (0..self.scene.triangles.len() as u32).for_each(|t| self.enter(t));
-        }
+        self.know_edges();
         let mut stack = vec![first];
         while let Some(&t) = stack.last() {
             let edge = self.longest_edge(t);
@@ -77,6 +89,64 @@ impl Cutting {
                 let half = self.halve(t, edge, middle);
                 changed.extend([t, half]);
             }
+        }
+    }
+
+    /// Enters the edges of all triangles, if that has not been done.
+    pub fn know_edges(&mut self) {
+        if self.about.is_empty() {
+            (0..self.scene.triangles.len() as u32).for_each(|t| self.enter(t));
+        }
+    }
+
+    /// Triangles on an edge.
+    pub fn about(&self, edge: Edge) -> &[u32] {
+        self.about.get(&edge).map_or(&[], Vec::as_slice)
+    }
+
+    /// Puts pieces in the place of a triangle. `known`: vertices of corners on edges.
+    pub fn split(&mut self, t: u32, pieces: &[[Corner; 3]], known: &mut HashMap<(Edge, u32), u32>) {
+        self.leave(t);
+        let whole = self.scene.triangles[t as usize];
+        let on = self.on_input[t as usize];
+        let of_input = self.input_corners[on.triangle as usize];
+        let mut within: HashMap<[u64; 2], u32> = HashMap::new();
+        for (i, piece) in pieces.iter().enumerate() {
+            let (mut triangle, mut part) = (whole, on);
+            for (k, corner) in piece.iter().enumerate() {
+                let (Corner::OnEdge(.., at) | Corner::Within(at)) = *corner else {
+                    let Corner::Old(old) = *corner else { continue };
+                    triangle.vertices[k] = whole.vertices[old];
+                    triangle.uv[k] = whole.uv[old];
+                    part.corners[k] = on.corners[old];
+                    continue;
+                };
+                part.corners[k] = in_whole(on.corners, at);
+                triangle.uv[k] = at_uv(whole.uv, at.to_array());
+                let vertices = &mut self.scene.vertices;
+                let new = || {
+                    vertices.push(at_place(of_input, part.corners[k]));
+                    (vertices.len() - 1) as u32
+                };
+                triangle.vertices[k] = match *corner {
+                    Corner::OnEdge(edge, number, _) => {
+                        *known.entry((edge, number)).or_insert_with(new)
+                    }
+                    _ => *(within.entry(at.to_array().map(f64::to_bits))).or_insert_with(new),
+                };
+            }
+            let place = match i {
+                0 => t,
+                _ => self.scene.triangles.len() as u32,
+            };
+            if i == 0 {
+                self.scene.triangles[t as usize] = triangle;
+                self.on_input[t as usize] = part;
+            } else {
+                self.scene.triangles.push(triangle);
+                self.on_input.push(part);
+            }
+            self.enter(place);
         }
     }
 
@@ -146,8 +216,14 @@ impl Cutting {
     }
 }
 
-fn edge(a: u32, b: u32) -> Edge {
+pub(super) fn edge(a: u32, b: u32) -> Edge {
     [a.min(b), a.max(b)]
+}
+
+/// Barycentric coordinates in the input of those in a part of it.
+fn in_whole(part: [[f64; 2]; 3], at: DVec2) -> [f64; 2] {
+    let [a, b, c] = part.map(DVec2::from_array);
+    (a + at.x * (b - a) + at.y * (c - a)).to_array()
 }
 
 pub(super) fn length(corners: [DVec3; 3], k: usize) -> f64 {

@@ -3,7 +3,9 @@
 //! that where the input has no T-junction, the result has none.
 
 mod cutting;
+mod outlines;
 mod shadows;
+mod splitting;
 mod surroundings;
 
 use std::collections::HashMap;
@@ -125,6 +127,11 @@ impl Scene {
             };
             let mut cutting = Cutting::new(self);
             if !cutting.until(|cut, t| wish.is_met(cut, t), most) {
+                size *= COARSER;
+                continue;
+            }
+            let lines = outlines::outlines(self, &surroundings, size);
+            if !splitting::split_along(&mut cutting, &lines, most) {
                 size *= COARSER;
                 continue;
             }

@@ -70,6 +70,28 @@ impl Surroundings {
         self.diagonals[self.shell[input] as usize]
     }
 
+    /// Gives each triangle of the input whose box comes within `reach` of that of these corners.
+    pub fn about(&self, corners: [DVec3; 3], reach: f64, mut each: impl FnMut(usize)) {
+        let mut near = Bounds(corners).aabb();
+        near.min -= reach as f32;
+        near.max += reach as f32;
+        let mut nodes = vec![0];
+        while let Some(n) = nodes.pop() {
+            let node = &self.bvh.nodes[n];
+            let apart = node.aabb.min.cmpgt(near.max) | node.aabb.max.cmplt(near.min);
+            let first = node.first_index as usize;
+            if apart.any() {
+                continue;
+            }
+            if !node.is_leaf() {
+                nodes.extend([first, first + 1]);
+                continue;
+            }
+            let own = &self.bvh.primitive_indices[first..first + node.prim_count as usize];
+            own.iter().for_each(|&t| each(t as usize));
+        }
+    }
+
     /// The size of a triangle that what lies in front of it asks for, `size` at most: no longer than
     /// other surfaces are off.
     pub fn size_at(&self, scene: &Scene, [a, b, c]: [DVec3; 3], size: f64) -> f64 {
