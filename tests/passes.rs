@@ -12,7 +12,6 @@ use mesolux::mesh::elements::Elements;
 use mesolux::mesh::near::Nearness;
 use mesolux::mesh::sources::Source;
 use mesolux::passes::cull::Culling;
-use mesolux::passes::occluder_tree::shadow_occluders;
 use mesolux::reference;
 use mesolux::reference::form_factors::Verdict;
 use mesolux::solver::{Estimator, Report, Settings, Solver};
@@ -354,11 +353,12 @@ fn estimators_equal_their_twins() {
         let elements = &solver.problem.elements;
         let chosen = strongest(&solver, shots as usize);
         let mut expected = vec![0.0; elements.len()];
-        let occluders = shadow_occluders(
-            elements,
-            &solver.problem.connections,
-            &solver.problem.occluders,
-        );
+        let Problem {
+            connections,
+            occluders,
+            ..
+        } = &solver.problem;
+        let occluders = occluders.casters(elements, connections);
         // Where a ray passes so close to an edge that rounding decides.
         let doubtful: Vec<Cell<bool>> = vec![Cell::new(false); elements.len()];
         let by_ray = |e: usize, source: &Source, p| {

@@ -78,12 +78,12 @@ pub struct SolveOptions {
     /// that of --quality, 0.001 for normal]
     #[arg(long, value_name = "X")]
     residual: Option<f64>,
-    /// Most elements of a curved surface or a relief that shoot together from one hemicube
-    /// [default: that of --quality, 48 for normal]
+    /// Most elements of a relief that shoot together from one hemicube, and half as many as of a
+    /// curved surface [default: that of --quality, 48 for normal]
     #[arg(long, value_name = "N")]
     source_elements: Option<usize>,
-    /// Most area that shoots together, as a share of the scene's; larger elements are cut [default:
-    /// that of --quality, 1/256 for normal]
+    /// Most area that shoots together, as a share of the scene's, less where it is lit unevenly;
+    /// larger elements are cut [default: that of --quality, 1/256 for normal]
     #[arg(long, value_name = "X")]
     source_area: Option<f64>,
     /// Most emitted power that shoots together, as a share of the scene's [default: that of

@@ -16,6 +16,7 @@ mod camera;
 pub mod camera_path;
 mod check;
 mod displace;
+pub(crate) mod even_light;
 mod hash;
 mod load;
 #[cfg(feature = "formats")]

@@ -16,7 +16,6 @@ use crate::mesh::shadow_tree::ShadowTree;
 use crate::mesh::sources::{self, Sources};
 use crate::passes::batch::Hemicubes;
 use crate::passes::buffers::{SceneBuffers, State};
-use crate::passes::occluder_tree::shadow_occluders;
 use crate::passes::relief_buffers::ReliefBuffers;
 use crate::passes::types::ShadowOccluder;
 use crate::scene::{PointLight, Scene};
@@ -78,7 +77,7 @@ impl Problem {
         };
         let (occluder_tree, near) = match settings.estimator {
             Estimator::Receiver => {
-                let tree = ShadowTree::new(shadow_occluders(&elements, &connections, &occluders));
+                let tree = ShadowTree::new(occluders.casters(&elements, &connections));
                 open_eyes(&elements, &mut sources.list, &tree);
                 let list = &sources.list;
                 let near = match kept {

@@ -14,6 +14,7 @@ use rayon::prelude::*;
 
 use crate::mesh::charts::Connections;
 use crate::mesh::elements::Elements;
+use crate::structs::ShadowOccluder;
 use outline::outlines;
 use region::{Region, regions};
 
@@ -93,6 +94,27 @@ impl Occluders {
 
     pub fn is_empty(&self) -> bool {
         self.items.is_empty()
+    }
+
+    /// For a tree of them: `[occluder]`, internal units.
+    pub fn casters(&self, elements: &Elements, connections: &Connections) -> Vec<ShadowOccluder> {
+        let caster = |(corners, &item): (&[u32; 3], &u32)| {
+            let item = item as usize;
+            let [a, b, c] = corners.map(|v| elements.vertices[v as usize].as_vec3());
+            let component = connections.component[item];
+            let normal = elements.normal[item];
+            ShadowOccluder {
+                a,
+                component,
+                b,
+                closed: connections.closed[component as usize].into(),
+                c,
+                height: normal.dot(elements.centroid[item]) as f32,
+                normal: normal.as_vec3(),
+                unused: 0,
+            }
+        };
+        self.corners.iter().zip(&self.items).map(caster).collect()
     }
 
     /// Corner positions of an occluder.

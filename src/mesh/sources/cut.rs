@@ -2,8 +2,18 @@
 
 use super::Grouping;
 use super::group::{Shape, bisect};
+use super::lit::Lit;
 use crate::mesh::charts::{Connections, charts, morton_order};
 use crate::mesh::elements::Elements;
+
+/// Of the most area of a source: what is smaller is not cut for its uneven light.
+const LEAST_UNEVEN: f64 = 1.0 / 16.0;
+
+/// Most unevenness of a source of the most area; smaller ones may be as much less even. Cornell box
+/// of 17,708 elements, rms and bias at random points: 1.20 and −0.56 % with 502 sources uncut;
+/// 0.94 and −0.31 % with 577 at twice this; 0.83 and −0.22 % with 724; 0.77 and −0.13 % with 1,032
+/// at half.
+const UNEVEN: f64 = 0.025;
 
 /// A scene's limits of area and power of one source.
 pub(super) struct Limits<'a> {
@@ -26,6 +36,12 @@ impl<'a> Limits<'a> {
         area > self.grouping.max_area * self.total_area
             || (emitted > 0.0 && emitted > self.grouping.max_power * self.total_power)
     }
+
+    /// Whether a source of this area is to be cut that is so unevenly lit, see [`Lit::unevenness`].
+    pub fn too_uneven(&self, area: f64, unevenness: impl FnOnce() -> f64) -> bool {
+        let share = area / (self.grouping.max_area * self.total_area);
+        share > LEAST_UNEVEN && share * unevenness() > UNEVEN
+    }
 }
 
 /// Power that an element emits, summed over the colours, internal units.
@@ -44,7 +60,12 @@ pub(super) struct Groups {
 }
 
 /// Cuts the charts in two until no part is over the limits.
-pub(super) fn cut(elements: &Elements, connections: &Connections, limits: &Limits<'_>) -> Groups {
+pub(super) fn cut(
+    elements: &Elements,
+    connections: &Connections,
+    limits: &Limits<'_>,
+    lit: Option<&Lit>,
+) -> Groups {
     let grouping = limits.grouping;
     let is_flat = |members: &[u32]| {
         let members = members.iter().map(|&e| e as usize);
@@ -74,8 +95,12 @@ pub(super) fn cut(elements: &Elements, connections: &Connections, limits: &Limit
                 most_curved
             };
             let many = members.len() > most && !plane;
+            let uneven = || {
+                lit.filter(|_| !relief)
+                    .is_some_and(|lit| limits.too_uneven(area, || lit.unevenness(&members)))
+            };
             let large = many || limits.too_much(area, emitted);
-            if large && members.len() > 1 {
+            if members.len() > 1 && (large || uneven()) {
                 let at = bisect(elements, &mut members);
                 stack.push(members.split_off(at));
                 stack.push(members);

@@ -8,6 +8,7 @@
 mod cut;
 mod eyes;
 mod group;
+mod lit;
 mod single;
 
 use glam::{DVec3, Vec3};
@@ -22,14 +23,15 @@ use cut::{Limits, cut};
 pub(crate) use eyes::least_strong;
 use eyes::{move_eyes, turn_frames};
 use group::group;
+use lit::Lit;
 use single::{halves, part, point};
 
 /// Where groups are cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grouping {
-    /// Most elements of a source that is curved or has a relief; the outline of a plane source
-    /// stands for any number. Where more than [`Self::MANY`] elements are curved, the limit of
-    /// curved sources grows as the square root of their number.
+    /// Most elements of a source that has a relief; a curved one may have twice as many, and more
+    /// where more than [`Self::MANY`] elements are curved: as the square root of their number. The
+    /// outline of a plane source stands for any number.
     pub max_elements: usize,
     /// Most area of a source, as a share of the scene's.
     pub max_area: f64,
@@ -46,7 +48,7 @@ impl Grouping {
     /// Most elements of a curved source without relief, where `curved` elements are curved in all.
     fn most_curved(&self, curved: usize) -> usize {
         let times = (curved as f64 / Self::MANY as f64).sqrt().max(1.0);
-        (self.max_elements as f64 * times) as usize
+        (2.0 * self.max_elements as f64 * times) as usize
     }
 }
 
@@ -178,7 +180,8 @@ pub fn build(
 ) -> (Sources, Connections) {
     let connections = Connections::new(elements);
     let limits = Limits::new(elements, grouping);
-    let groups = cut(elements, &connections, &limits);
+    let lit = Lit::new(elements, &connections, lights);
+    let groups = cut(elements, &connections, &limits, lit.as_ref());
     elements.permute(&groups.order);
     let connections = connections.permute(&groups.order);
     let mut sources = Sources {
