@@ -38,6 +38,7 @@ pub struct Solution {
 
 /// Irradiance at the corners, `[triangle][corner]`, W·m⁻², RGB: linear between them, continuous
 /// over planes.
+#[derive(Default)]
 pub struct CornerLight {
     pub irradiance: Vec<[Vec3; 3]>,
     /// The part straight from emitters and point lights.
@@ -134,11 +135,15 @@ impl Solution {
 
     /// With the light at the corners.
     pub fn with_corners(mut self, scene: &Scene) -> Self {
-        let at_corners = |light: &[Vec3]| corner_irradiance(scene, light, Joined::Plane);
         self.corners = Some(CornerLight {
-            irradiance: at_corners(&self.irradiance),
-            irradiance_direct: at_corners(&self.irradiance_direct),
+            irradiance: corner_light(scene, &self.irradiance),
+            irradiance_direct: corner_light(scene, &self.irradiance_direct),
         });
         self
     }
+}
+
+/// The light at the corners that a bake holds, `[triangle][corner]`, from that of the triangles.
+pub fn corner_light(scene: &Scene, irradiance: &[Vec3]) -> Vec<[Vec3; 3]> {
+    corner_irradiance(scene, irradiance, Joined::Plane)
 }
