@@ -5,6 +5,7 @@ mod file;
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
+use crate::bake::discretisation::discretisation;
 use crate::mesh::corners::{Joined, corner_irradiance};
 use crate::mesh::elements::Elements;
 use crate::meso::Relief;
@@ -133,10 +134,13 @@ impl Solution {
         }
     }
 
-    /// With the light at the corners.
+    /// With the light at the corners, and an estimate of its error in the report.
     pub fn with_corners(mut self, scene: &Scene) -> Self {
+        let irradiance = corner_light(scene, &self.irradiance);
+        let estimate = discretisation(scene, &self.irradiance, &irradiance);
+        self.report.discretisation = Some(estimate);
         self.corners = Some(CornerLight {
-            irradiance: corner_light(scene, &self.irradiance),
+            irradiance,
             irradiance_direct: corner_light(scene, &self.irradiance_direct),
         });
         self
