@@ -1,6 +1,7 @@
 //! From a scene to a solution: the library's main entry.
 
 pub mod cache;
+pub mod discretisation;
 pub mod quality;
 pub mod solution;
 
@@ -67,6 +68,7 @@ pub fn solve_on(
 pub fn solution(scene: &Scene, solver: &Solver) -> Result<Solution> {
     let mut report = solver.report().clone();
     report.skipped.degenerate_triangles = scene.dropped_degenerate as u64;
+    report.notes.clone_from(&scene.notes);
     let elements = &solver.problem.elements;
     Ok(Solution::new(scene, elements, &solver.light()?, report).with_corners(scene))
 }

@@ -1,139 +1,121 @@
 //! `mesolux bench irradiance`: irradiance of a bake against the path tracer, which knows nothing of
 //! hemicubes, sources or slots and sees relief as geometry.
 
-use glam::{DVec3, Vec3};
-use rayon::prelude::*;
+use std::path::{Path, PathBuf};
 
+use glam::Vec3;
+use serde::Serialize;
+
+use super::measure::Measure;
+use super::truth::{Truth, Wanted};
+use crate::atomic_file::write_atomically;
+use crate::bake::solution::{Bake, corner_light};
 use crate::error::{Error, Result};
-use crate::path_tracer::{NORMAL_95, PathTracer};
-use crate::render::Light;
 use crate::scene::{Scene, displace};
 
-/// How far irradiance is from the truth, over triangles without relief chosen at random by area.
-#[derive(Debug, Clone, Copy)]
-pub struct Found {
-    pub samples: usize,
-    /// Mean difference over the mean of the truth, and half of its 95 % interval.
-    pub bias: f64,
-    pub bias_interval: f64,
-    /// Root mean square of the difference over the mean of the truth, the path tracer's own noise
-    /// taken off.
-    pub rms: f64,
-    /// That noise, of one sample over the mean.
+/// A bake and its error.
+#[derive(Debug, Clone, Serialize)]
+pub struct Row {
+    pub bake: PathBuf,
+    pub places: usize,
+    /// Standard error of the reference at a centroid over the mean; the errors are without it.
     pub noise: f64,
+    #[serde(flatten)]
+    pub measure: Measure,
 }
 
-/// What is compared with what.
-pub struct Options {
-    pub samples: usize,
-    /// Paths a sample.
-    pub paths: u32,
-    pub seed: u64,
-}
-
-/// A place on a plain triangle with what the path tracer finds there.
-pub struct Sample {
-    pub triangle: usize,
-    pub truth: Vec3,
-    error: Vec3,
-}
-
-/// Triangles with neither relief nor emission, chosen by area, stratified; a large one may come
-/// again.
+/// The truth of a scene, as [`Truth::of`] gives it.
 ///
 /// # Errors
-/// A scene without such triangles.
-pub fn places(scene: &Scene, samples: usize, seed: u64) -> Result<Vec<usize>> {
-    let plain: Vec<usize> = (0..scene.triangles.len())
-        .filter(|&e| {
-            let material = &scene.materials[scene.triangles[e].material as usize];
-            !material.has_relief() && !material.emits()
-        })
-        .collect();
-    if plain.is_empty() {
-        return Err(Error::Scene {
-            scene: scene.name.clone(),
-            what: "it has no triangles without relief and emission to compare".into(),
-        });
-    }
-    let cross = |e: usize| {
-        let [a, b, c] = scene.corners(&scene.triangles[e]);
-        (b - a).cross(c - a)
-    };
-    let mut ends = Vec::with_capacity(plain.len());
-    let mut whole = 0.0;
-    for &e in &plain {
-        whole += cross(e).length();
-        ends.push(whole);
-    }
-    // The golden ratio's multiples run evenly through the strata's triangles, whatever order those
-    // have.
-    let chosen = (0..samples).filter_map(|i| {
-        let shift = ((i as u64 + seed) as f64 * 0.618_033_988_749_894_9).fract();
-        let at = whole * (i as f64 + shift) / samples as f64;
-        plain.get(ends.partition_point(|&end| end <= at)).copied()
-    });
-    Ok(chosen.collect())
+/// A scene without elements that can be compared, a folder that cannot be written.
+pub fn truth(
+    scene: &Scene,
+    wanted: &Wanted,
+    folder: Option<&Path>,
+    go_on: &impl Fn() -> bool,
+) -> Result<Option<Truth>> {
+    Truth::of(scene, &displace(scene), wanted, folder, go_on)
 }
 
-/// Centroid, scene units, and unit normal of a triangle.
-pub fn place_of(scene: &Scene, triangle: usize) -> (DVec3, DVec3) {
-    let [a, b, c] = scene.corners(&scene.triangles[triangle]);
-    ((a + b + c) / 3.0, (b - a).cross(c - a).normalize_or_zero())
+/// Error of the irradiance of elements, `[triangle]`, linear between corners as a bake's is; None
+/// when `go_on` returned false.
+///
+/// # Errors
+/// A scene without elements that can be compared.
+pub fn of_elements(
+    scene: &Scene,
+    irradiance: &[Vec3],
+    wanted: &Wanted,
+    go_on: &impl Fn() -> bool,
+) -> Result<Option<Measure>> {
+    let truth = truth(scene, wanted, None, go_on)?;
+    Ok(truth.map(|truth| Measure::of_elements(scene, irradiance, &truth)))
 }
 
-/// The truth at the centroids of [`places`].
-pub fn samples(scene: &Scene, options: &Options) -> Result<Vec<Sample>> {
-    let chosen = places(scene, options.samples, options.seed)?;
-    let fine = displace(scene);
-    let tracer = PathTracer::new(&fine)?;
-    Ok(chosen
-        .into_par_iter()
-        .map(|e| {
-            let (centroid, normal) = place_of(scene, e);
-            let (truth, error) =
-                tracer.irradiance(centroid, normal, options.paths, e as u64, Light::Global);
-            Sample {
-                triangle: e,
-                truth,
-                error,
+impl Row {
+    pub fn new(path: &Path, scene: &Scene, bake: &Bake, truth: &Truth) -> Self {
+        let made;
+        let corners = match &bake.corner_irradiance {
+            Some(corners) => corners,
+            None => {
+                made = corner_light(scene, &bake.irradiance);
+                &made
             }
-        })
-        .collect())
+        };
+        Self {
+            bake: path.to_owned(),
+            places: truth.places.len(),
+            noise: truth.noise(),
+            measure: Measure::new(&bake.irradiance, corners, truth),
+        }
+    }
+
+    pub fn print(&self) {
+        let Self { bake, places, .. } = self;
+        let noise = 100.0 * self.noise;
+        println!(
+            "{}: {places} places without relief and emission, noise of a reference {noise:.2} %, taken off",
+            bake.display()
+        );
+        let measured = [
+            ("centroids", self.measure.centroids),
+            ("random points", self.measure.points),
+        ];
+        for (at, m) in measured {
+            let [low, high] = m.rms_interval.map(|rms| 100.0 * rms);
+            println!(
+                "  {at}: rms {:.2} % ({low:.2} to {high:.2}), bias {:+.2} % ± {:.2} (95 %), {} % of the squared error in the worst 0.1 % of the area",
+                100.0 * m.rms,
+                100.0 * m.bias,
+                100.0 * m.bias_interval,
+                m.worst_percent()
+            );
+        }
+    }
 }
 
-/// `irradiance` is `[triangle]` in the order of the input.
-pub fn compare(irradiance: &[Vec3], samples: &[Sample]) -> Found {
-    let count = samples.len() as f64;
-    let apart = |s: &Sample| (irradiance[s.triangle] - s.truth).as_dvec3();
-    let mean = samples
-        .iter()
-        .map(|s| s.truth.as_dvec3().element_sum())
-        .sum::<f64>()
-        / (3.0 * count);
-    let sum: DVec3 = samples.iter().map(apart).sum();
-    let squares: f64 = samples
-        .iter()
-        .map(|s| apart(s).length_squared())
-        .sum::<f64>()
-        / (3.0 * count);
-    let noise: f64 = samples
-        .iter()
-        .map(|s| s.error.as_dvec3().length_squared())
-        .sum::<f64>()
-        / (3.0 * count);
-    let bias = sum.element_sum() / (3.0 * count);
-    // Colours of a sample err together: the interval is that of the samples' means.
-    let spread = samples
-        .iter()
-        .map(|s| (apart(s).element_sum() / 3.0 - bias).powi(2))
-        .sum::<f64>()
-        / (count - 1.0).max(1.0);
-    Found {
-        samples: samples.len(),
-        bias: bias / mean,
-        bias_interval: NORMAL_95 * (spread / count).sqrt() / mean,
-        rms: (squares - noise).max(0.0).sqrt() / mean,
-        noise: noise.sqrt() / mean,
-    }
+/// Writes `irradiance.csv` and `irradiance.json` into `folder`.
+///
+/// # Errors
+/// A folder that cannot be written.
+pub fn write(rows: &[Row], folder: &Path) -> Result<()> {
+    let json = folder.join("irradiance.json");
+    let text = serde_json::to_string_pretty(rows).map_err(|e| Error::file(&json, e.to_string()))?;
+    write_atomically(&json, |out| out.write_all(text.as_bytes()))?;
+    write_atomically(&folder.join("irradiance.csv"), |out| {
+        writeln!(
+            out,
+            "bake,places,noise,rms,rms_low,rms_high,bias,bias_interval,worst_share,points_rms,points_rms_low,points_rms_high,points_bias,points_bias_interval,points_worst_share"
+        )?;
+        for row in rows {
+            let (bake, measure) = (row.bake.display(), &row.measure);
+            let [centroids, points] = [measure.centroids, measure.points].map(|m| m.cells());
+            writeln!(
+                out,
+                "{bake},{},{},{centroids},{points}",
+                row.places, row.noise
+            )?;
+        }
+        Ok(())
+    })
 }

@@ -14,7 +14,9 @@ use plotters::style::RGBColor;
 use serde::Serialize;
 
 use super::lines::{Line, Lines};
+use super::places::Sample;
 use super::power_law::PowerLaw;
+use super::truth::Wanted;
 use super::{irradiance, memory};
 use crate::atomic_file::write_atomically;
 use crate::error::{Error, Result};
@@ -203,15 +205,16 @@ fn bake(
     let found = match options.samples {
         0 => None,
         samples => {
-            let wanted = irradiance::Options {
-                samples,
+            let wanted = Wanted {
+                sample: Sample::Some(samples),
                 paths: options.paths,
                 seed: 0,
+                direct: false,
             };
-            let samples = irradiance::samples(&scene, &wanted)?;
             let light = solver.light()?.irradiance;
             let light = solver.problem.elements.to_input_order(&light);
-            Some(irradiance::compare(&light, &samples))
+            let found = irradiance::of_elements(&scene, &light, &wanted, &go_on)?;
+            found.map(|measure| measure.centroids)
         }
     };
     Ok(Some(Row {

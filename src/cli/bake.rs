@@ -311,6 +311,9 @@ pub fn run(options: &Options) -> Result<()> {
         100.0 * report.unshot_share,
         report.stop
     );
+    if let Some(found) = &report.discretisation {
+        tracing::info!("estimated error of cutting into elements: {found}");
+    }
     if let Some(relief) = &report.relief {
         tracing::info!(
             "{} elements with relief in {} directions, {} kinds of relief",

@@ -6,8 +6,11 @@ use clap::{Args, Subcommand};
 
 use super::{Builtin, DeviceOptions};
 use mesolux::bake::solution::Bake;
+use mesolux::bench::places::Sample;
+use mesolux::bench::truth::{Truth, Wanted};
 use mesolux::bench::{frame, hemicube, irradiance, scaling, stress, table1};
 use mesolux::error::{Error, Result};
+use mesolux::scene::Scene;
 
 /// Measure speeds on this machine; use a release build
 #[derive(Args)]
@@ -92,15 +95,19 @@ struct IrradianceOptions {
     /// Bakes of one scene
     #[arg(value_name = "BAKE.safetensors", required = true)]
     bakes: Vec<PathBuf>,
-    /// Places that are compared, at random by area
-    #[arg(long, value_name = "N", default_value_t = 400)]
-    samples: usize,
-    /// Paths of each place
+    /// Folder for irradiance.csv, irradiance.json, and the reference, which is kept for the next run
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Elements that are compared, each at its centroid and at a random point: a number, stratified
+    /// by size and by how close other surfaces are, or `all`
+    #[arg(long, value_name = "N|all", default_value = "1000")]
+    samples: Sample,
+    /// Paths of each of these places
     #[arg(long, value_name = "N", default_value_t = 2000)]
     paths: u32,
     /// Other places
     #[arg(long, value_name = "N", default_value_t = 0)]
-    seed: u64,
+    seed: u32,
 }
 
 #[derive(Args)]
@@ -205,39 +212,50 @@ fn run_frame(options: &FrameOptions) -> Result<()> {
 }
 
 fn run_irradiance(options: &IrradianceOptions) -> Result<()> {
-    let wanted = irradiance::Options {
-        samples: options.samples.max(2),
+    let wanted = Wanted {
+        sample: options.samples,
         paths: options.paths,
-        seed: options.seed,
+        seed: options.seed.into(),
+        direct: false,
     };
-    let mut known: Option<(String, Vec<irradiance::Sample>)> = None;
+    let folder = options.output.as_deref();
+    if let Some(folder) = folder {
+        std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, e))?;
+    }
+    super::progress::catch_interrupts();
+    let go_on = || !super::progress::interrupted();
+    let mut rows = Vec::new();
+    // A scene whose elements are cut in another way has other places.
+    let mut known: Option<(String, Scene, Truth)> = None;
     for path in &options.bakes {
         let bake = Bake::load(path)?;
         let hash = &bake.origin.hash;
-        let samples = match &known {
-            Some((of, samples)) if of == hash => samples,
-            Some(_) => {
-                return Err(Error::file(
-                    path,
-                    "a bake of another scene than the first one's",
-                ));
-            }
+        if known.as_ref().is_some_and(|(of, ..)| of != hash) {
+            return Err(Error::file(
+                path,
+                "a bake of another scene than the first one's",
+            ));
+        }
+        let same = known
+            .take()
+            .filter(|(_, scene, _)| scene.on_input() == bake.on_input);
+        let (scene, truth) = match same {
+            Some((_, scene, truth)) => (scene, truth),
             None => {
                 let scene = Builtin::scene_of(path, &bake)?;
-                let samples = irradiance::samples(&scene, &wanted)?;
-                &known.insert((hash.clone(), samples)).1
+                let Some(truth) = irradiance::truth(&scene, &wanted, folder, &go_on)? else {
+                    return Ok(());
+                };
+                (scene, truth)
             }
         };
-        let found = irradiance::compare(&bake.irradiance, samples);
-        println!(
-            "{}: {} places without relief: bias {:+.2} % ± {:.2} (95 %), rms {:.2} % (path tracer's noise of {:.2} % taken off)",
-            path.display(),
-            found.samples,
-            100.0 * found.bias,
-            100.0 * found.bias_interval,
-            100.0 * found.rms,
-            100.0 * found.noise
-        );
+        let row = irradiance::Row::new(path, &scene, &bake, &truth);
+        row.print();
+        rows.push(row);
+        known = Some((hash.clone(), scene, truth));
+        if let Some(folder) = folder {
+            irradiance::write(&rows, folder)?;
+        }
     }
     Ok(())
 }

@@ -7,7 +7,9 @@ use clap::Args;
 
 use super::progress::{catch_interrupts, interrupted};
 use super::{Builtin, DeviceOptions};
-use mesolux::bench::pareto::{self, Grid, Wanted};
+use mesolux::bench::pareto::{self, Grid};
+use mesolux::bench::places::Sample;
+use mesolux::bench::truth::Wanted;
 use mesolux::error::{Error, Result};
 
 #[derive(Args)]
@@ -18,11 +20,12 @@ pub struct Options {
     /// for the next run
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Places that are compared, at random by area
-    #[arg(long, value_name = "N", default_value_t = 600)]
-    samples: usize,
-    /// Paths of the reference at each place
-    #[arg(long, value_name = "N", default_value_t = 65_536)]
+    /// Elements that are compared, each at its centroid and at a random point: a number, stratified
+    /// by size and by how close other surfaces are, or `all`
+    #[arg(long, value_name = "N|all", default_value = "4000")]
+    samples: Sample,
+    /// Paths of the reference at each of these places
+    #[arg(long, value_name = "N", default_value_t = 8192)]
     paths: u32,
     /// Other places
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -92,9 +95,10 @@ pub fn run(options: &Options) -> Result<()> {
     }
     let wanted = pareto::Options {
         wanted: Wanted {
-            samples: options.samples.max(2),
-            paths: options.paths.max(2),
+            sample: options.samples,
+            paths: options.paths,
             seed: options.seed.into(),
+            direct: true,
         },
         grid: Grid {
             hemicubes: options.hemicube.clone(),

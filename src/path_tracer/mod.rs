@@ -226,4 +226,13 @@ impl<'a> PathTracer<'a> {
         let error = film::standard_error(squares - sum * sum / count, count);
         ((sum / count).as_vec3(), error.as_vec3())
     }
+
+    /// How far the nearest surface is from a place of a surface with a unit normal, in scene units;
+    /// None where there is none.
+    #[cfg(feature = "cli")]
+    pub(crate) fn distance(&self, point: DVec3, normal: DVec3, way: DVec3) -> Option<f64> {
+        let from = self.geometry.inside(point) + geometry::ABOVE * normal;
+        let hit = self.geometry.hit(from, way)?;
+        Some(hit.distance * self.geometry.unit)
+    }
 }

@@ -52,7 +52,7 @@ pub use problem::Problem;
 pub use progress::Update;
 use progress::{Bound, Watch};
 pub use relief_light::ReliefLight;
-pub use report::{Report, Seconds, Skipped, StopReason};
+pub use report::{Discretisation, Report, Seconds, Skipped, StopReason, SurfaceError};
 pub use rows::Stages;
 pub use self_test::{choose_device, ids_come_back_right, open_device};
 pub use settings::{

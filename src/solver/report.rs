@@ -118,6 +118,24 @@ impl RawSums {
     }
 }
 
+/// An estimate of how far light that is linear over elements is off at random points: rms over the
+/// mean irradiance of what has neither relief nor emission. See [`crate::bake::discretisation`].
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Discretisation {
+    pub rms: f64,
+    pub surfaces: Vec<SurfaceError>,
+}
+
+/// What has one material.
+#[derive(Debug, Clone, Serialize)]
+pub struct SurfaceError {
+    pub name: String,
+    /// Share of the area.
+    pub area: f64,
+    /// Of this surface, over the mean irradiance of all.
+    pub rms: f64,
+}
+
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Report {
     pub device: String,
@@ -155,11 +173,15 @@ pub struct Report {
     pub unshot_share: f64,
     /// Null where a reflectance is 1: nothing bounds what is left then.
     pub error_bound: Option<f64>,
+    /// Null of a solution under way.
+    pub discretisation: Option<Discretisation>,
     pub stop: StopReason,
     pub seconds: Seconds,
     pub skipped: Skipped,
     /// Elements that receive and send by direction, and into how many; null where none does.
     pub relief: Option<ReliefReport>,
+    /// What was made up, ignored or limited when the scene was read and cut.
+    pub notes: Vec<String>,
     #[serde(skip)]
     meshlets: u64,
     #[serde(skip)]

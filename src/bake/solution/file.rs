@@ -173,6 +173,8 @@ pub struct Bake {
     /// W·m⁻², RGB, `[triangle]` in the order of the input.
     pub irradiance: Vec<Vec3>,
     pub irradiance_direct: Vec<Vec3>,
+    /// At the corners, `[triangle][corner]`; none of a bake that was stopped before it had them.
+    pub corner_irradiance: Option<Vec<[Vec3; 3]>>,
     pub relief: Option<DirectionalLight>,
     /// Where each triangle lies in the scene as it was read.
     pub on_input: Vec<OnInput>,
@@ -218,6 +220,7 @@ impl Bake {
         let bake = Self {
             origin,
             irradiance_direct: tensors.vectors("irradiance_direct", &[])?,
+            corner_irradiance: tensors.corners("corner_irradiance", irradiance.len())?,
             relief: tensors.relief(irradiance.len())?,
             on_input: tensors.on_input(irradiance.len())?,
             irradiance,
@@ -264,6 +267,18 @@ impl Tensors<'_> {
             return Err(self.bad(name, "not all numbers are finite"));
         }
         Ok(values.chunks_exact(3).map(Vec3::from_slice).collect())
+    }
+
+    /// Light at the corners of so many triangles, where the file has it.
+    fn corners(&self, name: &str, triangles: usize) -> Result<Option<Vec<[Vec3; 3]>>> {
+        if !self.file.names().contains(&name) {
+            return Ok(None);
+        }
+        let values = self.vectors(name, &[3])?;
+        match values.len() == 3 * triangles {
+            true => Ok(Some(values.as_chunks().0.to_vec())),
+            false => Err(self.bad(name, "not of as many triangles as irradiance")),
+        }
     }
 
     /// Where each of so many triangles lies in the input.

@@ -5,6 +5,7 @@ mod file;
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
+use crate::bake::discretisation::discretisation;
 use crate::mesh::corners::{Joined, corner_irradiance};
 use crate::mesh::elements::Elements;
 use crate::meso::Relief;
@@ -38,6 +39,7 @@ pub struct Solution {
 
 /// Irradiance at the corners, `[triangle][corner]`, W·m⁻², RGB: linear between them, continuous
 /// over planes.
+#[derive(Default)]
 pub struct CornerLight {
     pub irradiance: Vec<[Vec3; 3]>,
     /// The part straight from emitters and point lights.
@@ -132,13 +134,20 @@ impl Solution {
         }
     }
 
-    /// With the light at the corners.
+    /// With the light at the corners, and an estimate of its error in the report.
     pub fn with_corners(mut self, scene: &Scene) -> Self {
-        let at_corners = |light: &[Vec3]| corner_irradiance(scene, light, Joined::Plane);
+        let irradiance = corner_light(scene, &self.irradiance);
+        let estimate = discretisation(scene, &self.irradiance, &irradiance);
+        self.report.discretisation = Some(estimate);
         self.corners = Some(CornerLight {
-            irradiance: at_corners(&self.irradiance),
-            irradiance_direct: at_corners(&self.irradiance_direct),
+            irradiance,
+            irradiance_direct: corner_light(scene, &self.irradiance_direct),
         });
         self
     }
+}
+
+/// The light at the corners that a bake holds, `[triangle][corner]`, from that of the triangles.
+pub fn corner_light(scene: &Scene, irradiance: &[Vec3]) -> Vec<[Vec3; 3]> {
+    corner_irradiance(scene, irradiance, Joined::Plane)
 }

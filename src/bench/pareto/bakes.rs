@@ -5,11 +5,11 @@ use std::time::{Duration, Instant};
 
 use glam::Vec3;
 
-use super::measure::Measure;
-use super::truth::Truth;
 use super::{Method, Row};
 use crate::bake;
 use crate::bake::quality::scaled;
+use crate::bench::measure::Measure;
+use crate::bench::truth::Truth;
 use crate::error::Result;
 use crate::math::directions::Directions;
 use crate::meso::Transport;
@@ -155,12 +155,11 @@ impl Try {
             taken += turn.elapsed();
             let report = solver.report();
             let finished = report.stop != StopReason::Interrupted;
-            let light = solver.light()?;
-            done.irradiance = solver.problem.elements.to_input_order(&light.irradiance);
-            done.direct = solver
-                .problem
-                .elements
-                .to_input_order(&light.irradiance_direct);
+            let solution = bake::solution(scene, &solver)?;
+            let corners = solution.corners.unwrap_or_default().irradiance;
+            let measure = Measure::new(&solution.irradiance, &corners, truth);
+            done.irradiance = solution.irradiance;
+            done.direct = solution.irradiance_direct;
             done.rows.push(Row {
                 method: match self.estimator {
                     Estimator::Receiver => Method::Receiver,
@@ -181,7 +180,7 @@ impl Try {
                 error_bound: report.error_bound,
                 finished,
                 seconds: taken.as_secs_f64(),
-                measure: Measure::new(&truth.at_places(&done.irradiance), truth),
+                measure,
                 best: false,
             });
             if finished || taken >= grid.limit || !go_on() {

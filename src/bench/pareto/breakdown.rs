@@ -7,15 +7,15 @@ use glam::{DVec3, Vec3};
 use serde::Serialize;
 
 use super::bakes::Done;
-use super::measure::net_squares;
-use super::truth::{Truth, mean};
-use crate::bench::irradiance::place_of;
+use crate::bench::measure::net_squares;
+use crate::bench::places::place_of;
+use crate::bench::truth::{PARTS, Parts, Truth, average, mean};
 use crate::scene::Scene;
 
 /// Number of worst elements reported.
 const WORST: usize = 10;
 
-/// Error on a part of the scene, over the mean irradiance of all places.
+/// Error at the centroids of a part of the scene, over the mean irradiance of all places.
 #[derive(Debug, Clone, Serialize)]
 pub struct Part {
     pub name: String,
@@ -54,58 +54,64 @@ pub struct Breakdown {
     pub worst: Vec<Worst>,
 }
 
-/// Values at the places: `[global, direct, indirect]`, each with its truth and the truth's standard
-/// error.
+/// Values at the places with their truth: all light, the direct or the indirect part.
 struct Light {
     ours: Vec<Vec3>,
-    truth: Vec<Vec3>,
-    error: Vec<Vec3>,
+    truth: Vec<Parts>,
+}
+
+impl Light {
+    /// The parts of two truths are independent, and so are those of their difference.
+    fn without(&self, other: &Self) -> Self {
+        let ours = self.ours.iter().zip(&other.ours);
+        let truth = self.truth.iter().zip(&other.truth);
+        Self {
+            ours: ours.map(|(a, b)| a - b).collect(),
+            truth: truth
+                .map(|(a, b)| std::array::from_fn::<Vec3, PARTS, _>(|k| a[k] - b[k]))
+                .collect(),
+        }
+    }
+
+    fn true_grey(&self, place: usize) -> f64 {
+        average(&self.truth[place]).element_sum() / 3.0
+    }
 }
 
 impl Breakdown {
     pub(super) fn new(scene: &Scene, done: &Done, truth: &Truth) -> Self {
-        let pairs = |a: &[Vec3], b: &[Vec3], join: fn(Vec3, Vec3) -> Vec3| -> Vec<Vec3> {
-            a.iter().zip(b).map(|(&a, &b)| join(a, b)).collect()
-        };
         let global = Light {
             ours: truth.at_places(&done.irradiance),
-            truth: truth.global.clone(),
-            error: truth.global_error.clone(),
+            truth: truth.centroids.clone(),
         };
         let direct = Light {
             ours: truth.at_places(&done.direct),
             truth: truth.direct.clone(),
-            error: truth.direct_error.clone(),
         };
-        let indirect = Light {
-            ours: pairs(&global.ours, &direct.ours, |a, b| a - b),
-            truth: pairs(&global.truth, &direct.truth, |a, b| a - b),
-            // The two truths are independent.
-            error: pairs(&global.error, &direct.error, |a, b| {
-                (a * a + b * b).map(f32::sqrt)
-            }),
-        };
+        let indirect = global.without(&direct);
         let lights = [&global, &direct, &indirect];
-        let squares = lights.map(|l| net_squares(&l.ours, &l.truth, &l.error));
-        let whole = mean(&global.truth);
+        let squares = lights.map(|light| net_squares(&light.ours, &light.truth));
+        let whole = mean(&truth.places, &global.truth);
         let mut groups: BTreeMap<String, Vec<usize>> = BTreeMap::new();
-        for (i, &e) in truth.triangles.iter().enumerate() {
+        for (i, e) in truth.places.iter().map(|place| place.triangle).enumerate() {
             let name = &scene.materials[scene.triangles[e].material as usize].name;
             let faces = facing(place_of(scene, e).1);
             for key in ["all".into(), name.clone(), format!("{name} {faces}")] {
                 groups.entry(key).or_default().push(i);
             }
         }
-        let all: f64 = squares[0].iter().sum();
+        let weight = |i: usize| truth.places[i].weight;
+        let all: f64 = (0..truth.places.len())
+            .map(|i| weight(i) * squares[0][i])
+            .sum();
         let parts = groups.into_iter().map(|(name, members)| {
-            let count = members.len() as f64;
-            let of = |values: &[f64]| members.iter().map(|&i| values[i]).sum::<f64>();
-            let rms = |values: &[f64]| (of(values) / count).max(0.0).sqrt() / whole;
-            let light: f64 = members.iter().map(|&i| grey(global.truth[i])).sum();
-            let apart: f64 = members
-                .iter()
-                .map(|&i| grey(global.ours[i]) - grey(global.truth[i]))
-                .sum();
+            let sum = |value: &dyn Fn(usize) -> f64| -> f64 {
+                members.iter().map(|&i| weight(i) * value(i)).sum()
+            };
+            let count = sum(&|_| 1.0);
+            let rms = |values: &[f64]| (sum(&|i| values[i]) / count).max(0.0).sqrt() / whole;
+            let light = sum(&|i| global.true_grey(i));
+            let apart = sum(&|i| grey(global.ours[i]) - global.true_grey(i));
             Part {
                 name,
                 places: members.len(),
@@ -114,14 +120,14 @@ impl Breakdown {
                 rms: rms(&squares[0]),
                 rms_direct: rms(&squares[1]),
                 rms_indirect: rms(&squares[2]),
-                share: of(&squares[0]) / all,
+                share: sum(&|i| squares[0][i]) / all,
             }
         });
-        let mut order: Vec<usize> = (0..truth.triangles.len()).collect();
+        let mut order: Vec<usize> = (0..truth.places.len()).collect();
         order.sort_by(|&a, &b| squares[0][b].total_cmp(&squares[0][a]));
-        order.dedup_by_key(|&mut i| truth.triangles[i]);
+        order.dedup_by_key(|&mut i| truth.places[i].triangle);
         let worst = order.iter().take(WORST).map(|&i| {
-            let triangle = truth.triangles[i];
+            let triangle = truth.places[i].triangle;
             let (place, normal) = place_of(scene, triangle);
             let material = scene.triangles[triangle].material as usize;
             Worst {
@@ -129,9 +135,9 @@ impl Breakdown {
                 material: scene.materials[material].name.clone(),
                 place: place.to_array(),
                 normal: normal.to_array(),
-                truth: grey(global.truth[i]) / whole,
+                truth: global.true_grey(i) / whole,
                 ours: grey(global.ours[i]) / whole,
-                direct: (grey(direct.ours[i]) - grey(direct.truth[i])) / whole,
+                direct: (grey(direct.ours[i]) - direct.true_grey(i)) / whole,
             }
         });
         Self {

@@ -2,15 +2,13 @@
 //! against one reference.
 //!
 //! Time is measured from the scene in memory to the irradiance of every element; opening a device
-//! and reading files do not count. Error is that of irradiance at the centroids of triangles with
-//! neither relief nor emission, chosen by area.
+//! and reading files do not count. Error is that of irradiance on elements with neither relief nor
+//! emission, at their centroids and at random points, see [`super::places`].
 
 mod bakes;
 mod breakdown;
-mod measure;
 mod peers;
 mod plot;
-mod truth;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -20,9 +18,9 @@ use serde::Serialize;
 
 pub use bakes::Grid;
 pub use breakdown::{Breakdown, Part, Worst};
-pub use measure::{Measure, front};
-pub use truth::{Truth, Wanted};
 
+use super::measure::{Measure, front};
+use super::truth::{Truth, Wanted};
 use crate::atomic_file::write_atomically;
 use crate::error::{Error, Result};
 use crate::scene::{Scene, displace};
@@ -201,14 +199,14 @@ pub fn run(
 ) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, e))?;
     let fine = displace(scene);
-    let Some(truth) = Truth::of(scene, &fine, &options.wanted, folder, &go_on)? else {
+    let Some(truth) = Truth::of(scene, &fine, &options.wanted, Some(folder), &go_on)? else {
         return Ok(());
     };
     let conditions = Conditions {
         scene: &scene.name,
         device: device.name(),
         elements: scene.triangles.len(),
-        places: truth.triangles.len(),
+        places: truth.places.len(),
         reference_paths: options.wanted.paths,
         reference_seconds: truth.seconds,
         reference_noise: truth.noise(),
@@ -237,10 +235,10 @@ pub fn run(
             println!("{}", line(last));
             if closest
                 .as_ref()
-                .is_none_or(|(rms, _)| last.measure.rms < *rms)
+                .is_none_or(|(rms, _)| last.measure.centroids.rms < *rms)
             {
                 breakdown = Some(Breakdown::new(scene, &done, &truth));
-                closest = Some((last.measure.rms, done));
+                closest = Some((last.measure.centroids.rms, done));
             }
         }
         save(&rows, breakdown.as_ref())?;
@@ -288,7 +286,7 @@ fn mark(rows: &mut [Row]) {
         .collect();
     let points: Vec<(f64, f64)> = bakes
         .iter()
-        .map(|&i| (rows[i].seconds, rows[i].measure.rms))
+        .map(|&i| (rows[i].seconds, rows[i].measure.centroids.rms))
         .collect();
     for (i, best) in bakes.into_iter().zip(front(&points)) {
         rows[i].best = best;
@@ -296,12 +294,14 @@ fn mark(rows: &mut [Row]) {
 }
 
 const HEADER: &str =
-    "  method             seconds   rms % (95 % interval)     bias %              settings";
+    "  method             seconds   rms % (95 % interval)     bias %        worst %   \
+    at random points: rms %, bias %, worst %   settings
+  (worst: share of the squared error in the worst 0.1 % of the area)";
 
 fn line(row: &Row) -> String {
-    let m = &row.measure;
+    let (m, points) = (&row.measure.centroids, &row.measure.points);
     format!(
-        "{} {:<17} {:>8.2} {:>7.2} ({:.2} to {:.2}) {:>+9.2} +- {:.2}   {}{}",
+        "{} {:<17} {:>8.2} {:>7.2} ({:.2} to {:.2}) {:>+9.2} +- {:.2} {:>6}   {:>7.2} {:>+7.2} {:>6}   {}{}",
         if row.best { '*' } else { ' ' },
         row.method.title(),
         row.seconds,
@@ -310,9 +310,17 @@ fn line(row: &Row) -> String {
         100.0 * m.rms_interval[1],
         100.0 * m.bias,
         100.0 * m.bias_interval,
+        m.worst_percent(),
+        100.0 * points.rms,
+        100.0 * points.bias,
+        points.worst_percent(),
         row.settings(),
         if row.finished { "" } else { " (on its way)" }
     )
+}
+
+fn cell<T: ToString>(value: Option<T>) -> String {
+    value.map_or(String::new(), |v| v.to_string())
 }
 
 fn write(found: &Found<'_>, folder: &Path) -> Result<()> {
@@ -323,16 +331,12 @@ fn write(found: &Found<'_>, folder: &Path) -> Result<()> {
     write_atomically(&folder.join("pareto.csv"), |out| {
         writeln!(
             out,
-            "method,hemicube,emitter_hemicube,source_scale,directions,sources,hemicubes,paths,error_bound,finished,seconds,rms,rms_low,rms_high,bias,bias_interval,best"
+            "method,hemicube,emitter_hemicube,source_scale,directions,sources,hemicubes,paths,error_bound,finished,seconds,rms,rms_low,rms_high,bias,bias_interval,worst_share,points_rms,points_rms_low,points_rms_high,points_bias,points_bias_interval,points_worst_share,best"
         )?;
         for r in found.rows {
-            fn cell<T: ToString>(value: Option<T>) -> String {
-                value.map_or(String::new(), |v| v.to_string())
-            }
-            let m = &r.measure;
             writeln!(
                 out,
-                "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+                "{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
                 r.method.title(),
                 cell(r.hemicube),
                 cell(r.emitter_hemicube),
@@ -344,11 +348,8 @@ fn write(found: &Found<'_>, folder: &Path) -> Result<()> {
                 cell(r.error_bound),
                 r.finished,
                 r.seconds,
-                m.rms,
-                m.rms_interval[0],
-                m.rms_interval[1],
-                m.bias,
-                m.bias_interval,
+                r.measure.centroids.cells(),
+                r.measure.points.cells(),
                 r.best
             )?;
         }

@@ -2,7 +2,8 @@
 //! is installed.
 //!
 //! They compute the centroid of every element, as a bake does, and take the time that this takes;
-//! errors are compared at the reference's places.
+//! errors are compared at the reference's places. Between the centroids their light is linear as a
+//! bake's is.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -12,11 +13,11 @@ use glam::Vec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::measure::Measure;
-use super::truth::Truth;
 use super::{Method, Row};
 use crate::atomic_file::write_atomically;
-use crate::bench::irradiance::place_of;
+use crate::bench::measure::Measure;
+use crate::bench::places::place_of;
+use crate::bench::truth::Truth;
 use crate::error::{Error, Result};
 use crate::path_tracer::{PathTracer, VirtualLights};
 use crate::render::Light;
@@ -48,11 +49,10 @@ pub(super) struct Job<'a> {
 impl Job<'_> {
     /// Of irradiance `found` at every element, `[triangle]`.
     fn row(&self, method: Method, paths: u32, seconds: f64, found: &[Vec3]) -> Row {
-        let at_places = self.truth.at_places(found);
         Row {
             paths: Some(paths),
             seconds,
-            ..Row::new(method, Measure::new(&at_places, self.truth))
+            ..Row::new(method, Measure::of_elements(self.scene, found, self.truth))
         }
     }
 

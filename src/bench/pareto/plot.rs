@@ -22,7 +22,7 @@ pub(super) fn write(rows: &[Row], caption: &str, folder: &Path) -> Result<()> {
     let bad = |path: &Path, e: Box<dyn std::error::Error>| {
         Error::file(path, format!("cannot be drawn: {e}"))
     };
-    if !rows.iter().any(|r| r.measure.rms > 0.0) {
+    if !rows.iter().any(|r| r.measure.centroids.rms > 0.0) {
         return Ok(());
     }
     let path = folder.join("pareto.svg");
@@ -65,11 +65,15 @@ where
     B::ErrorType: 'static,
 {
     let percent = |v: f64| 100.0 * v;
-    let place = |r: &Row| (r.seconds, percent(r.measure.rms));
-    let shown = || rows.iter().filter(|r| r.measure.rms > 0.0);
+    let place = |r: &Row| (r.seconds, percent(r.measure.centroids.rms));
+    let shown = || rows.iter().filter(|r| r.measure.centroids.rms > 0.0);
     let xs = ends(shown().map(|r| r.seconds));
-    let ys =
-        ends(shown().flat_map(|r| [percent(r.measure.rms), percent(r.measure.rms_interval[1])]));
+    let ys = ends(shown().flat_map(|r| {
+        [
+            percent(r.measure.centroids.rms),
+            percent(r.measure.centroids.rms_interval[1]),
+        ]
+    }));
     // An interval that reaches 0 ends at the lower edge.
     let lowest = ys.start;
     root.fill(&WHITE)?;
@@ -100,13 +104,21 @@ where
             chart.draw_series([PathElement::new(points, colour.mix(0.35))])?;
         }
         chart.draw_series(of_method.iter().map(|r| {
-            let [low, high] = r.measure.rms_interval.map(|v| percent(v).max(lowest));
+            let [low, high] = r
+                .measure
+                .centroids
+                .rms_interval
+                .map(|v| percent(v).max(lowest));
             PathElement::new([(r.seconds, low), (r.seconds, high)], colour.mix(0.5))
         }))?;
         chart
             .draw_series(of_method.iter().map(|r| {
                 let size = if r.finished { 4 } else { 2 };
-                Circle::new((r.seconds, percent(r.measure.rms)), size, colour.filled())
+                Circle::new(
+                    (r.seconds, percent(r.measure.centroids.rms)),
+                    size,
+                    colour.filled(),
+                )
             }))?
             .label(method.title())
             .legend(move |(x, y)| Circle::new((x + 8, y), 5, colour.filled()));

@@ -4,6 +4,8 @@ use glam::DVec3;
 
 use super::{Case, Check, Context, Size, furnace_limit, furnace_material, settings, through_files};
 use crate::bench::irradiance;
+use crate::bench::places::Sample;
+use crate::bench::truth::Wanted;
 use crate::error::Result;
 use crate::scene::Scene;
 use crate::scene::shapes::Shapes;
@@ -218,15 +220,19 @@ fn non_manifold(context: &Context) -> Result<Vec<Check>> {
         Size::Small => 500,
         Size::Full => 4000,
     };
-    let wanted = irradiance::Options {
-        samples: 200,
+    let wanted = Wanted {
+        sample: Sample::Some(200),
         paths,
         seed: 0,
+        direct: false,
     };
-    let truth = irradiance::samples(&shapes.scene, &wanted)?;
-    let found = irradiance::compare(&solved.irradiance, &truth);
-    Ok(vec![
-        Check::at_most("bias", found.bias.abs(), BIAS),
-        Check::at_most("rms", found.rms, RMS),
-    ])
+    let measured = irradiance::of_elements(&shapes.scene, &solved.irradiance, &wanted, &|| true)?;
+    let checks = measured.into_iter().flat_map(|measure| {
+        let found = measure.centroids;
+        [
+            Check::at_most("bias", found.bias.abs(), BIAS),
+            Check::at_most("rms", found.rms, RMS),
+        ]
+    });
+    Ok(checks.collect())
 }
