@@ -12,6 +12,7 @@
 // places on it, evenly chosen.
 layout(constant_id = 0) const uint LIST = RECEIVE_DOUBTFUL;
 layout(constant_id = 1) const uint EYES = SOURCE_EYES;
+const uint STRIDE = SOURCE_EYES / EYES;
 
 // SOURCE_EYES a source.
 layout(binding = 8) uniform usamplerBuffer eyes;
@@ -32,7 +33,7 @@ void main() {
     Source eye = s;
     for (uint k = 0; k < from; k++) {
         if (LIST == RECEIVE_CROSSED) {
-            eye.eye = fetch(eyes, SOURCE_EYES * source + k * (SOURCE_EYES / EYES)).xyz;
+            eye.eye = fetch(eyes, SOURCE_EYES * source + k * STRIDE + STRIDE / 2).xyz;
         }
         // What lies below the horizon is not in the form factor.
         bool above = LIST != RECEIVE_CROSSED || dot(eye.eye - ball[0].xyz, n[0]) > 0.0;

@@ -35,9 +35,11 @@ shared! {
     RECEIVE_DOUBTFUL = 4;
     RECEIVE_CROSSED = 5;
     RECEIVE_LISTS = 6;
-    /// Places on a source from which rays find the share of it that such an element sees, or half
-    /// as many; a power of two, at most 32.
-    SOURCE_EYES = 8;
+    /// Places on a strong emitter from which rays find the share of it that such an element sees;
+    /// on other sources fewer. A power of two, at most 32.
+    SOURCE_EYES = 32;
+    /// The first of those are its ends: where they are seen as its eye is, no silhouette cuts it.
+    SOURCE_ENDS = 4;
     /// Bits of a listed element below those of that share.
     LISTED_BITS = 27;
     /// Elements that an invocation sorts: they share the data that it loads of each source.

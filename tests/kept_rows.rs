@@ -7,6 +7,7 @@ use glam::{DVec3, Vec3};
 use mesolux::bake;
 use mesolux::math::directions::Directions;
 use mesolux::mesh::near::Nearness;
+use mesolux::mesh::sources::Grouping;
 use mesolux::meso::{Options, Transport};
 use mesolux::solver::{Light, Report, Settings, Solver, Visibility};
 
@@ -44,6 +45,11 @@ fn settings() -> Settings {
         batch: 6,
         residual: RESIDUAL,
         nearness: Nearness::NONE,
+        // Groups that do not depend on the light.
+        grouping: Grouping {
+            max_unevenness: f64::INFINITY,
+            ..Grouping::default()
+        },
         relief: Options {
             transport: Transport::Physical,
             directions: Directions::new(32).expect("a number of the paper"),

@@ -14,7 +14,7 @@ use mesolux::mesh::sources::Source;
 use mesolux::passes::cull::Culling;
 use mesolux::reference;
 use mesolux::reference::form_factors::Verdict;
-use mesolux::solver::{Estimator, Report, Settings, Solver};
+use mesolux::solver::{Estimator, Problem, Report, Settings, Solver};
 
 const FACE: u32 = 32;
 

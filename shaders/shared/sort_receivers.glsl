@@ -24,6 +24,10 @@ layout(constant_id = 1) const uint SILHOUETTES = 1;
 layout(scalar, binding = 7) buffer FacingAway { uint away_count[]; };
 // Those without relief, then those with it.
 layout(scalar, binding = 8) readonly buffer Blocks { ReceiverBlock blocks[]; };
+#ifdef SHADOW_RAYS
+// SOURCE_EYES a source.
+layout(binding = 10) uniform usamplerBuffer eyes;
+#endif
 
 // Rounding of distances, a few steps of f32 at coordinates up to 1.
 const float BLOCK_EPSILON = 1e-6;
@@ -78,6 +82,33 @@ const float BELOW_FACTOR = 1.0 / 2048.0;
 bool eye_is_below(Source s, vec3 p, vec3 n) {
     return dot(s.eye - p, n) <= 0.0 && form_factor_about(s, p, n) > BELOW_FACTOR;
 }
+
+#ifdef SHADOW_RAYS
+// Which of the places asked are to see other ends of the source than its eye.
+void cross_unlike(
+    uint source,
+    Source s,
+    vec4 ball[SORT_ELEMENTS],
+    vec3 n[SORT_ELEMENTS],
+    bool asked[SORT_ELEMENTS],
+    bool seen[SORT_ELEMENTS],
+    inout bool crossed[SORT_ELEMENTS]
+) {
+    Source end = s;
+    for (uint k = 0; k < SOURCE_ENDS; k++) {
+        end.eye = fetch(eyes, SOURCE_EYES * source + k).xyz;
+        bool above[SORT_ELEMENTS];
+        for (uint j = 0; j < SORT_ELEMENTS; j++) {
+            above[j] = asked[j] && !crossed[j] && dot(end.eye - ball[j].xyz, n[j]) > 0.0;
+        }
+        bool open[SORT_ELEMENTS] = above;
+        look(end, ball, n, open);
+        for (uint j = 0; j < SORT_ELEMENTS; j++) {
+            crossed[j] = crossed[j] || above[j] && open[j] != seen[j];
+        }
+    }
+}
+#endif
 
 #ifdef ITEM_BUFFER
 // An element that sees a source under a larger form factor is worth several rays.
@@ -165,20 +196,8 @@ void main() {
 #ifdef SHADOW_RAYS
             bool asked[SORT_ELEMENTS] = seen;
             look(s, ball, n, seen);
-            // Where some of these neighbours see the eye and others do not, a silhouette is near.
-            bool any_open[SORT_ELEMENTS];
-            bool any_hidden[SORT_ELEMENTS];
-            for (uint j = 0; j < SORT_ELEMENTS; j++) {
-                any_open[j] = subgroupBallot(seen[j]) != uvec4(0);
-                any_hidden[j] = subgroupBallot(asked[j] && !seen[j]) != uvec4(0);
-            }
-            for (uint j = 0; j < SORT_ELEMENTS; j++) {
-                uint low = max(j, 1) - 1;
-                uint high = min(j + 1, SORT_ELEMENTS - 1);
-                bool some_open = any_open[low] || any_open[j] || any_open[high];
-                bool some_hidden = any_hidden[low] || any_hidden[j] || any_hidden[high];
-                bool mixed = some_open && some_hidden && s.kind == KIND_SURFACE;
-                crossed[j] = crossed[j] || SILHOUETTES == 1 && mixed && asked[j];
+            if (SILHOUETTES == 1 && s.kind == KIND_SURFACE) {
+                cross_unlike(slots[slot].source, s, ball, n, asked, seen, crossed);
             }
 #else
             for (uint j = 0; j < SORT_ELEMENTS; j++) {

@@ -41,6 +41,7 @@ pub fn scaled(scale: f64) -> Grouping {
         max_elements: ((plain.max_elements as f64 * scale).round() as usize).max(1),
         max_area: plain.max_area * scale,
         max_power: plain.max_power * scale,
+        ..plain
     }
 }
 

@@ -200,6 +200,7 @@ impl SolveOptions {
             max_elements: self.source_elements.unwrap_or(preset.max_elements),
             max_area: share("--source-area", self.source_area, preset.max_area)?,
             max_power: share("--source-power", self.source_power, preset.max_power)?,
+            ..preset
         })
     }
 

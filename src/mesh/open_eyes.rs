@@ -19,8 +19,11 @@ const LOOKS: usize = 8;
 /// How far it looks, in radii of its source.
 const REACH: f64 = 1.0;
 
+/// One of so many places is looked from to see whether some are covered.
+const ASKED: usize = 4;
+
 /// Over the places of a source: those among which open ones are looked for where some are covered.
-const MORE: usize = 8;
+const MORE: usize = 2;
 
 /// Golden angle.
 const TURN: f64 = 2.399_963_23;
@@ -32,13 +35,14 @@ pub fn open_eyes(
     sources: &mut [Source],
     occluders: &ShadowTree<ShadowOccluder>,
 ) -> usize {
-    let moved = sources.par_iter_mut().map(|source| {
+    let moved = sources.par_iter_mut().enumerate().map(|(turn, source)| {
         if source.kind == KIND_POINT {
             return 0;
         }
         let tree = PartTree::of(elements, source);
         let count = SOURCE_EYES as usize;
-        source.places = tree.places(elements, source, count);
+        source.places = tree.places(elements, source, count, turn);
+        ends_first(source);
         if source.element_count == 1 {
             return 0;
         }
@@ -46,10 +50,10 @@ pub fn open_eyes(
         let most = LOOKS / 2;
         let covered = |place: &DVec3| open(*place) < most;
         let eye = covered(&source.eye);
-        if !eye && !source.places.iter().any(covered) {
+        if !eye && !source.places.iter().step_by(ASKED).any(covered) {
             return 0;
         }
-        let places = tree.places(elements, source, MORE * count);
+        let places = tree.places(elements, source, MORE * count, turn);
         let openness: Vec<usize> = places.iter().map(|&place| open(place)).collect();
         let best = openness.iter().copied().max().unwrap_or(0);
         let open: Vec<DVec3> = (places.iter().zip(&openness))
@@ -69,9 +73,21 @@ pub fn open_eyes(
         }
         let spread = |k: usize| open[(2 * k + 1) * open.len() / (2 * count)];
         source.places = (0..count).map(spread).collect();
+        ends_first(source);
         usize::from(moved)
     });
     moved.sum()
+}
+
+/// Moves the places furthest out to four sides to the front, see `SOURCE_ENDS`.
+fn ends_first(source: &mut Source) {
+    let (t, b) = (source.tangent, source.bitangent);
+    let places = &mut source.places;
+    for (k, way) in [t + b, -t - b, t - b, b - t].into_iter().enumerate() {
+        let along = |i: &usize| places[*i].dot(way);
+        let furthest = (k..places.len()).max_by(|i, j| along(i).total_cmp(&along(j)));
+        places.swap(k, furthest.unwrap_or(k));
+    }
 }
 
 /// Directions, of [`LOOKS`], in which a place on a source sees as far as the source is wide.

@@ -240,7 +240,8 @@ fn sort(device: &Arc<Device>, on: &On<'_>, care: Care) -> Result<BoundCompute> {
                 shadow_nodes,
                 away_count,
                 blocks,
-                shadow_occluders
+                shadow_occluders,
+                eyes: &on.scene.eyes
             );
             pipeline(&sort_receivers_rays::SHADER)?.bind(&bindings)
         }
@@ -253,12 +254,15 @@ fn rays(hemicubes: &Hemicubes) -> &OccluderTree {
     tree.expect("a batch for form factors has rays")
 }
 
+/// Places on a source with a hemicube from which rays find the share of it that is seen.
+const HEMICUBE_EYES: u32 = 4;
+
 /// One a list that is left open.
 fn resolve(device: &Arc<Device>, on: &On<'_>) -> Result<Vec<(u32, BoundCompute)>> {
     // Those of strong emitters are the sharpest shadows.
     let (tree, from) = match &on.batch.sight {
         Sight::Rays(tree) => (tree, SOURCE_EYES),
-        Sight::Hemicubes(hemicubes) => (rays(hemicubes), SOURCE_EYES / 2),
+        Sight::Hemicubes(hemicubes) => (rays(hemicubes), HEMICUBE_EYES),
     };
     let (shadow_nodes, shadow_occluders) = (&tree.nodes, &tree.occluders);
     let eyes = &on.scene.eyes;

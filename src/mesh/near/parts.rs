@@ -15,6 +15,9 @@ pub struct PartTree {
     pub members: Vec<u32>,
 }
 
+/// Golden ratio's fraction, whose multiples spread evenly.
+const GOLDEN: f64 = 0.618_033_988_749_895;
+
 /// A part while the tree is walked.
 #[derive(Debug, Clone, Copy)]
 pub struct Part {
@@ -54,8 +57,15 @@ impl PartTree {
         }
     }
 
-    /// Places on a source, evenly by area; its eye if it has no members.
-    pub fn places(&self, elements: &Elements, source: &Source, count: usize) -> Vec<DVec3> {
+    /// Places on a source, evenly by area; its eye if it has no members. `turn` is another for each
+    /// source: an edge that lies alike across several would else be off alike in all.
+    pub fn places(
+        &self,
+        elements: &Elements,
+        source: &Source,
+        count: usize,
+        turn: usize,
+    ) -> Vec<DVec3> {
         if self.members.is_empty() {
             return vec![source.eye; count];
         }
@@ -69,15 +79,16 @@ impl PartTree {
         let mut places = Vec::with_capacity(count);
         let mut before = 0.0;
         let mut m = 0;
+        let shift = (GOLDEN * turn as f64 + 0.5).fract();
         for k in 0..count {
             // Members follow one another along the tree, so that equal steps of area spread out.
-            let at = all * (k as f64 + 0.5) / count as f64;
+            let at = all * (k as f64 + shift) / count as f64;
             while m + 1 < self.members.len() && before + area(self.members[m]) < at {
                 before += area(self.members[m]);
                 m += 1;
             }
             let [a, b, c] = triangle(self.members[m]);
-            let [u, v] = spread_in_triangle(k);
+            let [u, v] = spread_in_triangle(turn * count + k);
             places.push(a + u * (b - a) + v * (c - a));
         }
         places

@@ -9,12 +9,6 @@ use crate::mesh::elements::Elements;
 /// Of the most area of a source: what is smaller is not cut for its uneven light.
 const LEAST_UNEVEN: f64 = 1.0 / 16.0;
 
-/// Most unevenness of a source of the most area; smaller ones may be as much less even. Cornell box
-/// of 17,708 elements, rms and bias at random points: 1.20 and −0.56 % with 502 sources uncut;
-/// 0.94 and −0.31 % with 577 at twice this; 0.83 and −0.22 % with 724; 0.77 and −0.13 % with 1,032
-/// at half.
-const UNEVEN: f64 = 0.025;
-
 /// A scene's limits of area and power of one source.
 pub(super) struct Limits<'a> {
     pub grouping: &'a Grouping,
@@ -40,7 +34,7 @@ impl<'a> Limits<'a> {
     /// Whether a source of this area is to be cut that is so unevenly lit, see [`Lit::unevenness`].
     pub fn too_uneven(&self, area: f64, unevenness: impl FnOnce() -> f64) -> bool {
         let share = area / (self.grouping.max_area * self.total_area);
-        share > LEAST_UNEVEN && share * unevenness() > UNEVEN
+        share > LEAST_UNEVEN && share * unevenness() > self.grouping.max_unevenness
     }
 }
 
