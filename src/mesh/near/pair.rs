@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::parts::Part;
-use super::rays::blocked;
+use super::rays::{blocked, is_clear};
 use super::receivers::Receiver;
 use super::seen::{ABOVE, Before, Seen};
 use super::{Nearness, OfSource, Pair};
@@ -40,14 +40,18 @@ impl Search<'_> {
         // Where it is seen under that share of a view at most, however it is turned.
         let reach =
             (source.area / (std::f64::consts::PI * self.nearness.source)).sqrt() + source.radius;
+        let hull = seen.hull(source);
         for block in receivers {
+            let mut clear = None;
             let beside = source.radius + CLOSE * block.largest;
             if block.centre.distance(source.centroid) > reach.max(beside) + block.radius {
                 continue;
             }
             for e in block.elements.clone() {
                 if self.may_be_near(e, source) {
-                    self.pair(e, &seen, &mut factors, &mut found);
+                    let is_clear = || is_clear(self.occluders, &block.corners, &hull);
+                    let clear = || *clear.get_or_insert_with(is_clear);
+                    self.pair(e, &seen, clear, &mut factors, &mut found);
                 }
             }
         }
@@ -80,8 +84,16 @@ impl Search<'_> {
         most > self.nearness.source * std::f64::consts::PI * gap * gap
     }
 
-    /// Adds an element and its parts if the source is near. `factors` is room, `[part]`.
-    fn pair(&self, e: usize, seen: &Seen, factors: &mut [f64], found: &mut OfSource) {
+    /// Adds an element and its parts if the source is near. `clear` finds whether nothing can stand
+    /// between; `factors` is room, `[part]`.
+    fn pair(
+        &self,
+        e: usize,
+        seen: &Seen,
+        clear: impl FnOnce() -> bool,
+        factors: &mut [f64],
+        found: &mut OfSource,
+    ) {
         let (elements, whole) = (self.elements, seen.tree.whole());
         let centroid = elements.centroid[e];
         let size = elements.radius(e);
@@ -92,15 +104,20 @@ impl Search<'_> {
             true => BESIDE * self.nearness.source,
             false => self.nearness.source,
         };
-        let before = |samples| Before {
+        // The centroid of a close element may see less than its other parts.
+        let of_centroid = least * if close { 0.5 } else { 1.0 };
+        let normal = elements.normal[e];
+        if seen.is_less(centroid, normal, of_centroid) {
+            return;
+        }
+        let before = |samples, clear| Before {
             element: e,
-            normal: elements.normal[e],
+            normal,
             samples,
+            clear,
         };
         let middle = [(centroid, 1.0)];
-        let all = seen.note(whole, &before(&middle), factors);
-        // The centroid of a close element may see less than its other parts.
-        if all <= least * if close { 0.5 } else { 1.0 } {
+        if seen.note(whole, &before(&middle, false), factors) <= of_centroid {
             return;
         }
         let [a, b, c] = elements.triangle(e);
@@ -109,7 +126,7 @@ impl Search<'_> {
         for (sample, &[u, v, weight]) in samples.iter_mut().zip(points) {
             *sample = (a + u * (b - a) + v * (c - a), weight);
         }
-        let before = before(&samples[..points.len()]);
+        let before = before(&samples[..points.len()], clear());
         if close && seen.note(whole, &before, factors) <= least {
             return;
         }
@@ -197,6 +214,7 @@ impl Search<'_> {
             element: usize::MAX,
             normal,
             samples: &[(place, 1.0)],
+            clear: false,
         };
         seen.note(seen.tree.whole(), &before, factors);
         self.seen_parts(seen, &before, factors, &mut 0, each);
@@ -229,6 +247,9 @@ impl Search<'_> {
         factors: &[f64],
         rays: &mut u64,
     ) -> f64 {
+        if before.clear {
+            return factors[part.index];
+        }
         // A ray to the member that half of the part's form factor lies before.
         let member = seen.middle_member(part, factors);
         let (triangle, centroid) = (&seen.triangles[member], seen.centroid(member));

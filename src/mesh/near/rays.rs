@@ -53,6 +53,45 @@ pub fn first_met(
     at.is_finite().then_some((at, is_back))
 }
 
+/// Whether no occluder can cross a way from the hull of some places to that of others: each has all
+/// of them on one side of its plane, or lies beside the box about both.
+pub fn is_clear(tree: &ShadowTree<ShadowOccluder>, from: &[DVec3], to: &[DVec3]) -> bool {
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for p in from.iter().chain(to) {
+        (low, high) = (low.min(*p), high.max(*p));
+    }
+    let margin = DVec3::splat(IN_PLANE);
+    let (low, high) = ((low - margin).as_vec3(), (high + margin).as_vec3());
+    let beside = |a: Vec3, b: Vec3| a.cmpgt(high).any() || b.cmplt(low).any();
+    let may_cross = |o: &ShadowOccluder| {
+        if beside(o.a.min(o.b).min(o.c), o.a.max(o.b).max(o.c)) {
+            return false;
+        }
+        let normal = o.normal.as_dvec3();
+        let mut heights = (from.iter().chain(to)).map(|p| normal.dot(*p) - f64::from(o.height));
+        let (mut above, mut below) = (false, false);
+        heights.any(|height| {
+            above |= height >= IN_PLANE;
+            below |= height <= -IN_PLANE;
+            above && below
+        })
+    };
+    let nodes = tree.nodes();
+    let mut at = 0;
+    while at < nodes[0].skip as usize {
+        let node = &nodes[at];
+        if beside(node.low, node.high) {
+            at = node.skip as usize;
+            continue;
+        }
+        if tree.triangles[node.triangles()].iter().any(may_cross) {
+            return false;
+        }
+        at += 1;
+    }
+    true
+}
+
 /// Calls `leaf` with the occluders of each box on the way, of which it returns the share that is
 /// still to be walked.
 fn walk(

@@ -3,13 +3,23 @@
 use glam::DVec3;
 
 use super::parts::{Part, PartTree};
-use crate::math::form_factor::vector_to_triangle;
+use crate::math::form_factor::{sample_points, vector_to_triangle};
 use crate::mesh::elements::Elements;
 use crate::mesh::sources::Source;
 
-/// A part further off than this many of its radii, and as high above the receiver's horizon, counts
-/// as a disc seen along its axis: off by less than 1 %.
+/// A part further off than this many of its radii, and wholly above the receiver's horizon, counts as
+/// a disc seen along its axis: off by less than 1 %.
 const AS_DISC: f64 = 5.0;
+
+/// A member further off than this many of its radii counts as three points: off by less than 1 %.
+const AS_POINTS: f64 = 2.5;
+
+/// As [`AS_DISC`], for a plane part where a form factor within [`ROUGH`] of the true one will do.
+const AS_ROUGH_DISC: f64 = 3.0;
+
+/// Of a form factor, the least that [`Seen::is_less`] may take it for: 64/81 of a disc's at three
+/// radii, near its plane.
+const ROUGH: f64 = 0.6;
 
 /// Sine of the largest angle between a part's axis and a member's normal, for a part that is not in
 /// one plane to count as a disc.
@@ -27,6 +37,8 @@ pub(super) struct Before<'a> {
     pub normal: DVec3,
     /// Places on it, and their weights.
     pub samples: &'a [(DVec3, f64)],
+    /// Whether nothing can stand between.
+    pub clear: bool,
 }
 
 /// A source as its near receivers see it.
@@ -48,6 +60,9 @@ struct Disc {
     centre: DVec3,
     /// Of a ball about the centre that holds such a ball of each member.
     radius: f64,
+    /// Box that holds it.
+    low: DVec3,
+    high: DVec3,
     area: f64,
     /// Sum of area times normal.
     vector_area: DVec3,
@@ -89,7 +104,7 @@ impl Seen {
     pub fn note(&self, part: Part, before: &Before, factors: &mut [f64]) -> f64 {
         let (disc, n) = (&self.discs[part.index], before.normal);
         let add = |sum: f64, &(p, weight): &(DVec3, f64)| {
-            let factor = disc.vector(p, n)?.dot(n).max(0.0);
+            let factor = disc.vector(p, n, AS_DISC)?.dot(n).max(0.0);
             Some(sum + weight * factor)
         };
         let as_disc = before.samples.iter().try_fold(0.0, add);
@@ -116,28 +131,51 @@ impl Seen {
 
     /// Form factor from a place to a part, as if nothing stood between.
     pub fn factor(&self, part: Part, p: DVec3, n: DVec3) -> f64 {
-        match (self.discs[part.index].vector(p, n), part.count) {
+        self.factor_by(part, p, n, AS_DISC)
+    }
+
+    /// Whether the form factor from a place to the whole is surely less than `least`.
+    pub fn is_less(&self, p: DVec3, n: DVec3, least: f64) -> bool {
+        self.factor_by(self.tree.whole(), p, n, AS_ROUGH_DISC) < ROUGH * least
+    }
+
+    fn factor_by(&self, part: Part, p: DVec3, n: DVec3, as_disc: f64) -> f64 {
+        match (self.discs[part.index].vector(p, n, as_disc), part.count) {
             (Some(vector), _) => vector.dot(n).max(0.0),
-            (None, 1) => {
-                let triangle = &self.triangles[part.first];
-                vector_to_triangle(p, n, triangle).dot(n).max(0.0)
-            }
+            (None, 1) => self.of_member(part, p, n).dot(n).max(0.0),
             (None, _) => {
                 let [one, other] = part.halves();
-                self.factor(one, p, n) + self.factor(other, p, n)
+                self.factor_by(one, p, n, as_disc) + self.factor_by(other, p, n, as_disc)
             }
         }
     }
 
     /// [`Self::factor`] as a vector; see [`vector_to_triangle`].
     pub fn vector(&self, part: Part, p: DVec3, n: DVec3) -> DVec3 {
-        match (self.discs[part.index].vector(p, n), part.count) {
+        match (self.discs[part.index].vector(p, n, AS_DISC), part.count) {
             (Some(vector), _) => vector,
-            (None, 1) => vector_to_triangle(p, n, &self.triangles[part.first]),
+            (None, 1) => self.of_member(part, p, n),
             (None, _) => (part.halves().into_iter())
                 .map(|half| self.vector(half, p, n))
                 .sum(),
         }
+    }
+
+    /// Form factor as a vector from a place that sees the front of a member.
+    fn of_member(&self, part: Part, p: DVec3, n: DVec3) -> DVec3 {
+        let (disc, triangle) = (&self.discs[part.index], &self.triangles[part.first]);
+        let middle = disc.centre - p;
+        let least = AS_POINTS * disc.radius;
+        if !disc.is_above(p, n) || middle.length_squared() <= least * least {
+            return vector_to_triangle(p, n, triangle);
+        }
+        let [a, b, c] = triangle.map(|v| v - p);
+        let of = |&[u, v, weight]: &[f64; 3]| {
+            let way = a + u * (b - a) + v * (c - a);
+            way * (weight / way.length_squared().powi(2))
+        };
+        let sum: DVec3 = sample_points(true, false).iter().map(of).sum();
+        sum * (-middle.dot(disc.vector_area) / std::f64::consts::PI)
     }
 
     /// The least distance from a place to the ball about a member other than element `but`, where
@@ -153,6 +191,14 @@ impl Seen {
             1 => gap,
             _ => (part.halves().into_iter())
                 .fold(most, |most, half| self.nearest(half, p, but, most)),
+        }
+    }
+
+    /// Places whose hull holds the source.
+    pub fn hull(&self, source: &Source) -> Vec<DVec3> {
+        match source.cone == 0.0 && !source.contour.is_empty() {
+            true => source.contour.concat(),
+            false => self.triangles.concat(),
         }
     }
 
@@ -188,6 +234,8 @@ impl Disc {
         Self {
             centre,
             radius: distances.into_iter().fold(0.0, f64::max),
+            low: a.min(b).min(c),
+            high: a.max(b).max(c),
             area,
             vector_area: area * normal,
             front: 0.0,
@@ -208,6 +256,8 @@ impl Disc {
         Self {
             centre,
             radius: radii.fold(0.0, f64::max),
+            low: members.iter().fold(centre, |low, m| low.min(m.low)),
+            high: members.iter().fold(centre, |high, m| high.max(m.high)),
             area,
             vector_area,
             front: match plane {
@@ -219,17 +269,17 @@ impl Disc {
     }
 
     /// Form factor as a vector from a place with this normal; none where the part does not count as
-    /// one disc.
-    fn vector(&self, p: DVec3, n: DVec3) -> Option<DVec3> {
+    /// one disc. One in a plane does from `as_disc` radii on.
+    fn vector(&self, p: DVec3, n: DVec3, as_disc: f64) -> Option<DVec3> {
         let way = self.centre - p;
-        let height = way.dot(n);
         let facing = -way.dot(self.vector_area);
         let is_plane = self.front == 0.0;
-        if height <= -self.radius || is_plane && facing <= ABOVE * self.area {
+        if self.is_above(p, -n) || is_plane && facing <= ABOVE * self.area {
             return Some(DVec3::ZERO);
         }
         let square = way.length_squared();
-        let is_far = square > AS_DISC * AS_DISC * self.radius * self.radius;
+        let least = self.radius * if is_plane { as_disc } else { AS_DISC };
+        let is_far = square > least * least;
         let turned = self.front * self.area;
         if !is_far || !is_plane && facing * facing <= turned * turned * square {
             return None;
@@ -238,7 +288,13 @@ impl Disc {
             return Some(DVec3::ZERO);
         }
         let disc = std::f64::consts::PI * square + self.area;
-        (height >= self.radius).then(|| way * (facing / (square * disc)))
+        (self.is_above(p, n)).then(|| way * (facing / (square * disc)))
+    }
+
+    /// Whether all of it lies above the horizon of a place with this normal.
+    fn is_above(&self, p: DVec3, n: DVec3) -> bool {
+        let lowest = DVec3::select(n.cmpgt(DVec3::ZERO), self.low, self.high);
+        (lowest - p).dot(n) >= -ABOVE
     }
 }
 

@@ -67,8 +67,10 @@ fn near_factors_by_parts_are_those_by_members() {
                 element: usize::MAX,
                 normal: n,
                 samples: &[(p, 1.0)],
+                clear: false,
             };
-            seen.note(seen.tree.whole(), &before, &mut factors);
+            let all = seen.note(seen.tree.whole(), &before, &mut factors);
+            assert!(!seen.is_less(p, n, all), "a rough form factor is too small");
             let mut stack = vec![seen.tree.whole()];
             while let Some(part) = stack.pop() {
                 let factor = factors[part.index];
@@ -133,6 +135,7 @@ fn near_samples_are_weighted() {
                 element: usize::MAX,
                 normal: of[0][1],
                 samples: &samples,
+                clear: false,
             };
             let factor = seen.note(seen.tree.whole(), &before, &mut factors);
             let each = samples
