@@ -7,7 +7,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::elements::Elements;
-use super::near::{PartTree, blocked};
+use super::near::{PartTree, first_met};
 use super::shadow_tree::ShadowTree;
 use super::sources::Source;
 use crate::constants::{KIND_POINT, SOURCE_EYES};
@@ -16,7 +16,7 @@ use crate::structs::ShadowOccluder;
 /// Directions that a place looks in, evenly by what a surface receives from them.
 const LOOKS: usize = 8;
 
-/// How far it looks, in radii of its source.
+/// How far off what it meets hides the rest, in radii of its source.
 const REACH: f64 = 1.0;
 
 /// One of so many places is looked from to see whether some are covered.
@@ -90,14 +90,21 @@ fn ends_first(source: &mut Source) {
     }
 }
 
-/// Directions, of [`LOOKS`], in which a place on a source sees as far as the source is wide.
+/// Directions, of [`LOOKS`], in which a place on a source sees as far as the source is wide, and
+/// beyond that no back of a surface, which sends nothing: whatever shows its back on most sides
+/// encloses the place.
 fn openness(source: &Source, place: DVec3, occluders: &ShadowTree<ShadowOccluder>) -> usize {
+    let all = &occluders.nodes()[0];
+    let reach = f64::from(all.high.distance(all.low));
     let is_open = |k: &usize| {
         let r = ((*k as f64 + 0.5) / LOOKS as f64).sqrt();
         let (sin, cos) = (TURN * *k as f64 % TAU).sin_cos();
         let up = (1.0 - r * r).sqrt();
         let way = r * cos * source.tangent + r * sin * source.bitangent + up * source.normal;
-        !blocked(occluders, place, place + REACH * source.radius * way)
+        match first_met(occluders, place, reach * way) {
+            Some((at, is_back)) => !is_back && at * reach > REACH * source.radius,
+            None => true,
+        }
     };
     (0..LOOKS).filter(is_open).count()
 }

@@ -13,6 +13,8 @@ mod places;
 mod rays;
 mod receivers;
 mod seen;
+#[cfg(test)]
+mod tests;
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -26,7 +28,7 @@ use crate::structs::{NearFactor, NearPart, NearVector, ShadowOccluder};
 use pair::Search;
 pub use parts::PartTree;
 pub use places::Outlook;
-pub(super) use rays::blocked;
+pub(super) use rays::first_met;
 use receivers::Receiver;
 
 /// What counts as near.
@@ -213,27 +215,12 @@ impl NearPairs {
         }
         near.rows.begin();
         near.relief_rows.begin();
-        let of_plain = |_: &OfSource, _: &Pair, parts: &[NearPart], first: u32| {
-            let entry = |of: &NearPart| Entry {
-                part: first + of.part,
-                factor: of.factor.z,
-            };
-            parts.iter().map(entry).collect()
-        };
-        let of_relief = |of: &OfSource, pair: &Pair, parts: &[NearPart], first: u32| {
-            let whole = NearPart {
-                part: of.tree.part_count() as u32,
-                factor: pair.factor,
-            };
-            let parts = parts.iter().chain((!parts.is_empty()).then_some(&whole));
-            let entry = |of: &NearPart| NearPart {
-                part: first + of.part,
-                ..*of
-            };
-            parts.map(entry).collect()
-        };
-        near.entries = Entries::new(&found, &near.first_part, 0..plain, of_plain);
-        near.relief_entries = Entries::new(&found, &near.first_part, plain..elements, of_relief);
+        let first = &near.first_part;
+        near.entries = Entries::new(&found, first, 0..plain, false, |of| Entry {
+            part: of.part,
+            factor: of.factor.z,
+        });
+        near.relief_entries = Entries::new(&found, first, plain..elements, true, |of| of);
         near.trees = found.into_iter().map(|of| of.tree).collect();
         near
     }
@@ -258,39 +245,50 @@ impl<T> Rows<T> {
 }
 
 impl<T: Copy + Default> Entries<T> {
-    /// Sorts what becomes of the parts of `found` by element, source after source.
+    /// Sorts the parts of `found` by element, source after source; after the parts of each pair
+    /// what it receives of the whole source, where `whole` says so.
     fn new(
         found: &[OfSource],
         first_part: &[u32],
         elements: std::ops::Range<usize>,
-        entries: impl Fn(&OfSource, &Pair, &[NearPart], u32) -> Vec<T>,
+        whole: bool,
+        entry: impl Fn(NearPart) -> T,
     ) -> Self {
-        let pairs = || {
-            let sources = found.iter().zip(first_part);
-            let of_source = |(of, &first)| {
-                let of: &OfSource = of;
-                of.each().map(move |(pair, parts)| (of, pair, parts, first))
-            };
-            let own =
-                |(_, pair, ..): &(_, &Pair, _, _)| elements.contains(&(pair.element as usize));
-            sources.flat_map(of_source).filter(own)
+        let own = |pair: &Pair| (pair.element as usize).checked_sub(elements.start);
+        let count = |pair: &Pair| match pair.entries {
+            0 => 0,
+            entries => entries + u32::from(whole),
         };
         // How many each element has, then where they begin.
         let mut starts = vec![0_u32; elements.len() + 1];
-        for (of, pair, parts, first) in pairs() {
-            let e = pair.element as usize - elements.start;
-            starts[e + 1] += entries(of, pair, parts, first).len() as u32;
+        for pair in found.iter().flat_map(|of| &of.pairs) {
+            if let Some(at) = own(pair).and_then(|e| starts.get_mut(e + 1)) {
+                *at += count(pair);
+            }
         }
         for e in 0..elements.len() {
             starts[e + 1] += starts[e];
         }
-        let mut next = starts.clone();
+        let mut next = starts[..elements.len()].to_vec();
         let mut list: Vec<T> = vec![T::default(); starts[elements.len()] as usize];
-        for (of, pair, parts, first) in pairs() {
-            let at = &mut next[pair.element as usize - elements.start];
-            let new = entries(of, pair, parts, first);
-            list[*at as usize..][..new.len()].copy_from_slice(&new);
-            *at += new.len() as u32;
+        for (of, first) in found.iter().zip(first_part) {
+            for (pair, parts) in of.each() {
+                let Some(at) = own(pair).and_then(|e| next.get_mut(e)) else {
+                    continue;
+                };
+                let last = NearPart {
+                    part: of.tree.part_count() as u32,
+                    factor: pair.factor,
+                };
+                let entries = parts.iter().chain([&last]).take(count(pair) as usize);
+                for of in entries {
+                    list[*at as usize] = entry(NearPart {
+                        part: first + of.part,
+                        factor: of.factor,
+                    });
+                    *at += 1;
+                }
+            }
         }
         Self { list, starts }
     }

@@ -3,9 +3,9 @@
 use glam::{DVec3, Vec3};
 
 use super::parts::Part;
-use super::rays::blocked;
+use super::rays::{blocked, is_clear};
 use super::receivers::Receiver;
-use super::seen::Seen;
+use super::seen::{ABOVE, Before, Seen};
 use super::{Nearness, OfSource, Pair};
 use crate::math::form_factor::{sample_points, to_triangle};
 use crate::math::kept::{as_kept, direction_code, kept_direction};
@@ -22,9 +22,6 @@ const CLOSE: f64 = 4.0;
 /// about an element nearly touches, since a part of it may see what the source's eye does not.
 const BESIDE: f64 = 0.1;
 
-/// Height above a plane source from which on a place sees its front, internal units.
-const ABOVE: f64 = 1e-7;
-
 /// Times that a single member is cut in four for its visibility.
 const CUTS: u32 = 3;
 
@@ -35,49 +32,26 @@ pub(super) struct Search<'a> {
     pub nearness: Nearness,
 }
 
-/// A receiver before a source.
-struct Before<'a> {
-    element: usize,
-    normal: DVec3,
-    /// Places on it, and their weights.
-    samples: &'a [(DVec3, f64)],
-    seen: &'a Seen,
-    /// Form factors to the members as if nothing stood between, `[member]`.
-    factors: &'a [f64],
-}
-
-/// Room for the members and the parts of a source, `[member]` and `[part]`.
-pub(super) struct Room {
-    factors: Vec<f64>,
-    sums: Vec<f64>,
-}
-
-impl Room {
-    /// For sources of so many members at most.
-    pub fn of(members: usize) -> Self {
-        Self {
-            factors: vec![0.0; members],
-            sums: vec![0.0; (2 * members).saturating_sub(1)],
-        }
-    }
-}
-
 impl Search<'_> {
     pub fn source(&self, source: &Source, receivers: &[Receiver]) -> OfSource {
         let seen = Seen::new(self.elements, source);
         let mut found = OfSource::default();
-        let mut room = Room::of(seen.members.len());
+        let mut factors = vec![0.0; seen.tree.part_count()];
         // Where it is seen under that share of a view at most, however it is turned.
         let reach =
             (source.area / (std::f64::consts::PI * self.nearness.source)).sqrt() + source.radius;
+        let hull = seen.hull(source);
         for block in receivers {
+            let mut clear = None;
             let beside = source.radius + CLOSE * block.largest;
             if block.centre.distance(source.centroid) > reach.max(beside) + block.radius {
                 continue;
             }
             for e in block.elements.clone() {
                 if self.may_be_near(e, source) {
-                    self.pair(e, &seen, &mut room, &mut found);
+                    let is_clear = || is_clear(self.occluders, &block.corners, &hull);
+                    let clear = || *clear.get_or_insert_with(is_clear);
+                    self.pair(e, &seen, clear, &mut factors, &mut found);
                 }
             }
         }
@@ -110,72 +84,63 @@ impl Search<'_> {
         most > self.nearness.source * std::f64::consts::PI * gap * gap
     }
 
-    fn pair(&self, e: usize, seen: &Seen, room: &mut Room, found: &mut OfSource) {
-        let (elements, n) = (self.elements, self.elements.normal[e]);
+    /// Adds an element and its parts if the source is near. `clear` finds whether nothing can stand
+    /// between; `factors` is room, `[part]`.
+    fn pair(
+        &self,
+        e: usize,
+        seen: &Seen,
+        clear: impl FnOnce() -> bool,
+        factors: &mut [f64],
+        found: &mut OfSource,
+    ) {
+        let (elements, whole) = (self.elements, seen.tree.whole());
         let centroid = elements.centroid[e];
-        let own = |m: usize| seen.tree.members[m] as usize == e;
-        let mut all = 0.0;
-        let mut nearest = f64::INFINITY;
-        for (m, (member, factor)) in seen.members.iter().zip(&mut room.factors).enumerate() {
-            *factor = match own(m) {
-                true => 0.0,
-                false => member.form_factor(centroid, n),
-            };
-            all += *factor;
-            if !own(m) {
-                nearest = nearest.min(member.centroid.distance(centroid) - member.radius);
-            }
-        }
         let size = elements.radius(e);
-        let close = nearest <= CLOSE * size;
+        let nearest = seen.nearest(whole, centroid, e, CLOSE * size);
+        let close = nearest < CLOSE * size;
         let gap = centroid.distance(seen.middle) - seen.radius;
         let least = match gap <= CLOSE * size {
             true => BESIDE * self.nearness.source,
             false => self.nearness.source,
         };
         // The centroid of a close element may see less than its other parts.
-        if all <= least * if close { 0.5 } else { 1.0 } {
+        let of_centroid = least * if close { 0.5 } else { 1.0 };
+        let normal = elements.normal[e];
+        if seen.is_less(centroid, normal, of_centroid) {
+            return;
+        }
+        let before = |samples, clear| Before {
+            element: e,
+            normal,
+            samples,
+            clear,
+        };
+        let middle = [(centroid, 1.0)];
+        if seen.note(whole, &before(&middle, false), factors) <= of_centroid {
             return;
         }
         let [a, b, c] = elements.triangle(e);
         let points = sample_points(close, close && nearest <= size);
-        let mut samples = [(DVec3::ZERO, 0.0); 7];
+        let mut samples = [(centroid, 1.0); 7];
         for (sample, &[u, v, weight]) in samples.iter_mut().zip(points) {
             *sample = (a + u * (b - a) + v * (c - a), weight);
         }
-        let samples = &samples[..points.len()];
-        if close {
-            for (m, (member, factor)) in seen.members.iter().zip(&mut room.factors).enumerate() {
-                let of = |&(p, weight): &(DVec3, f64)| weight * member.form_factor(p, n);
-                *factor = match own(m) {
-                    true => 0.0,
-                    false => samples.iter().map(of).sum(),
-                };
-            }
-        }
-        sum_parts(seen.tree.whole(), &room.factors, &mut room.sums);
-        if room.sums[0] <= least {
+        let before = before(&samples[..points.len()], clear());
+        if close && seen.note(whole, &before, factors) <= least {
             return;
         }
-        let before = Before {
-            element: e,
-            normal: n,
-            samples,
-            seen,
-            factors: &room.factors,
-        };
-        self.parts(&before, &room.sums, found);
+        self.parts(seen, &before, factors, found);
     }
 
     /// Adds a pair with its parts.
-    fn parts(&self, before: &Before, sums: &[f64], found: &mut OfSource) {
-        let (elements, seen) = (self.elements, before.seen);
-        let e = before.element;
+    fn parts(&self, seen: &Seen, before: &Before, factors: &mut [f64], found: &mut OfSource) {
+        let (elements, e) = (self.elements, before.element);
         let first = found.entries.len();
         let OfSource { entries, rays, .. } = found;
-        self.seen_parts(before, sums, rays, |part, factor| {
+        self.seen_parts(seen, before, factors, rays, |part, factor| {
             let factor = match elements.is_meso(e) {
-                true => self.by_direction(before, part, factor),
+                true => self.by_direction(seen, before, part, factor),
                 false => Vec3::new(0.0, 0.0, factor as f32),
             };
             let part = part.index as u32;
@@ -197,7 +162,7 @@ impl Search<'_> {
             entry.factor = (entry.factor.as_dvec3() * scale).as_vec3();
         }
         // A source of one member sends what that sends, and relief sends by direction.
-        if seen.members.len() == 1 || elements.is_meso(seen.tree.members[0] as usize) {
+        if seen.triangles.len() == 1 || elements.is_meso(seen.tree.members[0] as usize) {
             found.entries.truncate(first);
         }
         found.pairs.push(Pair {
@@ -210,14 +175,18 @@ impl Search<'_> {
     /// Each part that a receiver sees any of, with its form factor.
     fn seen_parts(
         &self,
+        seen: &Seen,
         before: &Before,
-        sums: &[f64],
+        factors: &mut [f64],
         rays: &mut u64,
         mut each: impl FnMut(Part, f64),
     ) {
-        let mut stack = vec![before.seen.tree.whole()];
+        let mut stack = vec![seen.tree.whole()];
         while let Some(part) = stack.pop() {
-            let all = sums[part.index];
+            let all = match factors[part.index].is_nan() {
+                true => seen.note(part, before, factors),
+                false => factors[part.index],
+            };
             if all <= 0.0 {
                 continue;
             }
@@ -225,50 +194,39 @@ impl Search<'_> {
                 stack.extend(part.halves());
                 continue;
             }
-            let factor = self.seen_factor(before, part, rays);
+            let factor = self.seen_factor(seen, before, part, factors, rays);
             if factor > 0.0 {
                 each(part, factor);
             }
         }
     }
 
-    /// What a place sees of a source: each part with its form factor.
+    /// What a place sees of a source: each part with its form factor. `factors` is room, `[part]`.
     pub fn seen_from(
         &self,
         place: DVec3,
         normal: DVec3,
         seen: &Seen,
-        room: &mut Room,
+        factors: &mut [f64],
         each: impl FnMut(Part, f64),
     ) {
-        if (seen.middle - place).dot(normal) <= -seen.radius {
-            return;
-        }
-        for (member, factor) in seen.members.iter().zip(&mut room.factors) {
-            *factor = member.form_factor(place, normal);
-        }
-        if sum_parts(seen.tree.whole(), &room.factors, &mut room.sums) <= 0.0 {
-            return;
-        }
         let before = Before {
             element: usize::MAX,
             normal,
             samples: &[(place, 1.0)],
-            seen,
-            factors: &room.factors,
+            clear: false,
         };
-        self.seen_parts(&before, &room.sums, &mut 0, each);
+        seen.note(seen.tree.whole(), &before, factors);
+        self.seen_parts(seen, &before, factors, &mut 0, each);
     }
 
     /// A form factor to a part as a vector in the frame of an element with relief.
-    fn by_direction(&self, before: &Before, part: Part, factor: f64) -> Vec3 {
+    fn by_direction(&self, seen: &Seen, before: &Before, part: Part, factor: f64) -> Vec3 {
         let (e, n) = (before.element, before.normal);
         let Some(relief) = &self.elements.relief else {
             return Vec3::new(0.0, 0.0, factor as f32);
         };
-        let centroid = self.elements.centroid[e];
-        let members = before.seen.members[part.first..part.first + part.count].iter();
-        let sum: DVec3 = members.map(|m| m.form_factor_vector(centroid, n)).sum();
+        let sum = seen.vector(part, self.elements.centroid[e], n);
         let height = sum.dot(n);
         // Other places of the element see what its centroid does not.
         let vector = match height > LEAST_HEIGHT * sum.length() {
@@ -281,50 +239,39 @@ impl Search<'_> {
     }
 
     /// Form factor to a part with visibility, as a mean over the samples.
-    fn seen_factor(&self, before: &Before, part: Part, rays: &mut u64) -> f64 {
-        let Before {
-            normal: n,
-            samples,
-            seen,
-            factors,
-            ..
-        } = *before;
-        let range = part.first..part.first + part.count;
-        if part.count == 1 {
-            let member = &seen.members[part.first];
-            let open = |&(p, weight): &(DVec3, f64)| {
-                let factor = match samples.len() {
-                    1 => factors[part.first],
-                    _ => member.form_factor(p, n),
-                };
-                weight * self.open_share(p, n, &member.triangle, factor, CUTS, rays)
-            };
-            return samples.iter().map(open).sum();
+    fn seen_factor(
+        &self,
+        seen: &Seen,
+        before: &Before,
+        part: Part,
+        factors: &[f64],
+        rays: &mut u64,
+    ) -> f64 {
+        if before.clear {
+            return factors[part.index];
         }
         // A ray to the member that half of the part's form factor lies before.
-        let all: f64 = factors[range.clone()].iter().sum();
-        let mut passed = 0.0;
-        let middle = range.clone().find(|&m| {
-            passed += factors[m];
-            passed >= 0.5 * all
-        });
-        let member = &seen.members[middle.unwrap_or(range.start)];
+        let member = seen.middle_member(part, factors);
+        let (triangle, centroid) = (&seen.triangles[member], seen.centroid(member));
+        let n = before.normal;
         let open = |&(p, weight): &(DVec3, f64)| {
-            let of_members = seen.members[range.clone()].iter();
-            let factor: f64 = match samples.len() {
-                1 => all,
-                _ => of_members.map(|m| m.form_factor(p, n)).sum(),
+            let factor = match before.samples.len() {
+                1 => factors[part.index],
+                _ => seen.factor(part, p, n),
             };
+            if part.count == 1 {
+                return weight * self.open_share(p, n, triangle, factor, CUTS, rays);
+            }
             if factor <= 0.0 {
                 return 0.0;
             }
             *rays += 1;
-            match blocked(self.occluders, p, member.centroid) {
+            match blocked(self.occluders, p, centroid) {
                 true => 0.0,
                 false => weight * factor,
             }
         };
-        samples.iter().map(open).sum()
+        before.samples.iter().map(open).sum()
     }
 
     /// What a place sees of a triangle whose whole form factor is this: that of the quarters whose
@@ -363,15 +310,3 @@ impl Search<'_> {
 
 /// Sine of the lowest light that a part's direction is taken from.
 const LEAST_HEIGHT: f64 = 1e-3;
-
-fn sum_parts(part: Part, factors: &[f64], sums: &mut [f64]) -> f64 {
-    let sum = match part.count {
-        1 => factors[part.first],
-        _ => {
-            let [one, other] = part.halves();
-            sum_parts(one, factors, sums) + sum_parts(other, factors, sums)
-        }
-    };
-    sums[part.index] = sum;
-    sum
-}

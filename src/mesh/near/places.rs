@@ -3,7 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::pair::{Room, Search};
+use super::pair::Search;
 use super::parts::Part;
 use super::rays::blocked;
 use super::seen::Seen;
@@ -23,11 +23,11 @@ pub struct Outlook<'a> {
     sources: &'a [Source],
     /// `[source]`; none of a point light.
     seen: Vec<Option<Seen>>,
-    most_members: usize,
+    most_parts: usize,
 }
 
-/// Room for the members of one source after another.
-pub struct Looking(Room);
+/// Room for the parts of one source after another.
+pub struct Looking(Vec<f64>);
 
 impl<'a> Outlook<'a> {
     pub fn new(
@@ -39,7 +39,8 @@ impl<'a> Outlook<'a> {
             KIND_POINT => None,
             _ => Some(Seen::new(elements, source)),
         };
-        let counts = sources.iter().map(|source| source.element_count as usize);
+        let seen: Vec<Option<Seen>> = sources.par_iter().map(seen).collect();
+        let counts = seen.iter().flatten().map(|seen| seen.tree.part_count());
         Self {
             search: Search {
                 elements,
@@ -50,13 +51,13 @@ impl<'a> Outlook<'a> {
                 },
             },
             sources,
-            seen: sources.par_iter().map(seen).collect(),
-            most_members: counts.max().unwrap_or(0),
+            most_parts: counts.max().unwrap_or(0),
+            seen,
         }
     }
 
     pub fn looking(&self) -> Looking {
-        Looking(Room::of(self.most_members))
+        Looking(vec![0.0; self.most_parts])
     }
 
     /// The parts of a source, if it is a surface.
@@ -75,9 +76,9 @@ impl<'a> Outlook<'a> {
     ) {
         for (s, seen) in self.seen.iter().enumerate() {
             if let Some(seen) = seen {
-                let room = &mut looking.0;
+                let factors = &mut looking.0;
                 let part = |part: Part, factor: f64| each(s, part, factor);
-                self.search.seen_from(place, normal, seen, room, part);
+                self.search.seen_from(place, normal, seen, factors, part);
             }
         }
     }

@@ -13,6 +13,8 @@ pub(super) struct Receiver {
     pub radius: f64,
     /// Radius of an element.
     pub largest: f64,
+    /// Of the elements, each once.
+    pub corners: Vec<DVec3>,
 }
 
 impl Receiver {
@@ -30,9 +32,14 @@ impl Receiver {
                 }
                 let centre = 0.5 * (low + high);
                 let distances = elements.centroid[of.clone()].iter();
+                let mut corners = elements.corners[of.clone()].concat();
+                corners.sort_unstable();
+                corners.dedup();
+                let vertex = |&v: &u32| elements.vertices[v as usize];
                 let radii = of.clone().map(|e| elements.radius(e));
                 Self {
                     largest: radii.fold(0.0, f64::max),
+                    corners: corners.iter().map(vertex).collect(),
                     elements: of,
                     centre,
                     radius: distances.map(|c| c.distance(centre)).fold(0.0, f64::max),
