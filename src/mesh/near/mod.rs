@@ -28,7 +28,7 @@ use crate::structs::{NearFactor, NearPart, NearVector, ShadowOccluder};
 use pair::Search;
 pub use parts::PartTree;
 pub use places::Outlook;
-pub(super) use rays::first_met;
+pub(super) use rays::{blocked, first_met};
 use receivers::Receiver;
 
 /// What counts as near.
