@@ -7,8 +7,8 @@ use crate::math::form_factor::vector_to_triangle;
 use crate::mesh::elements::Elements;
 use crate::mesh::sources::Source;
 
-/// A part further off than this many of its radii, and wholly above the receiver's horizon, counts as
-/// four points with its moments of area up to the second.
+/// A part further off than this many of its radii, and wholly above the receiver's horizon, counts
+/// as four points with its moments of area up to the second.
 const AS_POINTS: f64 = 4.0;
 
 /// As [`AS_POINTS`], for a plane part where a form factor within [`ROUGH`] of the true one will do.
@@ -65,8 +65,8 @@ struct Far {
     /// The four points `centre` ± a ± b have the second moments of its area.
     spread: [DVec3; 2],
     /// Sine of the angle above the plane across the axis from which on a place sees the front of
-    /// every member, at [`AS_POINTS`] radii; 0 of a part in one plane, and more than 1 of one that is
-    /// not narrow.
+    /// every member, at [`AS_POINTS`] radii; 0 of a part in one plane, and more than 1 of one that
+    /// is not narrow.
     front: f64,
 }
 
@@ -186,8 +186,8 @@ impl Seen {
         }
     }
 
-    /// The member before and after which lie halves of a part's form factor. Notes in `factors` what
-    /// it finds on the way.
+    /// The member before and after which lie halves of a part's form factor. Notes in `factors`
+    /// what it finds on the way.
     pub fn middle_member(&self, mut part: Part, before: &Before, factors: &mut [f64]) -> usize {
         let mut left = 0.5;
         while part.count > 1 {
