@@ -244,14 +244,14 @@ impl Search<'_> {
         seen: &Seen,
         before: &Before,
         part: Part,
-        factors: &[f64],
+        factors: &mut [f64],
         rays: &mut u64,
     ) -> f64 {
         if before.clear {
             return factors[part.index];
         }
         // A ray to the member that half of the part's form factor lies before.
-        let member = seen.middle_member(part, factors);
+        let member = seen.middle_member(part, before, factors);
         let (triangle, centroid) = (&seen.triangles[member], seen.centroid(member));
         let n = before.normal;
         let open = |&(p, weight): &(DVec3, f64)| {

@@ -3,26 +3,22 @@
 use glam::DVec3;
 
 use super::parts::{Part, PartTree};
-use crate::math::form_factor::{sample_points, vector_to_triangle};
+use crate::math::form_factor::vector_to_triangle;
 use crate::mesh::elements::Elements;
 use crate::mesh::sources::Source;
 
-/// A part further off than this many of its radii, and wholly above the receiver's horizon, counts as
-/// a disc seen along its axis: off by less than 1 %.
-const AS_DISC: f64 = 5.0;
+/// A part further off than this many of its radii, and wholly above the receiver's horizon, counts
+/// as four points with its moments of area up to the second.
+const AS_POINTS: f64 = 4.0;
 
-/// A member further off than this many of its radii counts as three points: off by less than 1 %.
-const AS_POINTS: f64 = 2.5;
+/// As [`AS_POINTS`], for a plane part where a form factor within [`ROUGH`] of the true one will do.
+const AS_ROUGH_POINTS: f64 = 2.0;
 
-/// As [`AS_DISC`], for a plane part where a form factor within [`ROUGH`] of the true one will do.
-const AS_ROUGH_DISC: f64 = 3.0;
-
-/// Of a form factor, the least that [`Seen::is_less`] may take it for: 64/81 of a disc's at three
-/// radii, near its plane.
-const ROUGH: f64 = 0.6;
+/// Of a form factor, the least that [`Seen::is_less`] may take it for.
+const ROUGH: f64 = 0.7;
 
 /// Sine of the largest angle between a part's axis and a member's normal, for a part that is not in
-/// one plane to count as a disc.
+/// one plane to count as a far.
 const NARROW: f64 = 0.1;
 
 /// Height above a plane from which on a place sees its front, internal units.
@@ -50,12 +46,12 @@ pub(super) struct Seen {
     /// Of the members, in the tree's order.
     pub triangles: Vec<[DVec3; 3]>,
     /// `[part]`
-    discs: Vec<Disc>,
+    far: Vec<Far>,
 }
 
 /// A part as seen from afar.
 #[derive(Debug, Clone, Copy, Default)]
-struct Disc {
+struct Far {
     /// Centroid of the area.
     centre: DVec3,
     /// Of a ball about the centre that holds such a ball of each member.
@@ -66,9 +62,11 @@ struct Disc {
     area: f64,
     /// Sum of area times normal.
     vector_area: DVec3,
+    /// The four points `centre` ± a ± b have the second moments of its area.
+    spread: [DVec3; 2],
     /// Sine of the angle above the plane across the axis from which on a place sees the front of
-    /// every member, at [`AS_DISC`] radii; 0 of a part in one plane, and more than 1 of one that is
-    /// not narrow.
+    /// every member, at [`AS_POINTS`] radii; 0 of a part in one plane, and more than 1 of one that
+    /// is not narrow.
     front: f64,
 }
 
@@ -83,32 +81,32 @@ impl Seen {
         };
         let triangles: Vec<[DVec3; 3]> = tree.members.iter().map(triangle).collect();
         let normals = tree.members.iter().map(|&e| elements.normal[e as usize]);
-        let members: Vec<Disc> = (triangles.iter().zip(normals))
-            .map(|(triangle, normal)| Disc::of_member(triangle, normal))
+        let members: Vec<Far> = (triangles.iter().zip(normals))
+            .map(|(triangle, normal)| Far::of_member(triangle, normal))
             .collect();
-        let mut discs = vec![Disc::default(); tree.part_count()];
+        let mut far = vec![Far::default(); tree.part_count()];
         if !members.is_empty() {
-            fill(tree.whole(), &members, source.cone == 0.0, &mut discs);
+            fill(tree.whole(), &members, source.cone == 0.0, &mut far);
         }
         Self {
             middle: source.centroid,
             radius: source.radius,
             tree,
             triangles,
-            discs,
+            far,
         }
     }
 
     /// Form factor from a receiver's samples to a part, as if nothing stood between. Notes it in
     /// `factors`, `[part]`, and those that it is the sum of.
     pub fn note(&self, part: Part, before: &Before, factors: &mut [f64]) -> f64 {
-        let (disc, n) = (&self.discs[part.index], before.normal);
+        let (far, n) = (&self.far[part.index], before.normal);
         let add = |sum: f64, &(p, weight): &(DVec3, f64)| {
-            let factor = disc.vector(p, n, AS_DISC)?.dot(n).max(0.0);
+            let factor = far.vector(p, n, AS_POINTS)?.dot(n).max(0.0);
             Some(sum + weight * factor)
         };
-        let as_disc = before.samples.iter().try_fold(0.0, add);
-        let factor = match (as_disc, part.count) {
+        let as_far = before.samples.iter().try_fold(0.0, add);
+        let factor = match (as_far, part.count) {
             (Some(factor), 1) => factor,
             (Some(factor), _) => {
                 for half in part.halves() {
@@ -131,58 +129,44 @@ impl Seen {
 
     /// Form factor from a place to a part, as if nothing stood between.
     pub fn factor(&self, part: Part, p: DVec3, n: DVec3) -> f64 {
-        self.factor_by(part, p, n, AS_DISC)
+        self.factor_by(part, p, n, AS_POINTS)
     }
 
     /// Whether the form factor from a place to the whole is surely less than `least`.
     pub fn is_less(&self, p: DVec3, n: DVec3, least: f64) -> bool {
-        self.factor_by(self.tree.whole(), p, n, AS_ROUGH_DISC) < ROUGH * least
+        self.factor_by(self.tree.whole(), p, n, AS_ROUGH_POINTS) < ROUGH * least
     }
 
-    fn factor_by(&self, part: Part, p: DVec3, n: DVec3, as_disc: f64) -> f64 {
-        match (self.discs[part.index].vector(p, n, as_disc), part.count) {
+    fn factor_by(&self, part: Part, p: DVec3, n: DVec3, as_points: f64) -> f64 {
+        match (self.far[part.index].vector(p, n, as_points), part.count) {
             (Some(vector), _) => vector.dot(n).max(0.0),
-            (None, 1) => self.of_member(part, p, n).dot(n).max(0.0),
+            (None, 1) => {
+                let triangle = &self.triangles[part.first];
+                vector_to_triangle(p, n, triangle).dot(n).max(0.0)
+            }
             (None, _) => {
                 let [one, other] = part.halves();
-                self.factor_by(one, p, n, as_disc) + self.factor_by(other, p, n, as_disc)
+                self.factor_by(one, p, n, as_points) + self.factor_by(other, p, n, as_points)
             }
         }
     }
 
     /// [`Self::factor`] as a vector; see [`vector_to_triangle`].
     pub fn vector(&self, part: Part, p: DVec3, n: DVec3) -> DVec3 {
-        match (self.discs[part.index].vector(p, n, AS_DISC), part.count) {
+        match (self.far[part.index].vector(p, n, AS_POINTS), part.count) {
             (Some(vector), _) => vector,
-            (None, 1) => self.of_member(part, p, n),
+            (None, 1) => vector_to_triangle(p, n, &self.triangles[part.first]),
             (None, _) => (part.halves().into_iter())
                 .map(|half| self.vector(half, p, n))
                 .sum(),
         }
     }
 
-    /// Form factor as a vector from a place that sees the front of a member.
-    fn of_member(&self, part: Part, p: DVec3, n: DVec3) -> DVec3 {
-        let (disc, triangle) = (&self.discs[part.index], &self.triangles[part.first]);
-        let middle = disc.centre - p;
-        let least = AS_POINTS * disc.radius;
-        if !disc.is_above(p, n) || middle.length_squared() <= least * least {
-            return vector_to_triangle(p, n, triangle);
-        }
-        let [a, b, c] = triangle.map(|v| v - p);
-        let of = |&[u, v, weight]: &[f64; 3]| {
-            let way = a + u * (b - a) + v * (c - a);
-            way * (weight / way.length_squared().powi(2))
-        };
-        let sum: DVec3 = sample_points(true, false).iter().map(of).sum();
-        sum * (-middle.dot(disc.vector_area) / std::f64::consts::PI)
-    }
-
     /// The least distance from a place to the ball about a member other than element `but`, where
     /// it is less than `most`.
     pub fn nearest(&self, part: Part, p: DVec3, but: usize, most: f64) -> f64 {
-        let disc = &self.discs[part.index];
-        let gap = disc.centre.distance(p) - disc.radius;
+        let far = &self.far[part.index];
+        let gap = far.centre.distance(p) - far.radius;
         if gap >= most {
             return most;
         }
@@ -202,19 +186,22 @@ impl Seen {
         }
     }
 
-    /// The member before and after which lie halves of a part, by the form factors of [`Self::note`]
-    /// and within parts that have none by area.
-    pub fn middle_member(&self, mut part: Part, factors: &[f64]) -> usize {
-        let mut share = 0.5;
+    /// The member before and after which lie halves of a part's form factor. Notes in `factors`
+    /// what it finds on the way.
+    pub fn middle_member(&self, mut part: Part, before: &Before, factors: &mut [f64]) -> usize {
+        let mut left = 0.5;
         while part.count > 1 {
+            let [of_one, of_other] = part.halves().map(|half| {
+                if factors[half.index].is_nan() {
+                    self.note(half, before, factors);
+                }
+                factors[half.index]
+            });
             let [one, other] = part.halves();
-            let of_one = match factors[one.index].is_nan() {
-                true => self.discs[one.index].area / self.discs[part.index].area,
-                false => factors[one.index] / factors[part.index],
-            };
-            (part, share) = match share <= of_one {
-                true => (one, share / of_one),
-                false => (other, (share - of_one) / (1.0 - of_one)),
+            let share = of_one / (of_one + of_other);
+            (part, left) = match left <= share {
+                true => (one, left / share),
+                false => (other, (left - share) / (1.0 - share)),
             };
         }
         part.first
@@ -225,7 +212,7 @@ impl Seen {
     }
 }
 
-impl Disc {
+impl Far {
     fn of_member(triangle: &[DVec3; 3], normal: DVec3) -> Self {
         let [a, b, c] = *triangle;
         let centre = centroid(triangle);
@@ -238,6 +225,7 @@ impl Disc {
             high: a.max(b).max(c),
             area,
             vector_area: area * normal,
+            spread: spread(normal, triangle.map(|v| (v - centre) / 12_f64.sqrt())),
             front: 0.0,
         }
     }
@@ -250,6 +238,11 @@ impl Disc {
         let vector_area: DVec3 = members.iter().map(|m| m.vector_area).sum();
         let radii = members.iter().map(|m| m.centre.distance(centre) + m.radius);
         let axis = vector_area.normalize_or_zero();
+        let moments = members.iter().flat_map(|m| {
+            let [a, b] = m.spread;
+            [m.centre - centre, a, b].map(|v| v * (m.area / area).sqrt())
+        });
+        let spread = spread(axis, moments);
         let cosines = members.iter().map(|m| m.vector_area.dot(axis) / m.area);
         let cosine = cosines.fold(1.0, f64::min);
         let sine = (1.0 - cosine * cosine).sqrt();
@@ -260,17 +253,18 @@ impl Disc {
             high: members.iter().fold(centre, |high, m| high.max(m.high)),
             area,
             vector_area,
+            spread,
             front: match plane {
                 true => 0.0,
                 false if cosine <= 0.0 || sine > NARROW => 2.0,
-                false => sine * (1.0 - AS_DISC.powi(-2)).sqrt() + cosine / AS_DISC,
+                false => sine * (1.0 - AS_POINTS.powi(-2)).sqrt() + cosine / AS_POINTS,
             },
         }
     }
 
     /// Form factor as a vector from a place with this normal; none where the part does not count as
-    /// one disc. One in a plane does from `as_disc` radii on.
-    fn vector(&self, p: DVec3, n: DVec3, as_disc: f64) -> Option<DVec3> {
+    /// points. One in a plane does from `as_points` radii on.
+    fn vector(&self, p: DVec3, n: DVec3, as_points: f64) -> Option<DVec3> {
         let way = self.centre - p;
         let facing = -way.dot(self.vector_area);
         let is_plane = self.front == 0.0;
@@ -278,7 +272,7 @@ impl Disc {
             return Some(DVec3::ZERO);
         }
         let square = way.length_squared();
-        let least = self.radius * if is_plane { as_disc } else { AS_DISC };
+        let least = self.radius * if is_plane { as_points } else { AS_POINTS };
         let is_far = square > least * least;
         let turned = self.front * self.area;
         if !is_far || !is_plane && facing * facing <= turned * turned * square {
@@ -287,8 +281,11 @@ impl Disc {
         if facing <= 0.0 {
             return Some(DVec3::ZERO);
         }
-        let disc = std::f64::consts::PI * square + self.area;
-        (self.is_above(p, n)).then(|| way * (facing / (square * disc)))
+        let [a, b] = self.spread;
+        let points = [a + b, a - b, b - a, -a - b].map(|off| way + off);
+        let of = |way: &DVec3| *way / way.length_squared().powi(2);
+        let share = facing / (4.0 * std::f64::consts::PI);
+        (self.is_above(p, n)).then(|| share * points.iter().map(of).sum::<DVec3>())
     }
 
     /// Whether all of it lies above the horizon of a place with this normal.
@@ -302,15 +299,33 @@ fn centroid(triangle: &[DVec3; 3]) -> DVec3 {
     (triangle[0] + triangle[1] + triangle[2]) / 3.0
 }
 
-/// Finds the discs of a part and of those below it.
-fn fill(part: Part, members: &[Disc], plane: bool, discs: &mut [Disc]) {
-    discs[part.index] = match part.count {
+/// Two vectors across an axis with the second moments of these: a aᵀ + b bᵀ = Σ v vᵀ.
+fn spread(axis: DVec3, of: impl IntoIterator<Item = DVec3>) -> [DVec3; 2] {
+    let (s, t) = axis
+        .try_normalize()
+        .unwrap_or(DVec3::Z)
+        .any_orthonormal_pair();
+    let (mut ss, mut st, mut tt) = (0.0, 0.0, 0.0);
+    for v in of {
+        let (x, y) = (v.dot(s), v.dot(t));
+        (ss, st, tt) = (ss + x * x, st + x * y, tt + y * y);
+    }
+    // Cholesky's factors.
+    let along = ss.sqrt();
+    let across = if along > 0.0 { st / along } else { 0.0 };
+    let rest = (tt - across * across).max(0.0).sqrt();
+    [along * s + across * t, rest * t]
+}
+
+/// Finds how a part and those below it are seen from afar.
+fn fill(part: Part, members: &[Far], plane: bool, far: &mut [Far]) {
+    far[part.index] = match part.count {
         1 => members[part.first],
         count => {
             for half in part.halves() {
-                fill(half, members, plane, discs);
+                fill(half, members, plane, far);
             }
-            Disc::of_part(&members[part.first..part.first + count], plane)
+            Far::of_part(&members[part.first..part.first + count], plane)
         }
     };
 }
