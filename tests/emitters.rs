@@ -184,7 +184,13 @@ fn stops_and_goes_on_in_either_loop() {
     let build = room();
     // By rays, and by hemicubes.
     for emitters in [None, Some(4 * FACE)] {
-        let settings = settings(emitters);
+        let settings = Settings {
+            grouping: Grouping {
+                max_power: 1.0 / 128.0,
+                ..Grouping::default()
+            },
+            ..settings(emitters)
+        };
         let of_emitters = |report: &Report| report.emitter_hemicubes + report.emitters_by_rays;
         let whole = build.solve(&settings);
         let fine = of_emitters(&whole.report);

@@ -37,25 +37,33 @@ fn plate(gap: f64) -> (Build, std::ops::Range<usize>) {
 #[test]
 fn nothing_leaks_under_a_plate() {
     let (build, under) = plate(0.002);
-    let share = |nearness| {
+    let share = |nearness, scale: f64| {
+        let grouping = mesolux::bake::quality::scaled(scale);
         let solved = build.solve(&Settings {
             nearness,
+            grouping,
             ..Settings::default()
         });
         let all = solved.mean(&solved.irradiance, 0..solved.area.len());
         (solved.mean(&solved.irradiance, under.clone()) / all, solved)
     };
-    let (by_parts, solved) = share(Nearness::default());
-    let (by_means, _) = share(Nearness::NONE);
+    let (by_parts, solved) = share(Nearness::default(), 1.0);
+    let (by_means, _) = share(Nearness::NONE, 1.0);
+    let (of_finer, finer) = share(Nearness::default(), 0.25);
     let near = solved.report.near;
     println!("underside: {by_parts:.4} of the room's mean, {by_means:.4} by means; {near:?}");
     assert!(near.pairs > 0 && near.parts > near.pairs && near.rays > 0);
-    assert!(by_parts <= UNDERSIDE);
+    println!("with finer sources {of_finer:.4}; {:?}", finer.report.near);
+    assert!(UNDERSIDE.contains(&by_parts) && UNDERSIDE.contains(&of_finer));
+    // Light between plate and floor goes to and fro: turns alone would run away from it.
+    assert!(finer.report.near.sweeps < SWEEPS);
     assert!(by_means > 3.0 * by_parts, "the means leak");
 }
 
-/// Measured: 0.124, by means 0.60. Cells of the floor that lie half under the plate have one mean.
-const UNDERSIDE: f64 = 0.2;
+/// Measured: 0.117, by means 0.49; 0.092 with finer sources, in 18 sweeps. Cells of the floor that
+/// lie half under the plate have one mean.
+const UNDERSIDE: std::ops::Range<f64> = 0.06..0.2;
+const SWEEPS: u64 = 100;
 
 /// A box without a bottom, each side in n × n cells, on the square of `u` and `v` from `low` on.
 fn bell(build: &mut Build, low: DVec3, [u, v, up]: [DVec3; 3], n: u32) {

@@ -87,7 +87,7 @@ pub struct SolveOptions {
     #[arg(long, value_name = "X")]
     source_area: Option<f64>,
     /// Most emitted power that shoots together, as a share of the scene's [default: that of
-    /// --quality, 1/128 for normal]
+    /// --quality, 1/32 for normal]
     #[arg(long, value_name = "X")]
     source_power: Option<f64>,
     /// Leave the form factors of closed rooms as they were found, in place of scaling them so that all

@@ -30,6 +30,7 @@ mod shots;
 mod spine;
 mod system;
 mod team;
+mod turns;
 mod visibility;
 
 use std::sync::Arc;

@@ -17,10 +17,12 @@ use super::near::NearLight;
 use super::progress::{Bound, Watch};
 use super::rows::{Factors, Made};
 use super::team::Team;
+use super::turns::Turns;
 use super::visibility::Visibility;
 use super::{DrawnBatch, Problem, Report, StopReason, VISIBILITY_MEMORY};
 use crate::constants::KIND_POINT;
 use crate::error::Result;
+use crate::mesh::sources::Source;
 use crate::passes::fresh_rows::RowShape;
 use crate::passes::kept_rows::{KeptRows, KeptSize};
 use crate::passes::relief_buffers::meso_elements;
@@ -36,6 +38,8 @@ pub(super) struct Spine {
     pub kept: KeptRows,
     gathering: Gathering,
     pub near: NearLight,
+    /// Of what sources reflect of near light.
+    turns: Turns,
     /// Whether rows have brought light since `near` was solved.
     brought: bool,
 }
@@ -60,7 +64,7 @@ const UNSETTLED: f64 = 0.01;
 const UNMOVED: f64 = 0.05;
 
 /// Times that light is brought and solved by turns, at most.
-const MOST_TURNS: usize = 8;
+const MOST_TURNS: usize = 24;
 
 /// Between batches sweeps leave this share of what the undrawn sources have: it orders them well
 /// enough.
@@ -103,6 +107,7 @@ impl Spine {
         Ok(Self {
             gathering: Gathering::new(device, on, &kept)?,
             near: NearLight::new(on),
+            turns: Turns::default(),
             brought: true,
             devices: devices.to_vec(),
             team: None,
@@ -340,27 +345,42 @@ impl Spine {
         let sent = self.ledger.sent();
         self.near.solve(on, &brought, &sent, most);
         self.gathering.near(&self.near.send_to_relief(on, &sent))?;
-        let moved = self.take_near(on);
+        let moved = self.turn_near(on);
         report.seconds.near += start.elapsed().as_secs_f64();
         report.near.sweeps = self.near.sweeps;
         Ok(moved)
     }
 
-    /// Takes what the sources reflect of light from near ones. The power by which it changed.
-    fn take_near(&mut self, on: &Problem) -> f64 {
-        let near = on.sources.list.iter().map(|source| match source.kind {
+    /// What the sources reflect of light from near ones, `[source]`.
+    fn reflected_near(&self, on: &Problem) -> Vec<DVec3> {
+        let of = |source: &Source| match source.kind {
             KIND_POINT => DVec3::ZERO,
             _ => self.near.reflected(on, source),
-        });
-        self.ledger.system.set_near(near)
+        };
+        on.sources.list.iter().map(of).collect()
+    }
+
+    /// Takes what the sources are to reflect of light from near ones for the next turn. The power
+    /// by which what they do reflect is other than in this one.
+    fn turn_near(&mut self, on: &Problem) -> f64 {
+        let areas: Vec<f64> = on.sources.list.iter().map(|source| source.area).collect();
+        let (before, found) = (self.ledger.system.near(), self.reflected_near(on));
+        let apart = before.iter().zip(&found).zip(&areas);
+        let moved = apart.map(|((a, b), area)| area * (*a - *b).abs().element_sum());
+        let moved = moved.sum();
+        let next = self.turns.next(before, found, &areas);
+        self.ledger.system.set_near(&next);
+        moved
     }
 
     /// Brings light and solves by turns, until what near sources send fits the rest.
     fn settle(&mut self, on: &Problem, by_direction: bool, report: &mut Report) -> Result<()> {
         let mut turns = 0;
+        self.turns.forget();
         while turns < MOST_TURNS && !self.is_settled(on, by_direction, report)? {
             turns += 1;
         }
+        self.turns.forget();
         Ok(())
     }
 
@@ -406,7 +426,8 @@ impl Spine {
             .collect();
         self.ledger.system.measured(&reflected, &sent);
         self.near.measured();
-        self.take_near(on);
+        self.turns.forget();
+        self.ledger.system.set_near(&self.reflected_near(on));
         Ok(())
     }
 

@@ -323,15 +323,16 @@ impl System {
         }
     }
 
-    /// Sets the reflected radiosity of each source beside that of the rows, `[source]`. The power by
-    /// which it changes.
-    pub fn set_near(&mut self, reflected: impl Iterator<Item = DVec3>) -> f64 {
-        let mut moved = 0.0;
+    /// The reflected radiosity of each source beside that of the rows, `[source]`.
+    pub fn near(&self) -> Vec<DVec3> {
+        self.sources.iter().map(|source| source.near).collect()
+    }
+
+    /// See [`Self::near`].
+    pub fn set_near(&mut self, reflected: &[DVec3]) {
         for (source, near) in self.sources.iter_mut().zip(reflected) {
-            let before = std::mem::replace(&mut source.near, near);
-            moved += source.area * (near - before).abs().element_sum();
+            source.near = *near;
         }
-        moved
     }
 
     /// Sources that were drawn and have no row shoot what they have: measuring will find what

@@ -63,7 +63,7 @@ impl Default for Grouping {
         Self {
             max_elements: 48,
             max_area: 1.0 / 256.0,
-            max_power: 1.0 / 128.0,
+            max_power: 1.0 / 32.0,
             max_unevenness: 0.025,
         }
     }
