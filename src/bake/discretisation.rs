@@ -3,12 +3,9 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use crate::mesh::corners::PLANE_COS;
 use crate::scene::Scene;
 use crate::solver::{Discretisation, SurfaceError};
-
-/// Cosine of 2°, up to which elements have light in common, see
-/// [`Joined::Plane`](crate::mesh::corners::Joined::Plane).
-const PLANE_COS: f64 = 0.999_390_827_019_096;
 
 /// Part of the square of a jump between two elements of a plane that counts for each: a border of
 /// shadow crosses one of them, the smaller side of which, a quarter of its area on average, has the

@@ -9,7 +9,7 @@ use crate::scene::Scene;
 const CREASE_COS: f64 = 0.819_152_044_288_992;
 
 /// Cosine of 2°, the greatest angle between normals that counts as one plane.
-const PLANE_COS: f64 = 0.999_390_827_019_096;
+pub const PLANE_COS: f64 = 0.999_390_827_019_096;
 
 /// Most elements about a vertex that are compared with one another, so that a fan of 100,000
 /// triangles does not cost 10¹⁰ steps. About a vertex with more, no elements are joined.

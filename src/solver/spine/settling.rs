@@ -1,0 +1,98 @@
+//! Light from near sources part by part, in turns with what the rows bring.
+
+use std::time::Instant;
+
+use glam::DVec3;
+
+use super::{MOST_SWEEPS, Spine, UNSOLVED};
+use crate::constants::KIND_POINT;
+use crate::error::Result;
+use crate::mesh::sources::Source;
+use crate::solver::{Problem, Report};
+
+/// What a last sweep over near sources may change of an element's light, over the mean of all, as a
+/// share of the residual.
+const UNSETTLED: f64 = 0.01;
+
+/// Of the unshot power that turns into what may be missing: what near sources may still move.
+const UNMOVED: f64 = 0.05;
+
+/// Times that light is brought and solved by turns, at most.
+pub(super) const MOST_TURNS: usize = 24;
+
+impl Spine {
+    /// Brings the elements what all kept rows send, and what near sources send beyond their means.
+    /// The power that the sources reflect more or less for it, internal units.
+    pub fn bring(&mut self, on: &Problem, by_direction: bool, report: &mut Report) -> Result<f64> {
+        self.gather_kept(by_direction, report)?;
+        if self.near.is_empty() || !std::mem::replace(&mut self.brought, false) {
+            return Ok(0.0);
+        }
+        let start = Instant::now();
+        let brought = self.gathering.irradiance(on)?;
+        let sum: DVec3 = brought.iter().sum();
+        let mean = sum.max_element() / brought.len() as f64;
+        let most = UNSETTLED * on.settings.residual * mean;
+        let sent = self.ledger.sent();
+        self.near.solve(on, &brought, &sent, most);
+        self.gathering.near(&self.near.send_to_relief(on, &sent))?;
+        let moved = self.turn_near(on);
+        report.seconds.near += start.elapsed().as_secs_f64();
+        report.near.sweeps = self.near.sweeps;
+        Ok(moved)
+    }
+
+    /// What the sources reflect of light from near ones, `[source]`.
+    pub(super) fn reflected_near(&self, on: &Problem) -> Vec<DVec3> {
+        let of = |source: &Source| match source.kind {
+            KIND_POINT => DVec3::ZERO,
+            _ => self.near.reflected(on, source),
+        };
+        on.sources.list.iter().map(of).collect()
+    }
+
+    /// Takes what the sources are to reflect of light from near ones for the next turn. The power
+    /// by which what they do reflect is other than in this one.
+    fn turn_near(&mut self, on: &Problem) -> f64 {
+        let areas: Vec<f64> = on.sources.list.iter().map(|source| source.area).collect();
+        let (before, found) = (self.ledger.system.near(), self.reflected_near(on));
+        let apart = before.iter().zip(&found).zip(&areas);
+        let moved = apart.map(|((a, b), area)| area * (*a - *b).abs().element_sum());
+        let moved = moved.sum();
+        let next = self.turns.next(before, found, &areas);
+        self.ledger.system.set_near(&next);
+        moved
+    }
+
+    /// Brings light and solves by turns, until what near sources send fits the rest.
+    pub(super) fn settle(
+        &mut self,
+        on: &Problem,
+        by_direction: bool,
+        report: &mut Report,
+    ) -> Result<()> {
+        let mut turns = 0;
+        self.turns.forget();
+        while turns < MOST_TURNS && !self.is_settled(on, by_direction, report)? {
+            turns += 1;
+        }
+        self.turns.forget();
+        Ok(())
+    }
+
+    /// Brings light, and solves if what near sources send has moved the rest.
+    pub(super) fn is_settled(
+        &mut self,
+        on: &Problem,
+        by_direction: bool,
+        report: &mut Report,
+    ) -> Result<bool> {
+        let moved = self.bring(on, by_direction, report)?;
+        let settled = moved <= UNMOVED * self.ledger.bound.stop_power();
+        if !settled {
+            let most = UNSOLVED * self.ledger.bound.stop_power();
+            self.solve(most, MOST_SWEEPS, report);
+        }
+        Ok(settled)
+    }
+}
