@@ -103,7 +103,10 @@ fn eyes_are_not_covered() {
         .expect("the scene fits the device");
     let elements = &solver.problem.elements;
     let place = |p: DVec3| elements.origin + elements.unit * p;
-    let is_covered = |p: DVec3| is_within(place(p), low, sides);
+    // A place on the line of a side is beneath neither.
+    let [u, v] = sides;
+    let (inner, inside) = (low + 1e-6 * (u + v), sides.map(|side| (1.0 - 2e-6) * side));
+    let is_covered = |p: DVec3| is_within(place(p), inner, inside);
     let mut across = 0;
     for source in &solver.problem.sources.list {
         let on_floor = source.normal.y > 0.99 && place(source.centroid).y < 1e-6;

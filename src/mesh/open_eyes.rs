@@ -19,9 +19,6 @@ const LOOKS: usize = 8;
 /// How far off what it meets hides the rest, in radii of its source.
 const REACH: f64 = 1.0;
 
-/// One of so many places is looked from to see whether some are covered.
-const ASKED: usize = 4;
-
 /// Over the places of a source: those among which open ones are looked for where some are covered.
 const MORE: usize = 2;
 
@@ -50,7 +47,7 @@ pub fn open_eyes(
         let most = LOOKS / 2;
         let covered = |place: &DVec3| open(*place) < most;
         let eye = covered(&source.eye);
-        if !eye && !source.places.iter().step_by(ASKED).any(covered) {
+        if !eye && !source.places.iter().any(covered) {
             return 0;
         }
         let places = tree.places(elements, source, MORE * count, turn);
