@@ -52,7 +52,7 @@ fn turned_frame(normal: DVec3, seed: u64, index: u64) -> (DVec3, DVec3) {
 /// Groups that are cut for their power are stronger. The limit bounds the number of strong
 /// emitters, 512 by default, even where everything glows; the errors of many weak lamps are
 /// independent and average out.
-const LEAST: f64 = 0.25;
+const LEAST: f64 = 1.0 / 16.0;
 
 /// Power of a scene's weakest emitter that counts as strong, internal units.
 pub(crate) fn least_strong(sources: &[Source], grouping: &Grouping) -> f64 {

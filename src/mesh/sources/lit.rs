@@ -3,7 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::mesh::charts::Connections;
+use crate::mesh::charts::{Connections, morton_order};
 use crate::mesh::elements::Elements;
 use crate::mesh::near::blocked;
 use crate::mesh::occluders::Occluders;
@@ -37,7 +37,9 @@ impl<'a> Lit<'a> {
             emitted: luminance(elements.emitted[e].into()),
             reflectance: luminance(elements.reflectance[e].into()),
         };
-        let surfaces: Vec<Surface> = (0..elements.len()).map(surface).collect();
+        // In an order that does not depend on that of the input.
+        let order = morton_order(elements);
+        let surfaces: Vec<Surface> = order.iter().map(|&e| surface(e as usize)).collect();
         let points = lights.iter().map(|light| {
             let position = (light.position - elements.origin) / elements.unit;
             let square = elements.unit * elements.unit;
