@@ -76,7 +76,7 @@ fn solver_by(estimator: Estimator, transport: Transport, k: u32, shots: Option<u
         // Sources that few batches see twice.
         grouping: Grouping {
             max_area: 1.0 / 512.0,
-            max_power: 1.0 / 128.0,
+            max_power: 1.0 / 8.0,
             max_unevenness: f64::INFINITY,
             ..Grouping::default()
         },
