@@ -3,8 +3,8 @@
 //!
 //! Two surfaces close before each other, of reflectance ρ, give light to each other both by the
 //! rows of their sources, which are solved together, and part by part, which follows by turns. A
-//! turn moves light that they share by −ρ/(1 − ρ) of what is wrong with it: more than all of it from
-//! ρ = 0.5 on.
+//! turn multiplies the error of the light that they share by −ρ/(1 − ρ): from ρ = 0.5 on turns
+//! alone diverge.
 
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector};

@@ -187,7 +187,10 @@ pub fn build(
 ) -> (Sources, Connections) {
     let connections = Connections::new(elements);
     let limits = Limits::new(elements, grouping);
-    let lit = Lit::new(elements, &connections, lights);
+    let asked = grouping.max_unevenness.is_finite();
+    let lit = asked
+        .then(|| Lit::new(elements, &connections, lights))
+        .flatten();
     let groups = cut(elements, &connections, &limits, lit.as_ref());
     elements.permute(&groups.order);
     let connections = connections.permute(&groups.order);

@@ -82,19 +82,8 @@ fn on_triangle(
 
 /// The part of an edge whose heights lie within a range.
 fn between([p, q]: [DVec3; 2], [at_p, at_q]: [f64; 2], low: f64, high: f64) -> Option<[DVec3; 2]> {
-    let rise = at_q - at_p;
-    let (mut from, mut to) = (0.0_f64, 1.0_f64);
-    for (limit, sign) in [(low, 1.0), (high, -1.0)] {
-        let (start, slope) = (sign * (at_p - limit), sign * rise);
-        if slope > 0.0 {
-            from = from.max(-start / slope);
-        } else if slope < 0.0 {
-            to = to.min(-start / slope);
-        } else if start < 0.0 {
-            return None;
-        }
-    }
-    (from < to).then(|| [p + from * (q - p), p + to * (q - p)])
+    let [from, to] = share_above([[at_p - low, at_q - low], [high - at_p, high - at_q]])?;
+    Some([p + from * (q - p), p + to * (q - p)])
 }
 
 /// Where a triangle goes through height 0.
@@ -120,9 +109,17 @@ fn barycentric([a, b, c]: [DVec3; 3], p: DVec3) -> DVec2 {
 
 /// The part of a line within the triangle of these coordinates.
 pub(super) fn clipped([p, q]: Line) -> Option<Line> {
-    let (mut from, mut to) = (0.0_f64, 1.0_f64);
     let sides = |p: DVec2| [p.x, p.y, 1.0 - p.x - p.y];
-    for (start, end) in sides(p).into_iter().zip(sides(q)) {
+    let [one, other] = [sides(p), sides(q)];
+    let [from, to] = share_above([0, 1, 2].map(|k| [one[k], other[k]]))?;
+    Some([p.lerp(q, from), p.lerp(q, to)])
+}
+
+/// From where to where on a way all these are above 0, each of which is linear along it and given
+/// at its two ends.
+fn share_above<const N: usize>(of: [[f64; 2]; N]) -> Option<[f64; 2]> {
+    let (mut from, mut to) = (0.0_f64, 1.0_f64);
+    for [start, end] in of {
         let slope = end - start;
         if slope > 0.0 {
             from = from.max(-start / slope);
@@ -132,7 +129,7 @@ pub(super) fn clipped([p, q]: Line) -> Option<Line> {
             return None;
         }
     }
-    (from < to).then(|| [p.lerp(q, from), p.lerp(q, to)])
+    (from < to).then_some([from, to])
 }
 
 /// Of each triangle its edges, from corner k to the next, that end a surface or at which it turns
