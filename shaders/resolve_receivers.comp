@@ -17,6 +17,17 @@ const uint STRIDE = SOURCE_EYES / EYES;
 // SOURCE_EYES a source.
 layout(binding = 8) uniform usamplerBuffer eyes;
 
+// Less than the weight of any place, which is finite in a scene of size 1.
+const float LEAST_WEIGHT = 1e-30;
+
+// What a place on the source adds to the form factor from p, but for a constant.
+float weight_of(Eye place, Source s, vec3 p, vec3 n) {
+    vec3 d = place.at - p;
+    float square = dot(d, d);
+    float facing = -dot(d, s.cone_sin == 0.0 ? s.normal : place.normal);
+    return max(dot(d, n), 0.0) * max(facing, 0.0) / (square * square);
+}
+
 void main() {
     uint list = first_slot * RECEIVE_LISTS + LIST;
     uint count = lists[list].count;
@@ -28,22 +39,22 @@ void main() {
     vec4 ball[RAYS] = vec4[](fetch(balls, e));
     vec3 n[RAYS] = vec3[](fetch(planes, e).xyz);
     uint from = LIST == RECEIVE_CROSSED ? EYES : 1;
-    uint open_count = 0;
-    uint above_count = 0;
+    float open_sum = 0.0;
+    float sum = 0.0;
     Source eye = s;
     for (uint k = 0; k < from; k++) {
+        float weight = 1.0;
         if (LIST == RECEIVE_CROSSED) {
-            eye.eye = fetch(eyes, SOURCE_EYES * source + k * STRIDE + STRIDE / 2).xyz;
+            Eye place = load_eye(eyes, SOURCE_EYES * source + k * STRIDE + STRIDE / 2);
+            eye.eye = place.at;
+            weight = weight_of(place, s, ball[0].xyz, n[0]);
         }
-        // What lies below the horizon is not in the form factor.
-        bool above = LIST != RECEIVE_CROSSED || dot(eye.eye - ball[0].xyz, n[0]) > 0.0;
-        bool open[RAYS] = bool[](above && gl_GlobalInvocationID.x < count);
+        bool open[RAYS] = bool[](weight > 0.0 && gl_GlobalInvocationID.x < count);
         look(eye, ball, n, open);
-        open_count += open[0] ? 1 : 0;
-        above_count += above ? 1 : 0;
+        open_sum += open[0] ? weight : 0.0;
+        sum += weight;
     }
     bool near;
     uint kind = kind_of(s, ball[0], n[0], near);
-    float share = float(max(open_count, 1)) / float(max(above_count, 1));
-    append(first_slot, kind, open_count > 0, with_share(i, share));
+    append(first_slot, kind, open_sum > 0.0, with_share(i, open_sum / max(sum, LEAST_WEIGHT)));
 }

@@ -36,12 +36,13 @@ shared! {
     RECEIVE_CROSSED = 5;
     RECEIVE_LISTS = 6;
     /// Places on a strong emitter from which rays find the share of it that such an element sees;
-    /// on other sources fewer. A power of two, at most 32.
-    SOURCE_EYES = 32;
+    /// on other sources fewer. A power of two.
+    SOURCE_EYES = 128;
     /// The first of those are its ends: where they are seen as its eye is, no silhouette cuts it.
     SOURCE_ENDS = 4;
-    /// Bits of a listed element below those of that share.
-    LISTED_BITS = 27;
+    /// Bits of a listed element, and above them of the share of a source that it sees.
+    LISTED_BITS = 25;
+    SHARE_BITS = 7;
     /// Elements that an invocation sorts: they share the data that it loads of each source.
     SORT_ELEMENTS = 4;
     /// Most slots that a dispatch sorts receivers for: the bits of a word.

@@ -5,6 +5,7 @@
 mod common;
 
 use common::solve;
+use glam::Vec3;
 use mesolux::bench::stress::occluded_elements;
 use mesolux::solver::{Estimator, Settings};
 
@@ -47,3 +48,31 @@ fn radiosity_is_one_everywhere() {
     );
     assert!(rms <= 3e-3 && max <= 2e-2, "rms {rms}, max {max}");
 }
+
+/// Black surfaces that all emit one radiosity receive it everywhere. Each source is a strong emitter,
+/// of which rays find the share that is seen.
+#[test]
+fn irradiance_is_that_of_all_emitters() {
+    let mut elements = occluded_elements(20, 3, 0.0);
+    elements.emitted.fill(Vec3::ONE);
+    let solved = solve(elements, &[], &Settings::default());
+    let (mut sum, mut area, mut max) = (0.0, 0.0, 0f64);
+    for (e, a) in solved.irradiance.iter().zip(&solved.area) {
+        let error = f64::from(e.x) - 1.0;
+        sum += a * error * error;
+        area += a;
+        max = max.max(error.abs());
+    }
+    let rms = (sum / area).sqrt();
+    println!("{:?}", solved.report.by_rays);
+    println!("rms {:.3} %, max {:.2} %", 100.0 * rms, 100.0 * max);
+    assert!(solved.report.by_rays.silhouettes > 100_000);
+    assert!(
+        rms <= STRONG_RMS && max <= STRONG_MOST,
+        "rms {rms}, max {max}"
+    );
+}
+
+/// Measured:
+const STRONG_RMS: f64 = 2e-3;
+const STRONG_MOST: f64 = 2e-2;

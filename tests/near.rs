@@ -113,8 +113,13 @@ fn eyes_are_not_covered() {
         let members = || source.members().map(|e| is_covered(elements.centroid[e]));
         if on_floor && members().any(|covered| covered) && members().any(|covered| !covered) {
             across += 1;
-            for p in source.places.iter().chain([&source.eye]) {
-                assert!(!is_covered(*p), "{}", place(*p));
+            for p in source
+                .places
+                .iter()
+                .map(|place| place.at)
+                .chain([source.eye])
+            {
+                assert!(!is_covered(p), "{}", place(p));
             }
         }
     }

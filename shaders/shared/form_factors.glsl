@@ -245,7 +245,7 @@ void main() {
     uint word = listed[list * element_count + at];
     uint i = bitfieldExtract(word, 0, int(LISTED_BITS));
     // The share of the source that it sees.
-    float share = float((word >> LISTED_BITS) + 1) / 32.0;
+    float share = SHARE_STEP * float((word >> LISTED_BITS) + 1);
     uint e = first_element + i;
     Source s = load_source(slots[first_slot].source);
     vec3 n = fetch(planes, e).xyz;

@@ -24,9 +24,9 @@ void append(uint slot, uint kind, bool mine, uint listed_word) {
     }
 }
 
-// An element with the share of the source that it sees, rounded to a multiple of 1/32 above 0.
+// An element with the share of the source that it sees, rounded to a multiple of SHARE_STEP above 0.
 uint with_share(uint i, float share) {
-    return i | uint(max(share * 32.0 - 0.5, 0.0)) << LISTED_BITS;
+    return i | uint(max(share / SHARE_STEP - 0.5, 0.0)) << LISTED_BITS;
 }
 
 // The same for one of the lists that are resolved by rays.

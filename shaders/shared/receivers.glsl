@@ -53,8 +53,21 @@ const float ACUTE = 2.1;
 // has another sign.
 const float FLAT_POINT_DISTANCE = 32.0;
 const float POINT_DISTANCE = 16.0;
+// Step of the share of a source that a listed element sees.
+const float SHARE_STEP = 1.0 / float(1 << SHARE_BITS);
 // An element no further than so many of its radii from a source takes several samples.
 const float NEAR = 4.0;
+
+// A place on a source.
+struct Eye {
+    vec3 at;
+    vec3 normal;    // about; 0 on plane sources
+};
+
+Eye load_eye(usamplerBuffer eyes, uint index) {
+    uvec4 words = fetch_words(eyes, index);
+    return Eye(uintBitsToFloat(words.xyz), unpackSnorm4x8(words.w).xyz);
+}
 
 #ifdef SHADOW_OCCLUDERS
 #include "shared/shadow_packets.glsl"

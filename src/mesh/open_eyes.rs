@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::elements::Elements;
 use super::near::{PartTree, first_met};
 use super::shadow_tree::ShadowTree;
-use super::sources::Source;
+use super::sources::{Source, SourcePlace};
 use crate::constants::{KIND_POINT, SOURCE_EYES};
 use crate::structs::ShadowOccluder;
 
@@ -19,8 +19,8 @@ const LOOKS: usize = 8;
 /// How far off what it meets hides the rest, in radii of its source.
 const REACH: f64 = 1.0;
 
-/// Over the places of a source: those among which open ones are looked for where some are covered.
-const MORE: usize = 2;
+/// Of the places of a source, one in this many is looked at for cover.
+const EVERY: usize = 4;
 
 /// Golden angle.
 const TURN: f64 = 2.399_963_23;
@@ -45,25 +45,26 @@ pub fn open_eyes(
         }
         let open = |place: DVec3| openness(source, place, occluders);
         let most = LOOKS / 2;
-        let covered = |place: &DVec3| open(*place) < most;
-        let eye = covered(&source.eye);
-        if !eye && !source.places.iter().any(covered) {
+        let covered = |place: DVec3| open(place) < most;
+        let eye = covered(source.eye);
+        let looked_at = || source.places.iter().step_by(EVERY);
+        if !eye && !looked_at().any(|place| covered(place.at)) {
             return 0;
         }
-        let places = tree.places(elements, source, MORE * count, turn);
-        let openness: Vec<usize> = places.iter().map(|&place| open(place)).collect();
+        let places = &source.places;
+        let openness: Vec<usize> = places.iter().map(|place| open(place.at)).collect();
         let best = openness.iter().copied().max().unwrap_or(0);
-        let open: Vec<DVec3> = (places.iter().zip(&openness))
+        let open: Vec<SourcePlace> = (places.iter().zip(&openness))
             .filter(|(_, open)| 2 * **open >= best)
-            .map(|(&place, _)| place)
+            .map(|(place, _)| *place)
             .collect();
         let nearest = |to: DVec3| {
-            let distance = |place: &&DVec3| place.distance_squared(to);
+            let distance = |place: &&SourcePlace| place.at.distance_squared(to);
             open.iter()
                 .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-                .copied()
+                .map(|place| place.at)
         };
-        let middle = open.iter().sum::<DVec3>() / open.len() as f64;
+        let middle = open.iter().map(|place| place.at).sum::<DVec3>() / open.len() as f64;
         let moved = eye && best >= most;
         if let Some(place) = nearest(middle).filter(|_| moved) {
             source.eye = place;
@@ -81,7 +82,7 @@ fn ends_first(source: &mut Source) {
     let (t, b) = (source.tangent, source.bitangent);
     let places = &mut source.places;
     for (k, way) in [t + b, -t - b, t - b, b - t].into_iter().enumerate() {
-        let along = |i: &usize| places[*i].dot(way);
+        let along = |i: &usize| places[*i].at.dot(way);
         let furthest = (k..places.len()).max_by(|i, j| along(i).total_cmp(&along(j)));
         places.swap(k, furthest.unwrap_or(k));
     }

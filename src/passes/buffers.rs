@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use bytemuck::Pod;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::receiver_blocks::receiver_blocks;
 use super::types::{Component, Meshlet, Source, Triangle, contour_corners};
@@ -15,7 +15,7 @@ use crate::mesh::elements::Elements;
 use crate::mesh::meshlets;
 use crate::mesh::near::{NearPairs, Rows};
 use crate::mesh::occluders::Occluders;
-use crate::mesh::sources::{self, Sources};
+use crate::mesh::sources::{self, SourcePlace, Sources};
 use crate::vk::{Buffer, BufferUse, Commands, Device, Stage};
 
 /// The scene in internal units: read by the passes, never written.
@@ -143,15 +143,28 @@ impl SceneBuffers {
     }
 }
 
-/// Places on each source, `[source][SOURCE_EYES]`.
+/// Places on each source, with the packed normals of curved ones, `[source][SOURCE_EYES]`.
 fn eyes(sources: &Sources) -> Vec<[f32; 4]> {
     let of_source = |source: &sources::Source| {
-        // A point light sees from one place, and so does a source whose light is not cut.
-        let places = (0..SOURCE_EYES as usize).map(|k| source.places.get(k).unwrap_or(&source.eye));
-        let texels = places.map(|place| place.as_vec3().extend(0.0).to_array());
-        texels.collect::<Vec<_>>()
+        let texel = |k| {
+            // A point light sees from one place, and so does a source whose light is not cut.
+            let place: Option<&SourcePlace> = source.places.get(k);
+            let at = place.map_or(source.eye, |place| place.at).as_vec3();
+            let normal = place
+                .map(|place| place.normal)
+                .filter(|_| source.cone > 0.0);
+            at.extend(packed(normal.unwrap_or_default())).to_array()
+        };
+        (0..SOURCE_EYES as usize).map(texel).collect::<Vec<_>>()
     };
     sources.list.iter().flat_map(of_source).collect()
+}
+
+/// The bits of a vector with components from -1 to 1, as `unpackSnorm4x8` reads them.
+fn packed(vector: DVec3) -> f32 {
+    let bytes = vector.to_array().map(|c| (c * 127.0).round() as i8 as u8);
+    let [x, y, z] = bytes;
+    f32::from_bits(u32::from_le_bytes([x, y, z, 0]))
 }
 
 /// Normal n and n · x, `[element]`.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::{Estimator, Settings, Visibility};
-use crate::constants::KIND_POINT;
+use crate::constants::{KIND_POINT, LISTED_BITS};
 use crate::error::{Error, Result};
 use crate::mesh::charts::Connections;
 use crate::mesh::elements::Elements;
@@ -55,6 +55,11 @@ impl Problem {
         settings: &Settings,
         kept: Option<&Visibility>,
     ) -> Result<Self> {
+        if elements.len() > 1 << LISTED_BITS {
+            let (count, most) = (elements.len(), 1 << LISTED_BITS);
+            let what = format!("{count} elements, more than the {most} that can be solved");
+            return Err(Error::Usage(what));
+        }
         let grouped_by = match kept {
             Some(kept) => kept.grouped_by(),
             None => GroupedBy {

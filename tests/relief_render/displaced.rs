@@ -32,29 +32,23 @@ const PROMISED: Limits = Limits {
     bias: 0.01,
 };
 
-/// What is held of it in the parts of the light. Of the indirect light the elements alone take 1.2
-/// % where the red wall is near, as on the flat floor.
-const LIMITS: [(Light, Limits); 3] = [
-    (Light::Global, PROMISED),
-    (Light::Direct, PROMISED),
-    (
-        Light::Indirect,
-        Limits {
-            bias: 0.015,
-            ..PROMISED
-        },
-    ),
-];
+/// What is held of the indirect light on relief. Measured: 0.0034 at most, of which the paths' own
+/// error of the mean is 0.001.
+const INDIRECT: Limits = Limits {
+    bias: 0.007,
+    ..PROMISED
+};
 
-/// Bias of a relief's picture beyond that of the flat floor's. Measured with 960 paths: 0.0094, and
-/// the same where every element is a source; the paths' own error of the mean is 0.1 % of indirect
-/// light there.
-const RELIEF_BIAS: f64 = 0.01;
+/// The same on the flat floor. Measured: 0.0074; elements of an eighth of the room, which the slope
+/// of the light beside the red wall is not even over.
+const INDIRECT_ON_FLAT: Limits = Limits {
+    bias: 0.015,
+    ..PROMISED
+};
 
 #[test]
 fn pictures_are_those_of_the_displaced_scene() {
     let folder = tempfile::tempdir().expect("a folder for the test");
-    let mut flat_bias = [[0.0; 3]; 3];
     let mut failures = Vec::new();
     for case in &CASES {
         let scene = room(case);
@@ -70,7 +64,7 @@ fn pictures_are_those_of_the_displaced_scene() {
             bake_time.as_secs_f64(),
             fine.triangles.len()
         );
-        for (camera, flat_bias) in scene.cameras.iter().zip(&mut flat_bias) {
+        for camera in &scene.cameras {
             let start = Instant::now();
             let trace = |light, paths| {
                 Reference::new(&tracer, &view(camera), light, paths).expect("a picture")
@@ -80,11 +74,18 @@ fn pictures_are_those_of_the_displaced_scene() {
             let global = direct.plus(&indirect);
             let trace_time = start.elapsed();
             let start = Instant::now();
-            let references = [&global, &direct, &indirect];
-            let limits = LIMITS.iter().zip(references).zip(flat_bias);
-            for (((part, limits), reference), flat_bias) in limits {
+            let of_indirect = match case.name {
+                "flat" => INDIRECT_ON_FLAT,
+                _ => INDIRECT,
+            };
+            let parts = [
+                (Light::Global, PROMISED, &global),
+                (Light::Direct, PROMISED, &direct),
+                (Light::Indirect, of_indirect, &indirect),
+            ];
+            for (part, limits, reference) in parts {
                 let lighting = Lighting {
-                    part: *part,
+                    part,
                     cache: Some(folder.path()),
                     ..Lighting::from(&solution)
                 };
@@ -99,14 +100,7 @@ fn pictures_are_those_of_the_displaced_scene() {
                     100.0 * found.rms
                 );
                 show(&at, &picture, &reference.picture);
-                if case.name == "flat" {
-                    *flat_bias = found.bias;
-                }
-                let beyond_flat = (found.bias - *flat_bias).abs();
-                if rel_mse > limits.rel_mse
-                    || found.bias.abs() > limits.bias
-                    || beyond_flat > RELIEF_BIAS
-                {
+                if rel_mse > limits.rel_mse || found.bias.abs() > limits.bias {
                     failures.push(at);
                 }
             }

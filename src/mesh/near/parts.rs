@@ -1,10 +1,8 @@
 //! The members of a source as a tree of parts.
 
-use glam::DVec3;
-
 use crate::math::form_factor::spread_in_triangle;
 use crate::mesh::elements::Elements;
-use crate::mesh::sources::Source;
+use crate::mesh::sources::{Source, SourcePlace};
 
 /// A binary tree over the members of a source, in depth-first order: part 0 is the whole source. A
 /// part of `count` members from `first` on has the first half of them as its next part, and the
@@ -65,9 +63,10 @@ impl PartTree {
         source: &Source,
         count: usize,
         turn: usize,
-    ) -> Vec<DVec3> {
+    ) -> Vec<SourcePlace> {
         if self.members.is_empty() {
-            return vec![source.eye; count];
+            let (at, normal) = (source.eye, source.normal);
+            return vec![SourcePlace { at, normal }; count];
         }
         let triangle = |m: u32| match source.contour.first().map(Vec::as_slice) {
             // An element that is cut into several sources.
@@ -89,7 +88,10 @@ impl PartTree {
             }
             let [a, b, c] = triangle(self.members[m]);
             let [u, v] = spread_in_triangle(turn * count + k);
-            places.push(a + u * (b - a) + v * (c - a));
+            places.push(SourcePlace {
+                at: a + u * (b - a) + v * (c - a),
+                normal: elements.normal[self.members[m] as usize],
+            });
         }
         places
     }

@@ -77,7 +77,7 @@ pub struct Source {
     pub eye: DVec3,
     /// Places on it, evenly by area, from which silhouettes cut it; none before
     /// [`crate::mesh::open_eyes`].
-    pub places: Vec<DVec3>,
+    pub places: Vec<SourcePlace>,
     /// Centroid of the area.
     pub centroid: DVec3,
     /// Mean normal, and the hemicube's other two axes.
@@ -102,6 +102,14 @@ pub struct Source {
     /// Outline, counter-clockwise seen from the front.
     pub contour: Vec<Loop>,
     pub component: u32,
+}
+
+/// A place on a source.
+#[derive(Debug, Clone, Copy)]
+pub struct SourcePlace {
+    pub at: DVec3,
+    /// Of the member that it lies on.
+    pub normal: DVec3,
 }
 
 /// A few members of a curved source.
