@@ -46,7 +46,7 @@ fn radiosity_is_one_everywhere() {
         100.0 * pixel_rms,
         100.0 * pixel_max
     );
-    assert!(rms <= 3e-3 && max <= 2e-2, "rms {rms}, max {max}");
+    assert!(rms <= 2e-3 && max <= 2e-2, "rms {rms}, max {max}");
 }
 
 /// Black surfaces that all emit one radiosity receive it everywhere. Each source is a strong emitter,
@@ -73,6 +73,6 @@ fn irradiance_is_that_of_all_emitters() {
     );
 }
 
-/// Measured:
-const STRONG_RMS: f64 = 2e-3;
+/// Measured: 8.8e-4 and 0.98 %; with places of one weight the first is 1.18e-3.
+const STRONG_RMS: f64 = 1.05e-3;
 const STRONG_MOST: f64 = 2e-2;
