@@ -127,19 +127,11 @@ bool shown(vec3 p, vec3 n, uint slot, Source s) {
 uint sight_of(vec3 p, vec3 n, uint element, uint slot, Source s, bool asks) {
     vec3 d = p - s.eye;
     vec3 local = vec3(dot(d, s.tangent), dot(d, s.bitangent), dot(d, s.normal));
-    vec2 texel = hemicube_texel(local, face_size);
-    ivec2 first = hemicube_corner(texel, face_size);
-    ivec2 own = clamp(hemicube_pixel(texel, face_size) - first, ivec2(0), ivec2(1));
-    ivec2 column = ivec2(slot * face_size, 0);
-    // Its own pixel first.
-    ivec2 pixel[4];
-    uint item[4];
-    bool same = true;
-    for (uint k = 0; k < 4; k++) {
-        pixel[k] = first + (own ^ ivec2(k & 1, k >> 1));
-        item[k] = texelFetch(items, column + pixel[k], 0).r;
-        same = same && item[k] == item[0];
-    }
+    ivec2 first = hemicube_corner(hemicube_texel(local, face_size), face_size);
+    vec2 between = vec2(first + ivec2(slot * face_size + 1, 1)) / vec2(textureSize(items, 0));
+    uvec4 item = textureGather(items, between);
+    ivec2 pixel[4] = ivec2[](first + ivec2(0, 1), first + 1, first + ivec2(1, 0), first);
+    bool same = item.yzw == item.xxx;
     // In front of what they all show, p is open whatever the pixel.
     vec4 plane = fetch(planes, item[0] == NONE ? 0 : item[0]);
     float height = dot(plane.xyz, p) - plane.w;

@@ -179,45 +179,52 @@ void main() {
             uint slot = first_slot + findLSB(sighted);
             sighted &= sighted - 1;
             Source s = load_source(slots[slot].source);
+            uint of_slot = 0;
+#ifdef SHADOW_RAYS
             uint kind[SORT_ELEMENTS];
             bool seen[SORT_ELEMENTS];
-            bool doubtful[SORT_ELEMENTS];
             bool crossed[SORT_ELEMENTS];
             bool near[SORT_ELEMENTS];
             for (uint j = 0; j < SORT_ELEMENTS; j++) {
                 uint i = first + j * gl_SubgroupSize;
                 kind[j] = kind_of(s, ball[j], n[j], near[j]);
                 seen[j] = i < element_count && kind[j] < RECEIVE_KINDS && !near[j];
-                doubtful[j] = false;
                 // The element's own body would hide the eye.
                 crossed[j] = SILHOUETTES == 1 && seen[j] && eye_is_below(s, ball[j].xyz, n[j]);
                 seen[j] = seen[j] && !crossed[j];
             }
-#ifdef SHADOW_RAYS
             bool asked[SORT_ELEMENTS] = seen;
             look(s, ball, n, seen);
             if (SILHOUETTES == 1 && s.kind == KIND_SURFACE) {
                 cross_unlike(slots[slot].source, s, ball, n, asked, seen, crossed);
             }
-#else
-            for (uint j = 0; j < SORT_ELEMENTS; j++) {
-                uint e = first_element + first + j * gl_SubgroupSize;
-                bool wide = SILHOUETTES == 1 && seen[j] && form_factor_about(s, ball[j].xyz, n[j]) > CROSSED_FACTOR;
-                uint sight = sight_of(ball[j].xyz, n[j], e, slot, s, seen[j]);
-                crossed[j] = crossed[j] || wide && sight == DOUBTFUL || around_differs(ball[j].xyz, n[j], slot, s, sight, wide);
-                seen[j] = sight == SEEN;
-                doubtful[j] = sight == DOUBTFUL && !crossed[j];
-            }
-#endif
-            uint of_slot = 0;
             for (uint j = 0; j < SORT_ELEMENTS; j++) {
                 uint i = first + j * gl_SubgroupSize;
                 bool mine = i < element_count && kind[j] < RECEIVE_KINDS;
                 append(slot, kind[j], mine && (near[j] || seen[j]) && !crossed[j], with_share(i, 1.0));
-                append_open(slot, RECEIVE_DOUBTFUL, doubtful[j], i);
                 append_open(slot, RECEIVE_CROSSED, crossed[j], i);
                 of_slot += subgroupBallotBitCount(subgroupBallot(i < element_count && kind[j] == RECEIVE_KINDS));
             }
+#else
+            for (uint j = 0; j < SORT_ELEMENTS; j++) {
+                uint i = first + j * gl_SubgroupSize;
+                uint e = first_element + i;
+                bool near;
+                uint kind = kind_of(s, ball[j], n[j], near);
+                bool mine = i < element_count && kind < RECEIVE_KINDS;
+                bool asks = mine && !near;
+                // The element's own body would hide the eye.
+                bool below = SILHOUETTES == 1 && asks && eye_is_below(s, ball[j].xyz, n[j]);
+                asks = asks && !below;
+                bool wide = SILHOUETTES == 1 && asks && form_factor_about(s, ball[j].xyz, n[j]) > CROSSED_FACTOR;
+                uint sight = sight_of(ball[j].xyz, n[j], e, slot, s, asks);
+                bool crossed = below || wide && sight == DOUBTFUL || around_differs(ball[j].xyz, n[j], slot, s, sight, wide);
+                append(slot, kind, mine && (near || sight == SEEN) && !crossed, with_share(i, 1.0));
+                append_open(slot, RECEIVE_DOUBTFUL, sight == DOUBTFUL && !crossed, i);
+                append_open(slot, RECEIVE_CROSSED, crossed, i);
+                of_slot += subgroupBallotBitCount(subgroupBallot(i < element_count && kind == RECEIVE_KINDS));
+            }
+#endif
             if (subgroupElect()) {
                 atomicAdd(away_count[slot], of_slot);
             }
