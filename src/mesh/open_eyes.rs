@@ -43,16 +43,16 @@ pub fn open_eyes(
         if source.element_count == 1 {
             return 0;
         }
-        let open = |place: DVec3| openness(source, place, occluders);
+        let open = |place: DVec3| open_looks(source, place, occluders);
         let most = LOOKS / 2;
-        let covered = |place: DVec3| open(place) < most;
+        let covered = |place: DVec3| open(place).take(most).count() < most;
         let eye = covered(source.eye);
         let looked_at = || source.places.iter().step_by(EVERY);
         if !eye && !looked_at().any(|place| covered(place.at)) {
             return 0;
         }
         let places = &source.places;
-        let openness: Vec<usize> = places.iter().map(|place| open(place.at)).collect();
+        let openness: Vec<usize> = places.iter().map(|place| open(place.at).count()).collect();
         let best = openness.iter().copied().max().unwrap_or(0);
         let open: Vec<SourcePlace> = (places.iter().zip(&openness))
             .filter(|(_, open)| 2 * **open >= best)
@@ -91,10 +91,14 @@ fn ends_first(source: &mut Source) {
 /// Directions, of [`LOOKS`], in which a place on a source sees as far as the source is wide, and
 /// beyond that no back of a surface, which sends nothing: whatever shows its back on most sides
 /// encloses the place.
-fn openness(source: &Source, place: DVec3, occluders: &ShadowTree<ShadowOccluder>) -> usize {
+fn open_looks(
+    source: &Source,
+    place: DVec3,
+    occluders: &ShadowTree<ShadowOccluder>,
+) -> impl Iterator<Item = usize> {
     let all = &occluders.nodes()[0];
     let reach = f64::from(all.high.distance(all.low));
-    let is_open = |k: &usize| {
+    let is_open = move |k: &usize| {
         let r = ((*k as f64 + 0.5) / LOOKS as f64).sqrt();
         let (sin, cos) = (TURN * *k as f64 % TAU).sin_cos();
         let up = (1.0 - r * r).sqrt();
@@ -104,5 +108,5 @@ fn openness(source: &Source, place: DVec3, occluders: &ShadowTree<ShadowOccluder
             None => true,
         }
     };
-    (0..LOOKS).filter(is_open).count()
+    (0..LOOKS).filter(is_open)
 }
