@@ -104,12 +104,10 @@ impl Search<'_> {
             true => BESIDE * self.nearness.source,
             false => self.nearness.source,
         };
+        let is_beside = close && nearest <= size;
         // The centroid of a close element may see less than its other parts.
         let of_centroid = least * if close { 0.5 } else { 1.0 };
         let normal = elements.normal[e];
-        if seen.is_less(centroid, normal, of_centroid) {
-            return;
-        }
         let before = |samples, clear| Before {
             element: e,
             normal,
@@ -117,11 +115,16 @@ impl Search<'_> {
             clear,
         };
         let middle = [(centroid, 1.0)];
-        if seen.note(whole, &before(&middle, false), factors) <= of_centroid {
+        // That of one beside a member may see nothing: across a thin gap a place sees no further
+        // than the gap is wide.
+        if !is_beside
+            && (seen.is_less(centroid, normal, of_centroid)
+                || seen.note(whole, &before(&middle, false), factors) <= of_centroid)
+        {
             return;
         }
         let [a, b, c] = elements.triangle(e);
-        let points = sample_points(close, close && nearest <= size);
+        let points = sample_points(close, is_beside);
         let mut samples = [(centroid, 1.0); 7];
         for (sample, &[u, v, weight]) in samples.iter_mut().zip(points) {
             *sample = (a + u * (b - a) + v * (c - a), weight);
