@@ -69,8 +69,12 @@ pub struct RefinedFrom {
     pub on_input: Vec<OnInput>,
 }
 
-/// Of the size that is asked for: the least that close surfaces lead to.
+/// Of the size that is asked for: the least that close surfaces of the same shell lead to.
 const LEAST: f64 = 0.5;
+
+/// Of the size that is asked for: the least that close surfaces of other shells lead to, which
+/// light falls off towards from all sides.
+const LEAST_APART: f64 = 0.25;
 
 /// Of the diagonal of a shell: no triangle of it is longer.
 const OF_SHELL: f64 = 0.25;
@@ -286,7 +290,7 @@ impl Wish<'_> {
         if longest > size {
             return false;
         }
-        let close = || self.surroundings.size_at(self.input, corners, size);
-        longest <= LEAST * size || longest <= close()
+        let close = || self.surroundings.size_at(self.input, input, corners, size);
+        longest <= LEAST_APART * size || longest <= close()
     }
 }

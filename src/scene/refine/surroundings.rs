@@ -9,7 +9,7 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::{Boundable, BvhBuildParams};
 
-use super::{LEAST, Scene};
+use super::{LEAST, LEAST_APART, Scene};
 
 /// Surfaces about a place.
 pub(super) struct Surroundings {
@@ -92,9 +92,9 @@ impl Surroundings {
         }
     }
 
-    /// The size of a triangle that what lies in front of it asks for, `size` at most: no longer than
-    /// other surfaces are off.
-    pub fn size_at(&self, scene: &Scene, [a, b, c]: [DVec3; 3], size: f64) -> f64 {
+    /// The size of a piece of triangle `input` that what lies in front of it asks for, `size` at
+    /// most: no longer than other surfaces are off.
+    pub fn size_at(&self, scene: &Scene, input: usize, [a, b, c]: [DVec3; 3], size: f64) -> f64 {
         let middle = (a + b + c) / 3.0;
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let mut found = size;
@@ -118,7 +118,11 @@ impl Surroundings {
                 let other = scene.corners(&scene.triangles[o]);
                 if self.faces(middle, normal, other) {
                     let distance = middle.distance(nearest(middle, other));
-                    found = found.min(distance.max(LEAST * size));
+                    let least = match self.shell[o] == self.shell[input] {
+                        true => LEAST,
+                        false => LEAST_APART,
+                    };
+                    found = found.min(distance.max(least * size));
                 }
             }
         }
