@@ -2,13 +2,13 @@
 //! `cargo run --release --no-default-features --example bake -- cornell-relief`
 
 use mesolux::bake;
-use mesolux::scene::{self, BuiltinOptions};
+use mesolux::scene::{self, LoadOptions};
 use mesolux::solver::{self, Settings};
 
 fn main() -> mesolux::error::Result<()> {
     let name = std::env::args().nth(1);
     let name = name.as_deref().unwrap_or("cornell-relief");
-    let scene = scene::load(name, &BuiltinOptions::default())?;
+    let scene = scene::load(name, &LoadOptions::default())?;
     let device = solver::open_device(None, false)?;
     let solution = bake::bake(&device, &scene, &Settings::default(), |update| {
         eprintln!("{} shots, {:.4} unshot", update.shots, update.unshot_share);

@@ -8,7 +8,7 @@ use mesolux::bench::measure::Measure;
 use mesolux::bench::places::{Sample, place_of, places};
 use mesolux::bench::truth::{PARTS, Truth};
 use mesolux::path_tracer::PathTracer;
-use mesolux::scene::{BuiltinOptions, Refinement, Scene};
+use mesolux::scene::{LoadOptions, Refinement, Scene};
 use mesolux::solver::{Place, Settings};
 
 /// A room with a block that stands aslant in it, and a lamp below the ceiling: 26 triangles.
@@ -103,9 +103,9 @@ fn estimates_of_several_scenes() {
     }
     estimate_and_truth(&room.refined(&Refinement::default()), 6000);
     for patches in [5000, 20_000, 40_000] {
-        let options = BuiltinOptions {
+        let options = LoadOptions {
             patches: Some(patches),
-            statue: None,
+            ..LoadOptions::default()
         };
         let scene = mesolux::scene::load("cornell", &options).expect("a built-in scene");
         estimate_and_truth(&scene, 6000);

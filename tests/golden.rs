@@ -15,7 +15,7 @@ use image::{ImageBuffer, Rgb};
 use mesolux::bake::bake;
 use mesolux::bench::relief_room::{CASES, room};
 use mesolux::render::{Direct, Light, Lighting, Picture, View, render};
-use mesolux::scene::{BuiltinOptions, Camera, Scene, Texture, load};
+use mesolux::scene::{Camera, LoadOptions, Scene, Texture, load};
 use mesolux::solver::Settings;
 
 const SIZE: (u32, u32) = (96, 72);
@@ -116,9 +116,9 @@ fn draw(scene: &Scene, camera: &Camera, part: Light, direct: Direct) -> Picture 
 }
 
 fn built_in(name: &str, patches: usize) -> Scene {
-    let options = BuiltinOptions {
+    let options = LoadOptions {
         patches: Some(patches),
-        ..BuiltinOptions::default()
+        ..LoadOptions::default()
     };
     load(name, &options).expect("a built-in scene")
 }

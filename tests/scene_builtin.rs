@@ -5,10 +5,18 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 use mesolux::scene::builtin::relief_maps;
-use mesolux::scene::{BuiltinOptions, Scene, Triangle, load, write_scene};
+use mesolux::scene::{LoadOptions, Scene, Triangle, load, write_scene};
 
 fn built(name: &str, patches: Option<usize>, statue: Option<PathBuf>) -> Scene {
-    load(name, &BuiltinOptions { patches, statue }).unwrap()
+    load(
+        name,
+        &LoadOptions {
+            patches,
+            statue,
+            ..LoadOptions::default()
+        },
+    )
+    .unwrap()
 }
 
 /// Name, elements, meso elements, the least number of elements.
@@ -67,9 +75,9 @@ fn other_numbers_are_exact_too() {
             let even = 2 * (share * patches as f64 / 2.0).round() as usize;
             assert_eq!(meso(&scene), even, "{name} {patches}");
         }
-        let options = BuiltinOptions {
+        let options = LoadOptions {
             patches: Some(least - 1),
-            statue: None,
+            ..LoadOptions::default()
         };
         let error = load(name, &options).unwrap_err().to_string();
         assert!(
@@ -310,7 +318,7 @@ fn they_read_back_the_same() {
         let scene = built(name, Some(least), None);
         let dir = tempfile::tempdir().unwrap();
         let path = write_scene(&scene, dir.path()).unwrap();
-        let again = load(path.to_str().unwrap(), &BuiltinOptions::default()).unwrap();
+        let again = load(path.to_str().unwrap(), &LoadOptions::default()).unwrap();
         assert_eq!(scene.hash(), again.hash(), "{name}");
         assert!(again.notes.is_empty(), "{name}: {:?}", again.notes);
     }
@@ -331,9 +339,9 @@ fn a_statue_takes_the_place_of_the_figure() {
             }
         }
     }
-    let options = BuiltinOptions {
-        patches: None,
+    let options = LoadOptions {
         statue: Some(path),
+        ..LoadOptions::default()
     };
     let error = load("fruit-platter", &options).unwrap_err().to_string();
     assert!(

@@ -5,10 +5,18 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 
 use glam::DVec3;
-use mesolux::scene::{BuiltinOptions, Scene, Triangle, load};
+use mesolux::scene::{LoadOptions, Scene, Triangle, load};
 
 fn cornell(patches: Option<usize>, statue: Option<PathBuf>) -> Scene {
-    load("cornell", &BuiltinOptions { patches, statue }).unwrap()
+    load(
+        "cornell",
+        &LoadOptions {
+            patches,
+            statue,
+            ..LoadOptions::default()
+        },
+    )
+    .unwrap()
 }
 
 fn triangles_of<'a>(scene: &'a Scene, names: &'a [&str]) -> impl Iterator<Item = &'a Triangle> {
@@ -52,9 +60,9 @@ fn exactly_as_many_patches_as_asked_for() {
 
 #[test]
 fn the_least_number_of_patches_is_named_and_works() {
-    let options = |patches| BuiltinOptions {
+    let options = |patches| LoadOptions {
         patches: Some(patches),
-        statue: None,
+        ..LoadOptions::default()
     };
     let error = load("cornell", &options(1_000)).unwrap_err().to_string();
     let least: usize = error.rsplit(' ').next().unwrap().parse().unwrap();
@@ -96,9 +104,10 @@ fn a_tetrahedron_may_be_the_statue() {
     }
     let scene = cornell(Some(58), Some(path.clone()));
     stands_in_the_room(&scene);
-    let options = BuiltinOptions {
+    let options = LoadOptions {
         patches: Some(57),
         statue: Some(path),
+        ..LoadOptions::default()
     };
     let error = load("cornell", &options).unwrap_err().to_string();
     assert!(error.contains("58"), "{error}");

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use glam::DVec3;
-use mesolux::scene::{BuiltinOptions, HeightMap, Material, Scene, Triangle, displace, load};
+use mesolux::scene::{HeightMap, LoadOptions, Material, Scene, Triangle, displace, load};
 
 fn map(size: u32, height: impl Fn(f64, f64) -> f64) -> HeightMap {
     let place = |i: u32| (f64::from(i) + 0.5) / f64::from(size);
@@ -287,9 +287,9 @@ fn the_built_in_scenes_stay_closed() {
         ("cornell-relief", 8_000),
         ("fruit-platter", 6_000),
     ] {
-        let options = BuiltinOptions {
+        let options = LoadOptions {
             patches: Some(patches),
-            statue: None,
+            ..LoadOptions::default()
         };
         let scene = load(name, &options).unwrap();
         let high = displace(&scene);
@@ -323,7 +323,7 @@ fn the_built_in_scenes_stay_closed() {
 #[ignore = "prints the sizes of the baselines"]
 fn sizes() {
     for name in ["fruit-platter", "bowl-and-bunny", "cornell-relief"] {
-        let scene = load(name, &BuiltinOptions::default()).unwrap();
+        let scene = load(name, &LoadOptions::default()).unwrap();
         let before = std::time::Instant::now();
         let high = displace(&scene);
         let raised = |t: &&Triangle| scene.materials[t.material as usize].has_relief();

@@ -5,10 +5,10 @@ use std::path::Path;
 
 use glam::DVec3;
 use mesolux::error::Result;
-use mesolux::scene::{BuiltinOptions, Scene, load, write_scene};
+use mesolux::scene::{LoadOptions, Scene, load, write_scene};
 
 fn read(path: &Path) -> Result<Scene> {
-    load(path.to_str().unwrap(), &BuiltinOptions::default())
+    load(path.to_str().unwrap(), &LoadOptions::default())
 }
 
 /// Writes files into a new folder and loads the first.
@@ -47,9 +47,9 @@ fn same(a: &Scene, b: &Scene) {
 #[test]
 fn the_cornell_box_reads_back_the_same() {
     let dir = tempfile::tempdir().unwrap();
-    let options = BuiltinOptions {
+    let options = LoadOptions {
         patches: Some(5_001),
-        statue: None,
+        ..LoadOptions::default()
     };
     let scene = load("cornell", &options).unwrap();
     let path = write_scene(&scene, &dir.path().join("new/folder")).unwrap();

@@ -12,7 +12,7 @@ use mesolux::bake::bake;
 use mesolux::bake::solution::Bake;
 use mesolux::bench::relief_room::{CASES, room};
 use mesolux::render::{Lighting, Renderer, SAMPLES, View, render};
-use mesolux::scene::{BuiltinOptions, Camera, camera_path, load};
+use mesolux::scene::{Camera, LoadOptions, camera_path, load};
 use mesolux::solver::Settings;
 
 /// Places of cameras are a few products of numbers about 1, each rounded to 2⁻⁵³.
@@ -205,11 +205,7 @@ fn series_are_numbered_and_do_not_flicker() {
     assert!(done.status.success(), "{}", text(&done));
     assert!(!at("turn.png").exists() && !at("turn-0004.png").exists());
 
-    let scene = load(
-        &at("room.obj").to_string_lossy(),
-        &BuiltinOptions::default(),
-    )
-    .expect("read");
+    let scene = load(&at("room.obj").to_string_lossy(), &LoadOptions::default()).expect("read");
     let bake = Bake::load(&at("room.safetensors")).expect("read");
     let own = Camera {
         position: DVec3::new(0.5, 0.4, 0.1),

@@ -68,7 +68,7 @@ pub fn solve_on(
 pub fn solution(scene: &Scene, solver: &Solver) -> Result<Solution> {
     let mut report = solver.report().clone();
     report.skipped.degenerate_triangles = scene.dropped_degenerate as u64;
-    report.notes.clone_from(&scene.notes);
+    report.notes = [scene.notes.as_slice(), &scene.warnings].concat();
     let elements = &solver.problem.elements;
     Ok(Solution::new(scene, elements, &solver.light()?, report).with_corners(scene))
 }

@@ -23,7 +23,7 @@ use crate::error::{Error, Result};
 use crate::mesh::elements::Elements;
 use crate::mesh::sources::Grouping;
 use crate::meso::Transport;
-use crate::scene::{BuiltinOptions, load};
+use crate::scene::{LoadOptions, load};
 use crate::solver::{Settings, Solver, StopReason};
 use crate::vk::Device;
 
@@ -171,9 +171,9 @@ fn bake(
     limit: Option<usize>,
     go_on: &impl Fn() -> bool,
 ) -> Result<Option<Row>> {
-    let builtin = BuiltinOptions {
+    let builtin = LoadOptions {
         patches: Some(size),
-        statue: None,
+        ..LoadOptions::default()
     };
     let scene = load(&options.scene, &builtin)?;
     let mut settings = Settings {

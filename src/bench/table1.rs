@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::math::directions::Directions;
 use crate::meso::{Options as ReliefOptions, Transport};
 use crate::render::{Lighting, ReliefShading, Renderer, View};
-use crate::scene::{BuiltinOptions, Scene, displace, load};
+use crate::scene::{LoadOptions, Scene, displace, load};
 use crate::solver::{Settings, Solver, StopReason};
 use crate::vk::Device;
 
@@ -86,9 +86,9 @@ pub fn run(
     );
     println!("{HEADER}");
     for (name, minutes, fps) in scenes {
-        let builtin = BuiltinOptions {
+        let builtin = LoadOptions {
             patches: options.patches,
-            statue: None,
+            ..LoadOptions::default()
         };
         let scene = load(name, &builtin)?;
         let mut under = Vec::new();

@@ -392,6 +392,7 @@ pub fn origin(scene: &str, builtin: &Builtin, hash: String) -> Origin {
         },
         patches: builtin.patches,
         statue: builtin.statue.as_deref().map(absolute),
+        import: builtin.import(),
         hash,
     }
 }

@@ -22,7 +22,7 @@ use std::process::ExitCode;
 use clap::{Args, Parser, Subcommand};
 use mesolux::bake::solution::Bake;
 use mesolux::error::{Error, Result};
-use mesolux::scene::{BuiltinOptions, OnInput, Refinement, Scene};
+use mesolux::scene::{ImportOptions, LoadOptions, OnInput, Refinement, Scene};
 use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::prelude::*;
 
@@ -58,7 +58,7 @@ enum Command {
     Bench(bench::Options),
 }
 
-/// Options of built-in scenes, and how finely others are cut.
+/// How a scene is read: options of built-in scenes, and how finely others are cut.
 #[derive(Args, Clone)]
 struct Builtin {
     /// Built-in scenes: exactly this many elements
@@ -77,6 +77,12 @@ struct Builtin {
     /// Light every triangle as it is
     #[arg(long, conflicts_with = "element_size")]
     no_refine: bool,
+    /// Leave a normal map without a height map out, instead of integrating heights from it
+    #[arg(long)]
+    no_heights_from_normals: bool,
+    /// The z axis of OBJ files points up
+    #[arg(long)]
+    z_up: bool,
 }
 
 impl Builtin {
@@ -88,6 +94,8 @@ impl Builtin {
             element_size: None,
             max_elements: 0,
             no_refine: true,
+            no_heights_from_normals: !bake.origin.import.heights_from_normals,
+            z_up: bake.origin.import.z_up,
         };
         let scene = builtin.load(&bake.origin.scene)?;
         let count = scene.triangles.len();
@@ -109,6 +117,13 @@ impl Builtin {
         }
     }
 
+    fn import(&self) -> ImportOptions {
+        ImportOptions {
+            heights_from_normals: !self.no_heights_from_normals,
+            z_up: self.z_up,
+        }
+    }
+
     fn load(&self, name: &str) -> Result<Scene> {
         if let Some(size) = self.element_size
             && !(size.is_finite() && size > 0.0)
@@ -119,13 +134,17 @@ impl Builtin {
         }
         let scene = mesolux::scene::load(
             name,
-            &BuiltinOptions {
+            &LoadOptions {
                 patches: self.patches,
                 statue: self.statue.clone(),
+                import: self.import(),
             },
         )?;
         for note in &scene.notes {
             tracing::info!("{note}");
+        }
+        for warning in &scene.warnings {
+            tracing::warn!("{warning}");
         }
         if scene.dropped_degenerate > 0 {
             tracing::warn!(

@@ -7,7 +7,8 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::material::MadeUp;
-use super::uv::box_projection;
+use super::said::Said;
+use super::uv::{OnSurface, box_projection};
 use super::{Material, Scene, Triangle};
 use crate::error::{Error, Result};
 
@@ -19,10 +20,19 @@ pub(super) struct Mesh {
     pub materials: Vec<Material>,
     /// Materials for which a reflectance was made up.
     pub made_up: Vec<MadeUp>,
-    pub notes: Vec<String>,
+    /// Where the maps of each material lie, `[material]`; of those made up, as the mesh says.
+    pub on_surface: Vec<OnSurface>,
+    pub said: Said,
 }
 
 impl Mesh {
+    /// Turns a mesh whose z axis points up, so that y does.
+    pub fn turn_z_up(&mut self) {
+        for p in &mut self.positions {
+            *p = DVec3::new(p.x, p.z, -p.y);
+        }
+    }
+
     /// Triangles of one material, without texture coordinates.
     pub fn bare(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Self {
         Self {

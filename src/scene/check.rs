@@ -1,13 +1,13 @@
 //! Checks of a whole scene, from any source.
 
-use super::{Camera, Scene, relief_notes};
+use super::{Camera, ImportOptions, Scene, heights_from_normals, relief_notes};
 use crate::error::{Error, Result};
 
 /// Extents within which the squares and areas of later steps stay well within the range of f32.
 const EXTENTS: std::ops::RangeInclusive<f64> = 1e-15..=1e15;
 
 /// Checks a scene and gives it a camera if it has none.
-pub(super) fn finish(mut scene: Scene) -> Result<Scene> {
+pub(super) fn finish(mut scene: Scene, import: &ImportOptions) -> Result<Scene> {
     let refuse = |what: String| Error::Scene {
         scene: match &scene.path {
             Some(path) => path.display().to_string(),
@@ -41,6 +41,9 @@ pub(super) fn finish(mut scene: Scene) -> Result<Scene> {
         ));
     }
 
+    if import.heights_from_normals {
+        heights_from_normals::add_to(&mut scene);
+    }
     let mut notes = relief_notes::collect(&scene);
     scene.notes.append(&mut notes);
     if scene.cameras.is_empty() {

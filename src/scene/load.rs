@@ -1,14 +1,45 @@
 //! Resolves a scene argument and reads the scene.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
 
 use super::assemble::Assembly;
 use super::material::TextureCache;
 #[cfg(feature = "formats")]
 use super::scene_file;
 use super::text_file::stem;
-use super::{BuiltinOptions, Scene, builtin, check, obj};
+use super::{Scene, builtin, check, obj};
 use crate::error::{Error, Result};
+
+/// How a scene is read.
+#[derive(Debug, Clone, Default)]
+pub struct LoadOptions {
+    /// Of a built-in scene: the exact number of elements.
+    pub patches: Option<usize>,
+    /// Of a built-in scene: an OBJ mesh, y up, head towards −z, in place of the statue made by code.
+    pub statue: Option<PathBuf>,
+    pub import: ImportOptions,
+}
+
+/// How the files of other programs are read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ImportOptions {
+    /// Integrates heights from a normal map that has none, so that it makes a relief.
+    pub heights_from_normals: bool,
+    /// Turns OBJ meshes by −90° about x: their z axis points up.
+    pub z_up: bool,
+}
+
+impl Default for ImportOptions {
+    fn default() -> Self {
+        Self {
+            heights_from_normals: true,
+            z_up: false,
+        }
+    }
+}
 
 /// Reads the scene that `spec` names: a built-in one ([`builtin::NAMES`]), an `.obj` file or a
 /// `scene.toml` file.
@@ -16,7 +47,7 @@ use crate::error::{Error, Result};
 /// # Errors
 /// A name that is none of these; a file that cannot be read or used, with the line or the material;
 /// a scene that cannot be baked.
-pub fn load(spec: &str, options: &BuiltinOptions) -> Result<Scene> {
+pub fn load(spec: &str, options: &LoadOptions) -> Result<Scene> {
     if builtin::NAMES.contains(&spec) {
         return builtin::build(spec, options);
     }
@@ -38,9 +69,9 @@ pub fn load(spec: &str, options: &BuiltinOptions) -> Result<Scene> {
         )));
     }
     match extension.as_str() {
-        "obj" => load_obj(path),
+        "obj" => load_obj(path, &options.import),
         #[cfg(feature = "formats")]
-        _ => scene_file::load(path),
+        _ => scene_file::load(path, &options.import),
         #[cfg(not(feature = "formats"))]
         _ => Err(Error::Usage(format!(
             "scene {spec}: scene.toml needs the Cargo feature `formats`"
@@ -48,15 +79,19 @@ pub fn load(spec: &str, options: &BuiltinOptions) -> Result<Scene> {
     }
 }
 
-fn load_obj(path: &Path) -> Result<Scene> {
-    let mesh = obj::read(path, &mut TextureCache::default())?;
+fn load_obj(path: &Path, import: &ImportOptions) -> Result<Scene> {
+    let mut mesh = obj::read(path, &mut TextureCache::default())?;
+    if import.z_up {
+        mesh.turn_z_up();
+    }
     let mut assembly = Assembly::new(stem(path), Some(path));
     let materials = assembly.add_materials(&mesh.materials);
     assembly.add_mesh(&mesh, &materials)?;
-    assembly.scene.notes.extend(mesh.notes);
+    assembly.scene.notes.extend(mesh.said.notes);
+    assembly.scene.warnings.extend(mesh.said.warnings);
     assembly
         .scene
         .notes
         .extend(mesh.made_up.iter().map(|made_up| made_up.to_string()));
-    check::finish(assembly.into_scene())
+    check::finish(assembly.into_scene(), import)
 }

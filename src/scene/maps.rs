@@ -1,6 +1,7 @@
 //! Maps of the fine relief: heights and normals.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::DVec3;
 use image::DynamicImage;
@@ -33,7 +34,20 @@ impl HeightMap {
     /// # Errors
     /// A file that cannot be read or decoded; a texel that is not finite.
     pub fn load(path: &Path) -> Result<(Self, Option<String>)> {
-        let image = Channels::read(path)?;
+        Self::load_channel(path, None)
+    }
+
+    /// As [`Self::load`], of one channel where it is given.
+    pub(super) fn load_channel(
+        path: &Path,
+        channel: Option<Channel>,
+    ) -> Result<(Self, Option<String>)> {
+        let mut image = Channels::read(path)?;
+        if let Some(channel) = channel {
+            for texel in &mut image.texels {
+                *texel = [channel.of(*texel); 3];
+            }
+        }
         if let Some(at) = image.find(|texel| !texel.iter().all(|c| c.is_finite())) {
             return Err(image.refuse(path, at, "a height must be finite"));
         }
@@ -125,6 +139,66 @@ impl NormalMap {
                 .collect(),
         })
     }
+}
+
+impl NormalMap {
+    /// With slopes that are `scale` times as steep.
+    pub(super) fn scaled(map: Arc<Self>, scale: f32) -> Arc<Self> {
+        if scale == 1.0 {
+            return map;
+        }
+        let steeper = |&[x, y, z]: &[f32; 3]| {
+            let [x, y, z] = [x, y, z].map(f64::from);
+            let scale = f64::from(scale);
+            let n = DVec3::new(scale * x, scale * y, z);
+            n.normalize().as_vec3().to_array()
+        };
+        Arc::new(Self {
+            normals: map.normals.iter().map(steeper).collect(),
+            ..map.as_ref().clone()
+        })
+    }
+}
+
+/// A channel of an image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) enum Channel {
+    Red,
+    Green,
+    Blue,
+    Luminance,
+}
+
+impl Channel {
+    /// By the letter of MTL's `-imfchan`.
+    pub fn named(name: &str) -> Option<Self> {
+        Some(match name {
+            "r" => Self::Red,
+            "g" => Self::Green,
+            "b" => Self::Blue,
+            "l" => Self::Luminance,
+            _ => return None,
+        })
+    }
+
+    fn of(self, [r, g, b]: [f32; 3]) -> f32 {
+        match self {
+            Self::Red => r,
+            Self::Green => g,
+            Self::Blue => b,
+            Self::Luminance => [r, g, b].iter().zip(LUMINANCE).map(|(c, w)| c * w).sum(),
+        }
+    }
+}
+
+/// Whether an image holds normals: it has colours, and most texels are unit vectors that point out
+/// of a surface.
+///
+/// # Errors
+/// A file that cannot be read or decoded.
+pub(super) fn holds_normals(path: &Path) -> Result<bool> {
+    let image = Channels::read(path)?;
+    Ok(image.texels.iter().any(|[r, g, b]| r != g || r != b) && image.looks_like_normals())
 }
 
 /// An image as it is stored: integer codes over the greatest one, floats untouched.

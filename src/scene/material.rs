@@ -1,8 +1,10 @@
 //! Diffuse materials.
 
 use std::collections::HashMap;
+use std::hash::Hash;
 use std::path::Path;
 
+use super::maps::{Channel, holds_normals};
 use super::*;
 use crate::error::{Error, Result};
 
@@ -123,7 +125,7 @@ impl std::fmt::Display for MadeUp {
 #[derive(Default)]
 pub(super) struct TextureCache {
     textures: HashMap<PathBuf, Arc<Texture>>,
-    heights: HashMap<PathBuf, Arc<HeightMap>>,
+    heights: HashMap<(PathBuf, Option<Channel>), Arc<HeightMap>>,
     normals: HashMap<PathBuf, Arc<NormalMap>>,
     /// Notes from reading them, for the caller to pass on.
     pub notes: Vec<String>,
@@ -141,38 +143,85 @@ pub(super) struct Asked<'a> {
 
 impl TextureCache {
     pub fn texture(&mut self, asked: Asked, name: &str) -> Result<Arc<Texture>> {
-        cached(&mut self.textures, asked, name, Texture::load)
+        cached(
+            &mut self.textures,
+            asked,
+            name,
+            Path::to_owned,
+            Texture::load,
+        )
     }
 
-    pub fn heights(&mut self, asked: Asked, name: &str) -> Result<Arc<HeightMap>> {
-        cached(&mut self.heights, asked, name, |path| {
-            let (map, note) = HeightMap::load(path)?;
+    /// Heights; of one channel where it is given.
+    pub fn heights(
+        &mut self,
+        asked: Asked,
+        name: &str,
+        channel: Option<Channel>,
+    ) -> Result<Arc<HeightMap>> {
+        let key = |path: &Path| (path.to_owned(), channel);
+        cached(&mut self.heights, asked, name, key, |path| {
+            let (map, note) = HeightMap::load_channel(path, channel)?;
             self.notes.extend(note);
             Ok(map)
         })
     }
 
     pub fn normals(&mut self, asked: Asked, name: &str) -> Result<Arc<NormalMap>> {
-        cached(&mut self.normals, asked, name, NormalMap::load)
+        cached(
+            &mut self.normals,
+            asked,
+            name,
+            Path::to_owned,
+            NormalMap::load,
+        )
+    }
+
+    /// Heights, or normals if the image holds some and no channel is asked for.
+    pub fn bump(&mut self, asked: Asked, name: &str, channel: Option<Channel>) -> Result<Bump> {
+        let path = asked.path(name);
+        let is_normals = channel.is_none() && holds_normals(&path).map_err(|e| asked.error(e))?;
+        Ok(match is_normals {
+            true => Bump::Normals(self.normals(asked, name)?),
+            false => Bump::Heights(self.heights(asked, name, channel)?),
+        })
     }
 }
 
-fn cached<T>(
-    known: &mut HashMap<PathBuf, Arc<T>>,
+/// What a bump map holds.
+pub(super) enum Bump {
+    Heights(Arc<HeightMap>),
+    Normals(Arc<NormalMap>),
+}
+
+impl Asked<'_> {
+    fn path(&self, name: &str) -> PathBuf {
+        // Exporters on Windows write `textures\brick.png`, which no other system can open.
+        self.file.with_file_name(name.replace('\\', "/"))
+    }
+
+    fn error(&self, error: Error) -> Error {
+        Error::Material {
+            path: self.file.to_owned(),
+            material: self.material.to_owned(),
+            what: format!("{}: {error}", self.keyword),
+        }
+    }
+}
+
+fn cached<K: Eq + Hash, T>(
+    known: &mut HashMap<K, Arc<T>>,
     asked: Asked,
     name: &str,
+    key: impl FnOnce(&Path) -> K,
     read: impl FnOnce(&Path) -> Result<T>,
 ) -> Result<Arc<T>> {
-    // Exporters on Windows write `textures\brick.png`, which no other system can open.
-    let path = asked.file.with_file_name(name.replace('\\', "/"));
-    if let Some(map) = known.get(&path) {
+    let path = asked.path(name);
+    let key = key(&path);
+    if let Some(map) = known.get(&key) {
         return Ok(map.clone());
     }
-    let map = Arc::new(read(&path).map_err(|error| Error::Material {
-        path: asked.file.to_owned(),
-        material: asked.material.to_owned(),
-        what: format!("{}: {error}", asked.keyword),
-    })?);
-    known.insert(path, map.clone());
+    let map = Arc::new(read(&path).map_err(|error| asked.error(error))?);
+    known.insert(key, map.clone());
     Ok(map)
 }

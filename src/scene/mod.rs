@@ -18,24 +18,27 @@ mod check;
 mod displace;
 pub(crate) mod even_light;
 mod hash;
+mod heights_from_normals;
 mod load;
 #[cfg(feature = "formats")]
 mod map_files;
 mod maps;
 mod material;
 mod mtl;
-mod mtl_relief;
+mod mtl_maps;
 mod obj;
 mod obj_lint;
 #[cfg(feature = "formats")]
 mod placement;
 mod refine;
 mod relief_notes;
+mod said;
 #[cfg(feature = "formats")]
 mod scene_file;
 pub mod shapes;
 mod text_file;
 mod texture;
+mod tile;
 mod uv;
 #[cfg(feature = "formats")]
 mod write;
@@ -45,9 +48,8 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-pub use builtin::BuiltinOptions;
 pub use displace::{displace, relief_normals};
-pub use load::load;
+pub use load::{ImportOptions, LoadOptions, load};
 pub use maps::{HeightMap, NormalMap};
 pub use material::Material;
 pub use refine::{OnInput, RefinedFrom, Refinement};
@@ -77,6 +79,8 @@ pub struct Scene {
     pub refined_from: Option<RefinedFrom>,
     /// What was made up or ignored while reading, one sentence each, to show to the user.
     pub notes: Vec<String>,
+    /// What was ignored and would change the light, one sentence each.
+    pub warnings: Vec<String>,
 }
 
 impl Scene {

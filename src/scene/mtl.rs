@@ -1,19 +1,25 @@
-//! Wavefront MTL material libraries: `Kd`, `Ke`, `map_Kd`, and the maps of the relief.
+//! Wavefront MTL material libraries: `Kd`, `Ke` and maps; what else would change the light is
+//! reported.
 
 use std::path::Path;
 
 use super::Material;
-use super::material::{Asked, DEFAULT_KD, MadeUp, TextureCache};
-use super::mtl_relief::{self, Relief};
+use super::material::{DEFAULT_KD, MadeUp, TextureCache};
+use super::mtl_maps::{self, Maps};
 use super::obj_lint::{brief, finite, statements};
+use super::said::Said;
 use super::text_file::read_text;
+use super::uv::OnSurface;
 use crate::error::{Error, Result};
 
+#[derive(Default)]
 pub(super) struct Library {
     /// In the order of the file.
     pub materials: Vec<Material>,
+    /// Where the maps of each lie, `[material]`.
+    pub on_surface: Vec<OnSurface>,
     pub made_up: Vec<MadeUp>,
-    pub notes: Vec<String>,
+    pub said: Said,
 }
 
 /// Reads a library with its textures, whose paths are relative to it.
@@ -26,21 +32,19 @@ pub(super) fn read(path: &Path, textures: &mut TextureCache) -> Result<Library> 
         .map_err(|error| Error::file(path, error.to_string()))?;
 
     let mut library = Library {
-        materials: Vec::new(),
-        made_up: Vec::new(),
-        notes: Vec::new(),
+        said: checked.said,
+        ..Library::default()
     };
     assert_eq!(
         read.len(),
-        checked.reliefs.len(),
+        checked.maps.len(),
         "tobj and the check see the same materials"
     );
-    for (material, relief) in read.into_iter().zip(&checked.reliefs) {
+    for (material, maps) in read.into_iter().zip(&checked.maps) {
         // A texture without a factor is the reflectance itself.
-        let default = if material.diffuse_texture.is_some() {
-            1.0
-        } else {
-            DEFAULT_KD
+        let default = match maps.has_reflectance() {
+            true => 1.0,
+            false => DEFAULT_KD,
         };
         if material.diffuse.is_none() {
             library.made_up.push(MadeUp {
@@ -48,17 +52,6 @@ pub(super) fn read(path: &Path, textures: &mut TextureCache) -> Result<Library> 
                 kd: default,
             });
         }
-        let map_kd = match &material.diffuse_texture {
-            Some(name) => {
-                let asked = Asked {
-                    file: path,
-                    material: &material.name,
-                    keyword: "map_Kd",
-                };
-                Some(textures.texture(asked, name)?)
-            }
-            None => None,
-        };
         let mut material = Material {
             kd: material
                 .diffuse
@@ -67,10 +60,10 @@ pub(super) fn read(path: &Path, textures: &mut TextureCache) -> Result<Library> 
                 .emissive
                 .map_or([0.0; 3], |ke| ke.map(|c| c as f32)),
             name: material.name,
-            map_kd,
             ..Material::default()
         };
-        relief.read(path, textures, &mut material, &mut library.notes)?;
+        let on_surface = maps.read(path, textures, &mut material, &mut library.said)?;
+        library.on_surface.push(on_surface);
         material.check().map_err(|what| Error::Material {
             path: path.to_owned(),
             material: material.name.clone(),
@@ -81,58 +74,111 @@ pub(super) fn read(path: &Path, textures: &mut TextureCache) -> Result<Library> 
     Ok(library)
 }
 
+#[derive(Default)]
 struct Checked {
-    /// The text for tobj.
+    /// The text for tobj: `newmtl`, `Kd` and `Ke`.
     text: String,
     /// `[material]`, in the order of the file.
-    reliefs: Vec<Relief>,
+    maps: Vec<Maps>,
+    said: Said,
 }
 
+/// Statements about what a diffuse surface does not have: gloss, and the quality of a picture.
+const NOT_DIFFUSE: [&str; 23] = [
+    "Ka",
+    "Ks",
+    "Ns",
+    "Ni",
+    "illum",
+    "sharpness",
+    "Pr",
+    "Pm",
+    "Ps",
+    "Pc",
+    "Pcr",
+    "aniso",
+    "anisor",
+    "map_Ka",
+    "map_Ks",
+    "map_Ns",
+    "map_Pr",
+    "map_Pm",
+    "map_Ps",
+    "map_refl",
+    "refl",
+    "map_aat",
+    "Tf",
+];
+
 /// Checks the text line by line. tobj panics at a `Ka`, `Kd`, `Ks` or `Ke` that is too short, and
-/// does not read all statements of relief maps.
+/// does not read all statements of maps.
 fn check(path: &Path, text: &str) -> Result<Checked> {
-    let mut kept = String::new();
+    let mut checked = Checked::default();
     let mut names: Vec<String> = Vec::new();
-    let mut reliefs: Vec<Relief> = Vec::new();
     for (line, statement) in statements(text) {
         let statement = statement.trim();
+        if statement.is_empty() || statement.starts_with('#') {
+            continue;
+        }
         let (keyword, rest) = statement
             .split_once(char::is_whitespace)
             .map_or((statement, ""), |(keyword, rest)| (keyword, rest.trim()));
-        let checked = match keyword {
+        let operands = rest.split_once('#').map_or(rest, |(numbers, _)| numbers);
+        let named = |names: &[String]| names.last().map(|name| format!("material \"{name}\": "));
+        let warn = |what: String| {
+            let material = named(&names).unwrap_or_default();
+            format!("{}:{line}: {material}{what}", path.display())
+        };
+        let done = match keyword {
             "newmtl" => new_material(rest, &mut names),
             "Kd" | "Ke" => colour(keyword, rest),
-            "map_Kd" => texture(rest),
-            _ if mtl_relief::is_keyword(keyword) => match reliefs.last_mut() {
-                Some(relief) => relief.add(keyword, rest),
+            "d" | "Tr" => match opacity(keyword, operands) {
+                Ok(opacity) if opacity < 1.0 => {
+                    let what = format!("{keyword}: surfaces are opaque, not {opacity}");
+                    checked.said.warnings.push(warn(what));
+                    Ok(())
+                }
+                other => other.map(|_| ()),
+            },
+            _ if mtl_maps::is_keyword(keyword) => match checked.maps.last_mut() {
+                Some(maps) => maps.add(keyword, rest, line),
                 None => Ok(()),
             },
-            _ => continue,
+            _ if NOT_DIFFUSE.contains(&keyword) => Ok(()),
+            _ => {
+                let what = format!("{} is not used", brief(keyword));
+                checked.said.warnings.push(warn(what));
+                continue;
+            }
         };
-        let checked = checked.and_then(|()| match names.is_empty() {
+        let done = done.and_then(|()| match names.is_empty() {
             true => Err(format!("{keyword} stands before the first newmtl")),
             false => Ok(()),
         });
-        checked.map_err(|what| {
-            let what = match names.last() {
-                Some(name) if keyword != "newmtl" => format!("material \"{name}\": {what}"),
-                _ => what,
+        done.map_err(|what| {
+            let material = match keyword {
+                "newmtl" => None,
+                _ => named(&names),
             };
-            Error::line(path, line, what)
+            Error::line(path, line, material.unwrap_or_default() + &what)
         })?;
-        reliefs.resize_with(names.len(), Relief::default);
-        if mtl_relief::is_keyword(keyword) {
-            continue;
+        checked.maps.resize_with(names.len(), Maps::default);
+        match keyword {
+            "newmtl" => checked.text.push_str(&format!("newmtl {rest}\n")),
+            "Kd" | "Ke" => checked.text.push_str(&format!("{keyword} {operands}\n")),
+            _ => {}
         }
-        let operands = match keyword {
-            "Kd" | "Ke" => rest.split_once('#').map_or(rest, |(numbers, _)| numbers),
-            _ => rest,
-        };
-        kept.push_str(&format!("{keyword} {operands}\n"));
     }
-    Ok(Checked {
-        text: kept,
-        reliefs,
+    Ok(checked)
+}
+
+/// `d`, which may have the option `-halo`, or 1 − `Tr`.
+fn opacity(keyword: &str, operands: &str) -> Result<f64, String> {
+    let number = operands.split_whitespace().find(|word| *word != "-halo");
+    let number = finite(number.unwrap_or("")).map_err(|what| format!("{keyword}: {what}"))?;
+    Ok(match keyword {
+        "Tr" => 1.0 - number,
+        _ => number,
     })
 }
 
@@ -161,18 +207,5 @@ fn colour(keyword: &str, rest: &str) -> Result<(), String> {
     match numbers.len() {
         3 => Ok(()),
         found => Err(format!("{keyword} needs 3 numbers, found {found}")),
-    }
-}
-
-fn texture(rest: &str) -> Result<(), String> {
-    if rest.is_empty() {
-        Err("map_Kd names no file".into())
-    } else if rest.starts_with('-') {
-        Err(format!(
-            "map_Kd options are not known here: {}",
-            brief(rest)
-        ))
-    } else {
-        Ok(())
     }
 }

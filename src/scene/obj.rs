@@ -9,6 +9,7 @@ use super::assemble::{Mesh, MeshTriangle};
 use super::material::{DEFAULT_KD, MadeUp, TextureCache};
 use super::obj_lint::{self, Checked, brief};
 use super::text_file::read_text;
+use super::uv::UvTransform;
 use super::{Material, mtl};
 use crate::error::{Error, Result};
 
@@ -29,7 +30,7 @@ pub(super) fn read(path: &Path, textures: &mut TextureCache) -> Result<Mesh> {
     }
     let mut mesh = Mesh::default();
     if let Some((line, keyword)) = &checked.first_unknown {
-        mesh.notes.push(format!(
+        mesh.said.notes.push(format!(
             "{}: {} lines that are no OBJ statements were passed over, the first is line {line}: {keyword}",
             path.display(),
             checked.unknown
@@ -37,6 +38,7 @@ pub(super) fn read(path: &Path, textures: &mut TextureCache) -> Result<Mesh> {
     }
     materials(path, &checked, textures, &mut mesh)?;
     faces(path, &checked, &mut mesh)?;
+    warn_of_clamped_maps(path, &mut mesh);
     Ok(mesh)
 }
 
@@ -54,8 +56,9 @@ fn materials(
                 return Err(Error::line(path, *line, what));
             }
             let read = mtl::read(&file, textures)?;
-            mesh.notes.extend(read.notes);
-            mesh.notes.append(&mut textures.notes);
+            mesh.said.append(read.said);
+            mesh.said.notes.append(&mut textures.notes);
+            mesh.on_surface.extend(read.on_surface);
             for material in read.materials {
                 if mesh.materials.iter().any(|m| m.name == material.name) {
                     return Err(Error::Material {
@@ -135,6 +138,8 @@ fn faces(path: &Path, checked: &Checked, mesh: &mut Mesh) -> Result<()> {
             Some(index) => index,
             None => no_material(mesh),
         } as u32;
+        let on_surface = mesh.on_surface.get(material as usize);
+        let transform = on_surface.map_or(UvTransform::default(), |on| on.transform);
         mesh.positions.extend(
             model
                 .positions
@@ -147,7 +152,7 @@ fn faces(path: &Path, checked: &Checked, mesh: &mut Mesh) -> Result<()> {
             let uv = (has_uv.next() == Some(&true)).then(|| {
                 std::array::from_fn(|k| {
                     let at = 2 * model.texcoord_indices[3 * index + k] as usize;
-                    [model.texcoords[at] as f32, model.texcoords[at + 1] as f32]
+                    transform.apply([model.texcoords[at] as f32, model.texcoords[at + 1] as f32])
                 })
             });
             mesh.triangles.push(MeshTriangle {
@@ -163,6 +168,25 @@ fn faces(path: &Path, checked: &Checked, mesh: &mut Mesh) -> Result<()> {
         "tobj and the check see the same faces"
     );
     Ok(())
+}
+
+/// Maps repeat, also those that `-clamp` would keep from it: a warning where that shows.
+fn warn_of_clamped_maps(path: &Path, mesh: &mut Mesh) {
+    for (index, on) in mesh.on_surface.iter().enumerate() {
+        let Some((keyword, line)) = &on.clamped else {
+            continue;
+        };
+        let own = |t: &&MeshTriangle| t.material as usize == index;
+        let mut uv = mesh.triangles.iter().filter(own).filter_map(|t| t.uv);
+        if uv.any(|uv| uv.as_flattened().iter().any(|c| !(0.0..=1.0).contains(c))) {
+            mesh.said.warnings.push(format!(
+                "{}: material \"{}\": {keyword} in line {line} of its library repeats outside \
+                 0..1: -clamp is not used",
+                path.display(),
+                mesh.materials[index].name
+            ));
+        }
+    }
 }
 
 /// The index of the material for faces that name none.

@@ -11,14 +11,16 @@ use super::assemble::{Assembly, Mesh};
 use super::material::{Asked, DEFAULT_KD, MadeUp, TextureCache};
 use super::placement::{Placement, Scale};
 use super::text_file::{read_text, stem};
-use super::{Camera, Material, PointLight, Scene, check, obj};
+use super::{Camera, ImportOptions, Material, PointLight, Scene, check, obj};
 use crate::error::{Error, Result};
 
-#[derive(Debug, Default, Deserialize, Serialize)]
+#[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SceneFile {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
+    #[serde(default = "yes", skip_serializing_if = "Clone::clone")]
+    pub heights_from_normals: bool,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub mesh: Vec<Spanned<MeshTable>>,
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
@@ -44,6 +46,8 @@ pub(super) struct MeshTable {
     pub material: Option<String>,
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub reverse: bool,
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub z_up: bool,
 }
 
 #[derive(Debug, Default, Deserialize, Serialize)]
@@ -77,6 +81,10 @@ pub(super) struct CameraTable {
     pub fov: f64,
 }
 
+fn yes() -> bool {
+    true
+}
+
 fn y_up() -> [f64; 3] {
     DVec3::Y.to_array()
 }
@@ -85,7 +93,7 @@ fn y_up() -> [f64; 3] {
 ///
 /// # Errors
 /// Errors of the files it names; any error in its own text, with the line of the table.
-pub(super) fn load(path: &Path) -> Result<Scene> {
+pub(super) fn load(path: &Path, import: &ImportOptions) -> Result<Scene> {
     let text = read_text(path)?;
     let lines = Lines { path, text: &text };
     let file: SceneFile = toml::from_str(&text).map_err(|error| {
@@ -100,6 +108,7 @@ pub(super) fn load(path: &Path) -> Result<Scene> {
         add_mesh(
             table,
             &file,
+            import,
             &lines,
             &mut textures,
             &mut assembly,
@@ -134,7 +143,11 @@ pub(super) fn load(path: &Path) -> Result<Scene> {
         }
         scene.cameras.push(camera);
     }
-    check::finish(assembly.into_scene())
+    let import = ImportOptions {
+        heights_from_normals: import.heights_from_normals && file.heights_from_normals,
+        ..import.clone()
+    };
+    check::finish(assembly.into_scene(), &import)
 }
 
 /// The line of a byte of the file.
@@ -154,6 +167,7 @@ impl Lines<'_> {
 fn add_mesh(
     spanned: &Spanned<MeshTable>,
     file: &SceneFile,
+    import: &ImportOptions,
     lines: &Lines,
     textures: &mut TextureCache,
     assembly: &mut Assembly,
@@ -187,12 +201,16 @@ fn add_mesh(
         mesh.made_up.retain(|made_up| made_up.material == *name);
         mesh.triangles.iter_mut().for_each(|t| t.material = 0);
     }
+    if table.z_up || import.z_up {
+        mesh.turn_z_up();
+    }
     placement.apply(&mut mesh, table.reverse).map_err(refuse)?;
 
     let materials = assembly.add_materials(&mesh.materials);
     assembly.add_mesh(&mesh, &materials)?;
+    assembly.scene.warnings.extend(mesh.said.warnings);
     let notes = &mut assembly.scene.notes;
-    notes.extend(mesh.notes);
+    notes.extend(mesh.said.notes);
     for made_up in mesh.made_up.iter().map(MadeUp::to_string) {
         if !notes.contains(&made_up) {
             notes.push(made_up);
@@ -252,7 +270,7 @@ fn change_material(
         material.map_kd = Some(textures.texture(asked("map_kd"), file)?);
     }
     if let Some(file) = &changes.height_map {
-        material.map_height = Some(textures.heights(asked("height_map"), file)?);
+        material.map_height = Some(textures.heights(asked("height_map"), file, None)?);
     }
     if let Some(scale) = changes.height_scale {
         if material.map_height.is_none() {
@@ -263,7 +281,7 @@ fn change_material(
     if let Some(file) = &changes.normal_map {
         material.map_normal = Some(textures.normals(asked("normal_map"), file)?);
     }
-    mesh.notes.append(&mut textures.notes);
+    mesh.said.notes.append(&mut textures.notes);
     material.check().map_err(refuse)
 }
 

@@ -1,6 +1,37 @@
-//! Texture coordinates for surfaces without any.
+//! Texture coordinates: where maps lie on a surface, and those of surfaces without any.
 
 use glam::DVec3;
+
+/// From the texture coordinates of a mesh to those of its maps: scaled, then moved.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct UvTransform {
+    pub scale: [f32; 2],
+    pub offset: [f32; 2],
+}
+
+impl Default for UvTransform {
+    fn default() -> Self {
+        Self {
+            scale: [1.0; 2],
+            offset: [0.0; 2],
+        }
+    }
+}
+
+impl UvTransform {
+    pub fn apply(&self, uv: [f32; 2]) -> [f32; 2] {
+        std::array::from_fn(|k| uv[k] * self.scale[k] + self.offset[k])
+    }
+}
+
+/// Where the maps of a material lie on a surface.
+#[derive(Debug, Clone, Default)]
+pub(super) struct OnSurface {
+    /// From the texture coordinates of the mesh to those of the maps.
+    pub transform: UvTransform,
+    /// The statement of a map that `-clamp` keeps from repeating, and its line.
+    pub clamped: Option<(String, usize)>,
+}
 
 /// Box projection: along the axis nearest to the normal, one repeat per scene unit, not mirrored
 /// seen from the front.

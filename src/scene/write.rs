@@ -140,7 +140,8 @@ fn tables(scene: &Scene) -> SceneFile {
                 })
             })
             .collect(),
-        ..SceneFile::default()
+        heights_from_normals: false,
+        material: Default::default(),
     }
 }
 

@@ -7,7 +7,7 @@ mod scene_file;
 use std::fs;
 use std::path::Path;
 
-use mesolux::scene::{BuiltinOptions, load};
+use mesolux::scene::{LoadOptions, load};
 
 const MTL: &str = "newmtl lamp\nKd 0.1 0.2 0.3\nKe 1 2 3\n";
 const OBJ: &str =
@@ -25,12 +25,9 @@ fn try_files(dir: &Path, first: &str, files: [(&str, impl AsRef<[u8]>); 3]) -> R
             fs::write(path, bytes).unwrap();
         }
     }
-    load(
-        dir.join(first).to_str().unwrap(),
-        &BuiltinOptions::default(),
-    )
-    .map(|_| ())
-    .map_err(|error| error.to_string())
+    load(dir.join(first).to_str().unwrap(), &LoadOptions::default())
+        .map(|_| ())
+        .map_err(|error| error.to_string())
 }
 
 /// Replaces `from` by `to` in one of the three files, loads `first`, and looks for each fragment in
@@ -58,7 +55,7 @@ fn the_untouched_files_are_good() {
 
 #[test]
 fn unknown_scenes_and_options_are_named() {
-    let none = BuiltinOptions::default();
+    let none = LoadOptions::default();
     let error = load("cornel", &none).unwrap_err().to_string();
     assert!(
         error.contains("\"cornel\"") && error.contains("cornell"),
@@ -66,7 +63,7 @@ fn unknown_scenes_and_options_are_named() {
     );
     let error = load("nowhere.obj", &none).unwrap_err().to_string();
     assert!(error.contains("nowhere.obj: cannot be read"), "{error}");
-    let patches = BuiltinOptions {
+    let patches = LoadOptions {
         patches: Some(9),
         ..none
     };
@@ -89,12 +86,12 @@ fn unknown_scenes_and_options_are_named() {
     ] {
         let path = dir.path().join(name);
         fs::write(&path, bytes).unwrap();
-        let error = load(path.to_str().unwrap(), &BuiltinOptions::default())
+        let error = load(path.to_str().unwrap(), &LoadOptions::default())
             .unwrap_err()
             .to_string();
         assert!(fragments.iter().all(|f| error.contains(f)), "{error}");
     }
     fs::create_dir(dir.path().join("folder.obj")).unwrap();
     let folder = dir.path().join("folder.obj");
-    load(folder.to_str().unwrap(), &BuiltinOptions::default()).unwrap_err();
+    load(folder.to_str().unwrap(), &LoadOptions::default()).unwrap_err();
 }

@@ -154,8 +154,23 @@ fn wrong_materials_are_named() {
         ),
         (
             "Ke 1 2 3",
-            "Ke 1 2 3\nmap_Kd -s 2 2 1 x.png",
-            ["a.mtl:4:", "options"],
+            "Ke 1 2 3\nmap_Kd -zoom 2 x.png",
+            ["a.mtl:4:", "-zoom is not known"],
+        ),
+        (
+            "Ke 1 2 3",
+            "Ke 1 2 3\nmap_Kd -s 0 2 1 x.png",
+            ["a.mtl:4:", "-s: must not be 0"],
+        ),
+        (
+            "Ke 1 2 3",
+            "Ke 1 2 3\nmap_Kd -o x.png",
+            ["a.mtl:4:", "-o: \"x.png\" is not a number"],
+        ),
+        (
+            "Ke 1 2 3",
+            "Ke 1 2 3\nd half",
+            ["a.mtl:4:", "d: \"half\" is not a number"],
         ),
         ("newmtl lamp", "newmtl", ["a.mtl:1:", "no name"]),
         ("newmtl lamp", "", ["a.mtl:2:", "before the first newmtl"]),

@@ -125,12 +125,12 @@ fn what_no_height_map_can_be_is_refused() {
     refused(mtl("disp -bm 2"), &["a.mtl:4", "names no file"]);
     refused(mtl("norm"), &["a.mtl:4", "names no file"]);
     refused(
-        mtl("map_Bump -clamp on ok.png"),
-        &["a.mtl:4", "-clamp", "not known"],
+        mtl("map_Bump -imfchan x ok.png"),
+        &["a.mtl:4", "-imfchan", "\"x\" is none of r, g, b, l"],
     );
     refused(
-        mtl("norm -bm 2 ok.png"),
-        &["a.mtl:4", "norm", "-bm", "not known"],
+        mtl("norm -level 2 ok.png"),
+        &["a.mtl:4", "norm", "-level", "not known"],
     );
 
     let toml = |lines| square_toml(&dir, lines);

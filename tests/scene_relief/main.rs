@@ -11,11 +11,11 @@ use std::path::Path;
 
 use image::{DynamicImage, ImageBuffer, Luma, Rgb};
 use mesolux::error::Result;
-use mesolux::scene::{BuiltinOptions, Scene, load};
+use mesolux::scene::{LoadOptions, Scene, load};
 use tempfile::TempDir;
 
 fn read(path: &Path) -> Result<Scene> {
-    load(path.to_str().unwrap(), &BuiltinOptions::default())
+    load(path.to_str().unwrap(), &LoadOptions::default())
 }
 
 fn grey16(width: u32, height: u32, code: impl Fn(u32, u32) -> u16) -> DynamicImage {

@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use mesolux::scene::{ImportOptions, LoadOptions, load};
+
 use super::{folder, grey16, ramp, rgb_float, rgb8, square, square_toml, waves};
 
 #[test]
@@ -126,4 +128,128 @@ fn the_mean_angle_is_in_scene_units() {
         note.contains(&format!("{angle:.0} degrees")),
         "{note} {angle}"
     );
+}
+
+/// As Blender 4.5 writes it.
+#[test]
+fn a_bump_map_of_normals_is_a_normal_map_with_heights_of_its_own() {
+    let (_, normal) = waves(1.0, [1.0, 1.0]);
+    let dir = folder(&[
+        ("n.exr", &normal),
+        ("flat.png", &rgb8(4, 4, |_, _| [128, 128, 255])),
+    ]);
+    let scene = square(&dir, "map_Bump -bm 1.000000 n.exr").unwrap();
+    let material = &scene.materials[0];
+    assert!(material.map_normal.is_some() && material.has_relief());
+    let said = |words: &str| scene.notes.iter().any(|note| note.contains(words));
+    assert!(
+        said("n.exr holds normals") && said("heights of"),
+        "{:?}",
+        scene.notes
+    );
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+
+    // Slopes half as steep come from heights half as high.
+    let half = square(&dir, "map_Bump -bm 0.5 n.exr").unwrap();
+    let ratio = half.materials[0].height_scale / material.height_scale;
+    assert!((ratio - 0.5).abs() < 1e-3, "{ratio}");
+
+    let path = dir.path().join("a.obj");
+    let without = LoadOptions {
+        import: ImportOptions {
+            heights_from_normals: false,
+            ..ImportOptions::default()
+        },
+        ..LoadOptions::default()
+    };
+    let scene = load(path.to_str().unwrap(), &without).unwrap();
+    assert!(scene.materials[0].map_normal.is_some() && !scene.materials[0].has_relief());
+
+    let scene = square(&dir, "norm flat.png").unwrap();
+    assert!(!scene.materials[0].has_relief());
+    assert!(
+        scene.notes.iter().any(|n| n.contains("flat.png is flat")),
+        "{:?}",
+        scene.notes
+    );
+}
+
+#[test]
+fn maps_lie_where_their_options_say() {
+    let dir = folder(&[
+        (
+            "a.png",
+            &rgb8(4, 2, |x, y| [10 * x as u8, 20 * y as u8, 200]),
+        ),
+        ("h.png", &ramp()),
+    ]);
+    let plain = square(&dir, "").unwrap();
+    let scene = square(&dir, "map_Kd -s 2 3 1 -o 0.5 -0.25 a.png").unwrap();
+    for (moved, was) in scene.triangles.iter().zip(&plain.triangles) {
+        for (uv, [u, v]) in moved.uv.iter().zip(was.uv) {
+            assert_eq!(*uv, [2.0 * u + 0.5, 3.0 * v - 0.25]);
+        }
+    }
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+
+    let scene = square(&dir, "map_Kd -s 2 2 1 a.png\ndisp -s 3 3 h.png").unwrap();
+    assert_eq!(
+        scene.triangles[0].uv[1][0],
+        3.0 * plain.triangles[0].uv[1][0]
+    );
+    let warning = &scene.warnings[0];
+    assert!(warning.contains("a.mtl:4: material \"m\": map_Kd") && warning.contains("disp"));
+
+    // The square's coordinates end at 1.
+    assert!(
+        square(&dir, "map_Kd -clamp on a.png")
+            .unwrap()
+            .warnings
+            .is_empty()
+    );
+    let scene = square(&dir, "map_Kd -clamp on -s 2 2 a.png").unwrap();
+    assert!(
+        scene.warnings[0].contains("-clamp is not used"),
+        "{:?}",
+        scene.warnings
+    );
+
+    let heights = |lines| {
+        let map = square(&dir, lines).unwrap().materials.remove(0).map_height;
+        map.map(|map| map.values.clone()).unwrap()
+    };
+    assert!(
+        heights("disp -imfchan r a.png")[..4] == [0.0, 10.0 / 255.0, 20.0 / 255.0, 30.0 / 255.0]
+    );
+    assert!(heights("disp -imfchan g a.png")[4..] == [20.0 / 255.0; 4]);
+}
+
+#[test]
+fn what_would_change_the_light_and_is_not_used_is_a_warning() {
+    let dir = folder(&[]);
+    for (lines, words) in [
+        (
+            "d 0.5",
+            "a.mtl:4: material \"m\": d: surfaces are opaque, not 0.5",
+        ),
+        (
+            "Tr 0.25",
+            "a.mtl:4: material \"m\": Tr: surfaces are opaque, not 0.75",
+        ),
+        (
+            "map_d leaf.png",
+            "a.mtl:4: material \"m\": map_d is not used",
+        ),
+        (
+            "map_Ke lamp.png",
+            "a.mtl:4: material \"m\": map_Ke is not used",
+        ),
+        ("shine 3", "a.mtl:4: material \"m\": shine is not used"),
+    ] {
+        let scene = square(&dir, lines).unwrap();
+        let is_said = scene.warnings.len() == 1 && scene.warnings[0].contains(words);
+        assert!(is_said, "{:?}", scene.warnings);
+    }
+    let scene = square(&dir, "d 1\nTr 0\nKs 0.5 0.5 0.5\nNi 1.45\nillum 2").unwrap();
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
 }

@@ -9,7 +9,7 @@ use crate::bake::discretisation::discretisation;
 use crate::mesh::corners::{Joined, corner_irradiance};
 use crate::mesh::elements::Elements;
 use crate::meso::Relief;
-use crate::scene::{OnInput, Scene};
+use crate::scene::{ImportOptions, OnInput, Scene};
 use crate::solver::{Light, ReliefLight, Report};
 pub use file::{Bake, VERSION};
 
@@ -107,6 +107,8 @@ pub struct Origin {
     pub scene: String,
     pub patches: Option<usize>,
     pub statue: Option<std::path::PathBuf>,
+    #[serde(default)]
+    pub import: ImportOptions,
     /// [`Scene::hash`].
     pub hash: String,
 }

@@ -22,7 +22,7 @@ use crate::bake;
 use crate::error::{Error, Result};
 use crate::mesh::elements::Elements;
 use crate::scene::shapes::Shapes;
-use crate::scene::{BuiltinOptions, PointLight, Scene, load, write_scene};
+use crate::scene::{LoadOptions, PointLight, Scene, load, write_scene};
 use crate::solver::{Report, Settings, Solver};
 use crate::vk::Device;
 
@@ -311,7 +311,7 @@ fn settings() -> Settings {
 fn through_files(scene: &Scene) -> Result<Scene> {
     let folder = tempfile::tempdir().map_err(|e| Error::write(&std::env::temp_dir(), e))?;
     let path = write_scene(scene, folder.path())?;
-    load(&path.to_string_lossy(), &BuiltinOptions::default())
+    load(&path.to_string_lossy(), &LoadOptions::default())
 }
 
 /// Form factors of one receiver onto a closed scene sum to 1 within this: near and far sources are

@@ -8,7 +8,7 @@ use super::grid::{Part, Room};
 use super::stage::{self, Stage, diffuse, even_share};
 use super::{bunny, relief_maps, solid};
 use crate::error::Result;
-use crate::scene::{BuiltinOptions, Camera, Material, PointLight, Scene};
+use crate::scene::{Camera, LoadOptions, Material, PointLight, Scene};
 
 const NAME: &str = "bowl-and-bunny";
 const PATCHES: usize = 73_256;
@@ -39,7 +39,7 @@ const BOWL: u32 = 5;
 ///
 /// # Errors
 /// Too few patches; a statue that cannot be read.
-pub(super) fn build(options: &BuiltinOptions) -> Result<Scene> {
+pub(super) fn build(options: &LoadOptions) -> Result<Scene> {
     let patches = stage::planned(NAME, options, PATCHES, LEAST_PATCHES)?;
     let mut figure = match &options.statue {
         Some(path) => stage::read_statue(path)?,

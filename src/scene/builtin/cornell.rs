@@ -9,7 +9,7 @@ use super::statue;
 use crate::error::{Error, Result};
 use crate::scene::assemble::Assembly;
 use crate::scene::uv::box_projection;
-use crate::scene::{BuiltinOptions, Camera, Material, Scene, check};
+use crate::scene::{Camera, LoadOptions, Material, Scene, check};
 
 /// Default number of elements.
 const PATCHES: usize = 12_000;
@@ -30,7 +30,7 @@ const STATUE_TRIANGLES: std::ops::RangeInclusive<usize> = 3_000..=25_780;
 ///
 /// # Errors
 /// A statue that cannot be read; fewer patches than statue and coarsest room need.
-pub(super) fn build(options: &BuiltinOptions) -> Result<Scene> {
+pub(super) fn build(options: &LoadOptions) -> Result<Scene> {
     let patches = options.patches.unwrap_or(PATCHES);
     let mut mesh = match &options.statue {
         Some(path) => stage::read_statue(path)?,
@@ -69,14 +69,14 @@ pub(super) fn build(options: &BuiltinOptions) -> Result<Scene> {
     )?;
     assembly.add_mesh(&mesh, &materials)?;
     let scene = &mut assembly.scene;
-    scene.notes.append(&mut mesh.notes);
+    scene.notes.append(&mut mesh.said.notes);
     scene.cameras.push(camera());
     assert_eq!(
         scene.triangles.len(),
         patches,
         "every patch is there, and no other"
     );
-    check::finish(assembly.into_scene())
+    check::finish(assembly.into_scene(), &options.import)
 }
 
 /// The middle of the floor, where the statue stands.

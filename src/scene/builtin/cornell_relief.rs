@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::stage::{self, Stage, even_share};
 use super::{cornell, relief_maps, solid, statue};
 use crate::error::Result;
-use crate::scene::{BuiltinOptions, Material, Scene};
+use crate::scene::{LoadOptions, Material, Scene};
 
 const NAME: &str = "cornell-relief";
 const PATCHES: usize = 83_160;
@@ -22,7 +22,7 @@ const HEIGHT: f32 = 0.03;
 ///
 /// # Errors
 /// Too few patches; a statue that cannot be read.
-pub(super) fn build(options: &BuiltinOptions) -> Result<Scene> {
+pub(super) fn build(options: &LoadOptions) -> Result<Scene> {
     let mut horse = match &options.statue {
         Some(path) => stage::read_statue(path)?,
         None => {

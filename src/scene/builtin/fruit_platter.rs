@@ -10,7 +10,7 @@ use super::stage::{self, Stage, diffuse, even_share};
 use super::{fruit, relief_maps, solid};
 use crate::error::{Error, Result};
 use crate::scene::assemble::Mesh;
-use crate::scene::{BuiltinOptions, Camera, Material, Scene};
+use crate::scene::{Camera, LoadOptions, Material, Scene};
 
 const NAME: &str = "fruit-platter";
 const PATCHES: usize = 76_304;
@@ -46,7 +46,7 @@ const DISH: u32 = 6;
 ///
 /// # Errors
 /// Too few patches; a statue, which this scene has no place for.
-pub(super) fn build(options: &BuiltinOptions) -> Result<Scene> {
+pub(super) fn build(options: &LoadOptions) -> Result<Scene> {
     if options.statue.is_some() {
         return Err(Error::Usage(format!(
             "{NAME}: there is no statue in it to replace"

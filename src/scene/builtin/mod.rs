@@ -14,9 +14,7 @@ mod stage;
 mod statue;
 mod surface_nets;
 
-use std::path::PathBuf;
-
-use super::Scene;
+use super::{LoadOptions, Scene};
 use crate::error::{Error, Result};
 
 /// Names that [`super::load`] takes instead of a path. All but the first are scenes of the paper's
@@ -28,17 +26,8 @@ pub const NAMES: [&str; 4] = [
     "cornell-relief",
 ];
 
-/// Options of a built-in scene.
-#[derive(Debug, Clone, Default)]
-pub struct BuiltinOptions {
-    /// The exact number of elements.
-    pub patches: Option<usize>,
-    /// An OBJ mesh, y up, head towards −z, in place of the statue made by code.
-    pub statue: Option<PathBuf>,
-}
-
 /// Builds the scene of that name.
-pub(super) fn build(name: &str, options: &BuiltinOptions) -> Result<Scene> {
+pub(super) fn build(name: &str, options: &LoadOptions) -> Result<Scene> {
     match name {
         "cornell" => cornell::build(options),
         "fruit-platter" => fruit_platter::build(options),

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::scene::assemble::{Assembly, Mesh, MeshTriangle, is_degenerate};
 use crate::scene::material::TextureCache;
 use crate::scene::uv::box_projection;
-use crate::scene::{BuiltinOptions, Camera, Material, PointLight, Scene, check, obj};
+use crate::scene::{Camera, LoadOptions, Material, PointLight, Scene, check, obj};
 
 /// A scene of solids in a room, complete except for the number of elements.
 pub(super) struct Stage {
@@ -32,7 +32,7 @@ impl Stage {
     ///
     /// # Errors
     /// Fewer patches than solids and coarsest room need.
-    pub fn build(self, options: &BuiltinOptions) -> Result<Scene> {
+    pub fn build(self, options: &LoadOptions) -> Result<Scene> {
         let solids: usize = self.solids.iter().map(count).sum();
         let least = solids + grid::least_triangles();
         let patches = match options.patches {
@@ -53,7 +53,7 @@ impl Stage {
         assembly.add_mesh(&room, &materials)?;
         for solid in self.solids {
             assembly.add_mesh(&solid, &materials)?;
-            assembly.scene.notes.extend(solid.notes);
+            assembly.scene.notes.extend(solid.said.notes);
         }
         let scene = &mut assembly.scene;
         scene.point_lights = self.point_lights;
@@ -63,7 +63,7 @@ impl Stage {
             patches,
             "every patch is there, and no other"
         );
-        check::finish(assembly.into_scene())
+        check::finish(assembly.into_scene(), &options.import)
     }
 }
 
@@ -73,7 +73,7 @@ impl Stage {
 /// Fewer than `least`: the figures would lose their shape.
 pub(super) fn planned(
     name: &str,
-    options: &BuiltinOptions,
+    options: &LoadOptions,
     default: usize,
     least: usize,
 ) -> Result<usize> {
@@ -139,7 +139,7 @@ pub(super) fn cover(mesh: &mut Mesh, material: u32, repeats: f64) {
 pub(super) fn read_statue(path: &Path) -> Result<Mesh> {
     let mut mesh = obj::read(path, &mut TextureCache::default())?;
     if mesh.materials.iter().any(|m| m.name != "default") {
-        mesh.notes.push(format!(
+        mesh.said.notes.push(format!(
             "{}: the statue has the material of the scene, not its own",
             path.display()
         ));
