@@ -26,7 +26,14 @@ fn bad_input_is_one_line_and_exit_code_2() {
     let mtl = |change: (&str, &str)| MATERIALS.replace(change.0, change.1);
     // What is wrong, the OBJ, the MTL, more arguments, and what the one line must say.
     type Case<'a> = (&'a str, String, String, &'a [&'a str], &'a [&'a str]);
-    let cases: [Case; 15] = [
+    let cases: [Case; 16] = [
+        (
+            "lamp that faces away",
+            room(("f 5 6 7 8", "f 8 7 6 5")),
+            MATERIALS.into(),
+            &[],
+            &["room.obj", "no light arrives", "sides"],
+        ),
         (
             "nan",
             room(("v 1 0 0", "v nan 0 0")),

@@ -4,9 +4,9 @@ use glam::{DVec3, Vec3};
 use serde::Serialize;
 
 use super::places::Place;
-use super::random::below;
 use super::truth::{PARTS, Parts, Truth, average, mean};
 use crate::bake::solution::corner_light;
+use crate::math::random::below;
 use crate::path_tracer::NORMAL_95;
 use crate::scene::Scene;
 

@@ -13,7 +13,6 @@ pub mod pictures;
 mod pixels;
 pub mod places;
 mod power_law;
-mod random;
 pub mod relief_room;
 pub mod scaling;
 pub mod stress;

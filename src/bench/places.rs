@@ -5,8 +5,8 @@ use std::str::FromStr;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::random::unit;
 use crate::error::{Error, Result};
+use crate::math::random::unit;
 use crate::path_tracer::PathTracer;
 use crate::scene::Scene;
 

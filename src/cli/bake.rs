@@ -16,7 +16,7 @@ use mesolux::math::directions::Directions;
 use mesolux::mesh::sources::Grouping;
 use mesolux::meso::{self, Transport};
 use mesolux::scene::Scene;
-use mesolux::solver::{Estimator, Report, Settings, Solver, Update, Visibility};
+use mesolux::solver::{Estimator, Report, Settings, Solver, StopReason, Update, Visibility};
 use mesolux::vk::Device;
 
 /// Solve a scene and write the light on every element
@@ -291,6 +291,7 @@ pub fn run(options: &Options) -> Result<()> {
     let devices = options.device.open()?;
     let solver = solve_visibly(&devices, &scene, &settings, kept.as_ref())?;
     let solution = mesolux::bake::solution(&scene, &solver)?;
+    refuse_darkness(&scene, &solution)?;
     options.device.check()?;
     if options.keep_visibility {
         let path = beside(&options.output);
@@ -342,7 +343,26 @@ pub fn run(options: &Options) -> Result<()> {
 /// Bakes with progress on stderr; Ctrl-C stops the bake and keeps what it has.
 pub fn bake_visibly(device: &Arc<Device>, scene: &Scene, settings: &Settings) -> Result<Solution> {
     let devices = [Arc::clone(device)];
-    mesolux::bake::solution(scene, &solve_visibly(&devices, scene, settings, None)?)
+    let solution =
+        mesolux::bake::solution(scene, &solve_visibly(&devices, scene, settings, None)?)?;
+    refuse_darkness(scene, &solution)?;
+    Ok(solution)
+}
+
+/// # Errors
+/// A bake that ran to its end, and on whose surfaces no light arrives.
+fn refuse_darkness(scene: &Scene, solution: &Solution) -> Result<()> {
+    let is_dark = solution.irradiance.iter().all(|e| *e == glam::Vec3::ZERO);
+    if !is_dark || solution.report.stop != StopReason::Residual {
+        return Ok(());
+    }
+    let path = scene.path.as_ref();
+    Err(Error::Scene {
+        scene: path.map_or_else(|| scene.name.clone(), |path| path.display().to_string()),
+        what: "no light arrives on any surface: no front of one faces the front of a lamp; turn \
+               lamps or meshes by reverse or sides in scene.toml"
+            .into(),
+    })
 }
 
 fn solve_visibly(

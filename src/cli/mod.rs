@@ -83,6 +83,9 @@ struct Builtin {
     /// The z axis of OBJ files points up
     #[arg(long)]
     z_up: bool,
+    /// Leave surfaces that show light only their backs, instead of turning them
+    #[arg(long)]
+    sides_as_given: bool,
 }
 
 impl Builtin {
@@ -96,6 +99,7 @@ impl Builtin {
             no_refine: true,
             no_heights_from_normals: !bake.origin.import.heights_from_normals,
             z_up: bake.origin.import.z_up,
+            sides_as_given: bake.origin.import.sides_as_given,
         };
         let scene = builtin.load(&bake.origin.scene)?;
         let count = scene.triangles.len();
@@ -121,6 +125,7 @@ impl Builtin {
         ImportOptions {
             heights_from_normals: !self.no_heights_from_normals,
             z_up: self.z_up,
+            sides_as_given: self.sides_as_given,
         }
     }
 

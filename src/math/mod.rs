@@ -4,3 +4,4 @@ pub mod directions;
 pub mod form_factor;
 pub mod hemicube;
 pub mod kept;
+pub mod random;

@@ -10,7 +10,8 @@ use crate::mesh::elements::Elements;
 /// Elements that touch over an edge, and the connected parts that they form.
 pub struct Connections {
     /// Per element and edge (corner i to corner i + 1): the element on the other side, if there is
-    /// exactly one and it has the edge in the opposite direction.
+    /// exactly one and it has the edge in the opposite direction. Of two surfaces that touch along
+    /// the edge, the element that continues its own.
     pub neighbours: Vec<[Option<u32>; 3]>,
     /// Connected part of each element.
     pub component: Vec<u32>,
@@ -22,11 +23,14 @@ pub struct Connections {
     pub enclosed: bool,
 }
 
+/// Low vertex, high vertex, element, and edge of the element.
+type Edge = (u32, u32, u32, u8);
+
 impl Connections {
     pub fn new(elements: &Elements) -> Self {
         let count = elements.len();
-        // (low vertex, high vertex, element, edge): equal edges are adjacent once sorted.
-        let mut edges: Vec<(u32, u32, u32, u8)> = Vec::with_capacity(3 * count);
+        // Equal edges are adjacent once sorted.
+        let mut edges: Vec<Edge> = Vec::with_capacity(3 * count);
         for (e, corners) in elements.corners.iter().enumerate() {
             for i in 0..3 {
                 let (a, b) = (corners[i], corners[(i + 1) % 3]);
@@ -36,12 +40,30 @@ impl Connections {
         edges.sort_unstable();
         let mut neighbours = vec![[None; 3]; count];
         for group in edges.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
-            if let [x, y] = group {
-                let start = |z: &(u32, u32, u32, u8)| elements.corners[z.2 as usize][z.3 as usize];
-                if start(x) != start(y) {
-                    neighbours[x.2 as usize][x.3 as usize] = Some(y.2);
-                    neighbours[y.2 as usize][y.3 as usize] = Some(x.2);
+            let start = |z: &Edge| elements.corners[z.2 as usize][z.3 as usize];
+            let normal = |z: &Edge| elements.normal[z.2 as usize];
+            let mut join = |x: &Edge, y: &Edge| {
+                neighbours[x.2 as usize][x.3 as usize] = Some(y.2);
+                neighbours[y.2 as usize][y.3 as usize] = Some(x.2);
+            };
+            match group {
+                [x, y] if start(x) != start(y) => join(x, y),
+                // Two surfaces that touch, such as the sides of a sheet: each continues.
+                [_, _, _, _] => {
+                    let (on, back): (Vec<&Edge>, Vec<&Edge>) =
+                        group.iter().partition(|z| start(z) == start(&group[0]));
+                    let continues = |x: &Edge, y: &Edge| normal(x).dot(normal(y)) > 0.0;
+                    if let ([a, b], [c, d]) = (&on[..], &back[..]) {
+                        for [c, d] in [[c, d], [d, c]] {
+                            let apart = !continues(a, d) && !continues(b, c);
+                            if continues(a, c) && continues(b, d) && apart {
+                                join(a, c);
+                                join(b, d);
+                            }
+                        }
+                    }
                 }
+                _ => {}
             }
         }
         let mut component = vec![u32::MAX; count];

@@ -8,8 +8,9 @@ use glam::DVec3;
 
 use super::material::MadeUp;
 use super::said::Said;
+use super::sides::{self, Sides};
 use super::uv::{OnSurface, box_projection};
-use super::{Material, Scene, Triangle};
+use super::{ImportOptions, Material, Scene, Triangle};
 use crate::error::{Error, Result};
 
 /// A mesh before it is added to a scene.
@@ -69,6 +70,8 @@ pub(super) struct Assembly {
     /// Corners of each triangle in their order, the least first.
     known: HashSet<[u32; 3]>,
     projected: usize,
+    /// Whether the sides of each triangle may be found, `[triangle]`.
+    free: Vec<bool>,
 }
 
 impl Assembly {
@@ -82,6 +85,7 @@ impl Assembly {
             welded: HashMap::new(),
             known: HashSet::new(),
             projected: 0,
+            free: Vec::new(),
         }
     }
 
@@ -134,11 +138,7 @@ impl Assembly {
             let vertices = corners.map(|p| self.weld(p));
             // Two triangles in one place would both reflect the light that falls there: each bounce
             // would double it.
-            let least = (0..3).fold(0, |l, i| if vertices[i] < vertices[l] { i } else { l });
-            if !self
-                .known
-                .insert([0, 1, 2].map(|i| vertices[(least + i) % 3]))
-            {
+            if !self.known.insert(least_first(vertices)) {
                 self.scene.dropped_duplicates += 1;
                 continue;
             }
@@ -155,6 +155,25 @@ impl Assembly {
         Ok(())
     }
 
+    /// Gives the triangles from `first` on the sides that are asked for; those of none are found.
+    pub fn give_sides(&mut self, first: usize, sides: Option<Sides>) {
+        match sides {
+            None | Some(Sides::AsGiven) => {}
+            Some(Sides::Outward) => sides::face(&mut self.scene, first, true),
+            Some(Sides::Inward) => sides::face(&mut self.scene, first, false),
+            Some(Sides::Both) => {
+                for t in first..self.scene.triangles.len() {
+                    let back = sides::turned(&self.scene.triangles[t]);
+                    if self.known.insert(least_first(back.vertices)) {
+                        self.scene.triangles.push(back);
+                    }
+                }
+            }
+        }
+        self.free
+            .resize(self.scene.triangles.len(), sides.is_none());
+    }
+
     fn weld(&mut self, position: DVec3) -> u32 {
         // Adding zero turns −0 into 0: the same position with other bits.
         let position = position + DVec3::ZERO;
@@ -168,6 +187,14 @@ impl Assembly {
             })
     }
 
+    /// The scene, with the sides found that were not given, unless `import` leaves them.
+    pub fn into_imported(mut self, import: &ImportOptions) -> Scene {
+        if !import.sides_as_given {
+            sides::turn_dark(&mut self.scene, &self.free);
+        }
+        self.into_scene()
+    }
+
     pub fn into_scene(mut self) -> Scene {
         if self.projected > 0 {
             self.scene.notes.push(format!(
@@ -177,6 +204,12 @@ impl Assembly {
         }
         self.scene
     }
+}
+
+/// Corners in their order, the least first.
+fn least_first(vertices: [u32; 3]) -> [u32; 3] {
+    let least = (0..3).fold(0, |l, i| if vertices[i] < vertices[l] { i } else { l });
+    [0, 1, 2].map(|i| vertices[(least + i) % 3])
 }
 
 /// Whether a triangle has practically no area: height over longest edge below [`LEAST_HEIGHT`].

@@ -30,6 +30,8 @@ pub struct ImportOptions {
     pub heights_from_normals: bool,
     /// Turns OBJ meshes by −90° about x: their z axis points up.
     pub z_up: bool,
+    /// Leaves pieces that show light only their backs as they are, instead of turning them.
+    pub sides_as_given: bool,
 }
 
 impl Default for ImportOptions {
@@ -37,6 +39,7 @@ impl Default for ImportOptions {
         Self {
             heights_from_normals: true,
             z_up: false,
+            sides_as_given: false,
         }
     }
 }
@@ -87,11 +90,12 @@ fn load_obj(path: &Path, import: &ImportOptions) -> Result<Scene> {
     let mut assembly = Assembly::new(stem(path), Some(path));
     let materials = assembly.add_materials(&mesh.materials);
     assembly.add_mesh(&mesh, &materials)?;
+    assembly.give_sides(0, None);
     assembly.scene.notes.extend(mesh.said.notes);
     assembly.scene.warnings.extend(mesh.said.warnings);
     assembly
         .scene
         .notes
         .extend(mesh.made_up.iter().map(|made_up| made_up.to_string()));
-    check::finish(assembly.into_scene(), import)
+    check::finish(assembly.into_imported(import), import)
 }

@@ -36,6 +36,7 @@ mod said;
 #[cfg(feature = "formats")]
 mod scene_file;
 pub mod shapes;
+mod sides;
 mod text_file;
 mod texture;
 mod tile;

@@ -10,6 +10,7 @@ use toml::Spanned;
 use super::assemble::{Assembly, Mesh};
 use super::material::{Asked, DEFAULT_KD, MadeUp, TextureCache};
 use super::placement::{Placement, Scale};
+use super::sides::Sides;
 use super::text_file::{read_text, stem};
 use super::{Camera, ImportOptions, Material, PointLight, Scene, check, obj};
 use crate::error::{Error, Result};
@@ -48,6 +49,8 @@ pub(super) struct MeshTable {
     pub reverse: bool,
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub z_up: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sides: Option<Sides>,
 }
 
 #[derive(Debug, Default, Deserialize, Serialize)]
@@ -147,7 +150,7 @@ pub(super) fn load(path: &Path, import: &ImportOptions) -> Result<Scene> {
         heights_from_normals: import.heights_from_normals && file.heights_from_normals,
         ..import.clone()
     };
-    check::finish(assembly.into_scene(), &import)
+    check::finish(assembly.into_imported(&import), &import)
 }
 
 /// The line of a byte of the file.
@@ -207,7 +210,9 @@ fn add_mesh(
     placement.apply(&mut mesh, table.reverse).map_err(refuse)?;
 
     let materials = assembly.add_materials(&mesh.materials);
+    let first = assembly.scene.triangles.len();
     assembly.add_mesh(&mesh, &materials)?;
+    assembly.give_sides(first, table.sides);
     assembly.scene.warnings.extend(mesh.said.warnings);
     let notes = &mut assembly.scene.notes;
     notes.extend(mesh.said.notes);

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use image::DynamicImage;
 
 use crate::error::{Error, Result};
+use crate::math::random;
 
 /// A linear RGB image; repeats outside 0..1.
 #[derive(Debug, Clone, PartialEq)]
@@ -156,11 +157,7 @@ pub(super) fn neighbours(coordinate: f64, size: u32) -> ([usize; 2], f64) {
 
 /// A uniform place in the triangle (0,0), (1,0), (0,1), the same for the same number.
 fn place_in_triangle(number: u64) -> (f64, f64) {
-    // SplitMix64, Steele et al. 2014.
-    let mut z = (number + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^= z >> 31;
+    let z = random::next(&mut number.wrapping_mul(random::STEP));
     let unit = |bits: u64| bits as f64 / f64::from(u32::MAX);
     let (s, t) = (unit(z >> 32), unit(z & u64::from(u32::MAX)));
     if s + t > 1.0 {

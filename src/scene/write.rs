@@ -10,6 +10,7 @@ use toml::Spanned;
 use super::Scene;
 use super::map_files::{self, MapFiles};
 use super::scene_file::{CameraTable, MeshTable, PointLightTable, SceneFile};
+use super::sides::Sides;
 use crate::atomic_file::write_atomically;
 use crate::error::{Error, Result};
 
@@ -114,6 +115,7 @@ fn tables(scene: &Scene) -> SceneFile {
         name: Some(scene.name.clone()),
         mesh: vec![bare(MeshTable {
             file: MESH.into(),
+            sides: Some(Sides::AsGiven),
             ..MeshTable::default()
         })],
         point_light: scene

@@ -1,8 +1,11 @@
 //! Random numbers that are the same in every run (Steele et al. 2014).
 
+/// From one state of the sequence to the next.
+pub const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
+
 /// The next number of a sequence, and its state.
 pub fn next(state: &mut u64) -> u64 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    *state = state.wrapping_add(STEP);
     let mut z = *state;
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

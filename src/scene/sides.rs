@@ -1,0 +1,324 @@
+//! Which sides of surfaces light falls on.
+//!
+//! Only the front of a triangle sends and receives light, and modellers do not show which side that
+//! is. Random paths from the lights, off either side of what they meet, find the pieces that show
+//! light only their backs: a room whose normals point outward is one.
+
+use std::collections::HashMap;
+use std::time::Duration;
+
+use glam::DVec3;
+use obvhs::aabb::Aabb;
+use obvhs::cwbvh::CwBvh;
+use obvhs::cwbvh::builder::build_cwbvh;
+use obvhs::ray::{Ray, RayHit};
+use obvhs::{Boundable, BvhBuildParams};
+use serde::{Deserialize, Serialize};
+
+use super::even_light::luminance;
+use super::{Scene, Triangle};
+use crate::math::random;
+
+/// Which side of a mesh is the front.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
+pub(super) enum Sides {
+    /// That of the file.
+    #[serde(rename = "as given")]
+    AsGiven,
+    /// That which faces away from the middle of each of its pieces.
+    #[serde(rename = "outward")]
+    Outward,
+    #[serde(rename = "inward")]
+    Inward,
+    /// Both: each triangle is there twice, back to back.
+    #[serde(rename = "both")]
+    Both,
+}
+
+/// Paths from the lights, and surfaces that each meets at most.
+const PATHS: usize = 8192;
+const BOUNCES: usize = 6;
+
+/// Meetings with the back of a piece, at least, that show which side is lit.
+const ENOUGH: u32 = 8;
+
+/// Turns the pieces of the triangles from `first` on so that they face outward, or inward.
+pub(super) fn face(scene: &mut Scene, first: usize, outward: bool) {
+    let pieces = pieces(&scene.triangles[first..]);
+    let count = pieces.iter().max().map_or(0, |&last| last as usize + 1);
+    let own = || scene.triangles[first..].iter().zip(&pieces);
+    // Area and its first moment of each piece.
+    let mut sums = vec![(0.0, DVec3::ZERO); count];
+    for (triangle, &piece) in own() {
+        let [a, b, c] = scene.corners(triangle);
+        let area = (b - a).cross(c - a).length();
+        let sum = &mut sums[piece as usize];
+        *sum = (sum.0 + area, sum.1 + area * (a + b + c) / 3.0);
+    }
+    let mut flow = vec![0.0; count];
+    for (triangle, &piece) in own() {
+        let [a, b, c] = scene.corners(triangle);
+        let (area, moment) = sums[piece as usize];
+        let away = (a + b + c) / 3.0 - moment / area;
+        flow[piece as usize] += (b - a).cross(c - a).dot(away);
+    }
+    for (triangle, &piece) in scene.triangles[first..].iter_mut().zip(&pieces) {
+        if (flow[piece as usize] < 0.0) == outward {
+            *triangle = turned(triangle);
+        }
+    }
+}
+
+/// Turns pieces that show light only their backs, of those triangles that are `free` to be,
+/// `[triangle]`, with a note.
+pub(super) fn turn_dark(scene: &mut Scene, free: &[bool]) {
+    let Some(lights) = Lights::of(scene) else {
+        return;
+    };
+    let pieces = pieces(&scene.triangles);
+    let count = pieces.iter().max().map_or(0, |&last| last as usize + 1);
+    // Meetings of each piece, [front, back].
+    let mut met = vec![[0_u32; 2]; count];
+    let rays = Rays::new(scene);
+    let mut state = 0;
+    for _ in 0..PATHS {
+        let (mut from, mut direction) = lights.ray(&rays, &mut state);
+        for _ in 0..BOUNCES {
+            let Some((t, place, normal)) = rays.first_met(from, direction) else {
+                break;
+            };
+            let is_back = direction.dot(normal) > 0.0;
+            met[pieces[t] as usize][usize::from(is_back)] += 1;
+            let side = if is_back { -normal } else { normal };
+            direction = diffuse(side, &mut state);
+            from = place + ABOVE * side;
+        }
+    }
+    let emits = |t: &Triangle| scene.materials[t.material as usize].emits();
+    let mut keeps = vec![false; count];
+    for ((t, &piece), &free) in scene.triangles.iter().zip(&pieces).zip(free) {
+        keeps[piece as usize] |= emits(t) || !free;
+    }
+    let is_dark = |piece: u32| {
+        let [front, back] = met[piece as usize];
+        front == 0 && back >= ENOUGH && !keeps[piece as usize]
+    };
+    let mut materials: Vec<u32> = Vec::new();
+    let mut count = 0;
+    for (triangle, &piece) in scene.triangles.iter_mut().zip(&pieces) {
+        if is_dark(piece) {
+            *triangle = turned(triangle);
+            count += 1;
+            if !materials.contains(&triangle.material) {
+                materials.push(triangle.material);
+            }
+        }
+    }
+    if count > 0 {
+        let name = |&m: &u32| format!("\"{}\"", scene.materials[m as usize].name);
+        let names: Vec<String> = materials.iter().map(name).collect();
+        scene.notes.push(format!(
+            "{count} triangles of {} showed light only their backs, and were turned; \
+             --sides-as-given leaves them",
+            names.join(", ")
+        ));
+    }
+}
+
+pub(super) fn turned(triangle: &Triangle) -> Triangle {
+    let (mut vertices, mut uv) = (triangle.vertices, triangle.uv);
+    vertices.swap(1, 2);
+    uv.swap(1, 2);
+    Triangle {
+        vertices,
+        uv,
+        ..*triangle
+    }
+}
+
+/// A number for each triangle, the same for those that are joined by edges along which their fronts
+/// are on one side.
+fn pieces(triangles: &[Triangle]) -> Vec<u32> {
+    // Ends of each edge, the triangle, and whether it runs from the first end to the other.
+    let mut edges: Vec<([u32; 2], u32, bool)> = Vec::with_capacity(3 * triangles.len());
+    for (t, triangle) in (0..).zip(triangles) {
+        let [a, b, c] = triangle.vertices;
+        for [p, q] in [[a, b], [b, c], [c, a]] {
+            edges.push(([p.min(q), p.max(q)], t, p < q));
+        }
+    }
+    edges.sort_unstable();
+    let mut parent: Vec<u32> = (0..triangles.len() as u32).collect();
+    fn root(parent: &mut [u32], mut t: u32) -> u32 {
+        while parent[t as usize] != t {
+            parent[t as usize] = parent[parent[t as usize] as usize];
+            t = parent[t as usize];
+        }
+        t
+    }
+    for of in edges.chunk_by(|a, b| a.0 == b.0) {
+        if let [(_, t, along), (_, o, other)] = *of
+            && along != other
+        {
+            let (t, o) = (root(&mut parent, t), root(&mut parent, o));
+            parent[t.max(o) as usize] = t.min(o);
+        }
+    }
+    let mut numbers: HashMap<u32, u32> = HashMap::new();
+    (0..triangles.len() as u32)
+        .map(|t| {
+            let next = numbers.len() as u32;
+            *numbers.entry(root(&mut parent, t)).or_insert(next)
+        })
+        .collect()
+}
+
+/// Where paths begin.
+struct Lights {
+    /// Triangle or point light, and the sum of the powers up to it.
+    list: Vec<(Light, f64)>,
+}
+
+#[derive(Clone, Copy)]
+enum Light {
+    /// Corners, in the frame of [`Rays`].
+    Triangle([DVec3; 3]),
+    Point(DVec3),
+}
+
+impl Lights {
+    fn of(scene: &Scene) -> Option<Self> {
+        let (origin, unit) = scene.local_frame();
+        let within = |p: DVec3| (p - origin) / unit;
+        let (mut list, mut sum) = (Vec::new(), 0.0);
+        let mut add = |light, power: f64| {
+            if power > 0.0 {
+                sum += power;
+                list.push((light, sum));
+            }
+        };
+        for triangle in &scene.triangles {
+            let corners = scene.corners(triangle).map(within);
+            let [a, b, c] = corners;
+            let area = 0.5 * (b - a).cross(c - a).length();
+            let emitted = luminance(scene.materials[triangle.material as usize].ke);
+            add(Light::Triangle(corners), area * emitted);
+        }
+        for light in &scene.point_lights {
+            // Power over π, as that of the triangles.
+            let power = 4.0 * luminance(light.intensity) / (unit * unit);
+            add(Light::Point(within(light.position)), power);
+        }
+        (!list.is_empty()).then_some(Self { list })
+    }
+
+    /// A place on the lights by power, and a direction.
+    fn ray(&self, rays: &Rays, state: &mut u64) -> (DVec3, DVec3) {
+        let total = self.list.last().map_or(0.0, |last| last.1);
+        let at = random::unit(state) * total;
+        let index = self.list.partition_point(|(_, sum)| *sum <= at);
+        match self.list[index.min(self.list.len() - 1)].0 {
+            Light::Triangle([a, b, c]) => {
+                let (s, t) = (random::unit(state), random::unit(state));
+                let (s, t) = if s + t > 1.0 {
+                    (1.0 - s, 1.0 - t)
+                } else {
+                    (s, t)
+                };
+                let normal = (b - a).cross(c - a).normalize_or_zero();
+                let from = a + s * (b - a) + t * (c - a) + ABOVE * normal;
+                (from, diffuse(normal, state))
+            }
+            Light::Point(from) => (rays.inside(from), uniform(state)),
+        }
+    }
+}
+
+/// A direction of the unit sphere.
+fn uniform(state: &mut u64) -> DVec3 {
+    let z = 2.0 * random::unit(state) - 1.0;
+    let angle = std::f64::consts::TAU * random::unit(state);
+    let around = (1.0 - z * z).max(0.0).sqrt();
+    DVec3::new(around * angle.cos(), around * angle.sin(), z)
+}
+
+/// A direction above a plane by the cosine.
+fn diffuse(normal: DVec3, state: &mut u64) -> DVec3 {
+    (normal + uniform(state)).normalize_or(normal)
+}
+
+/// Height of a path's start above a surface, where half the scene is 1.
+const ABOVE: f64 = 1e-6;
+
+/// Boxes reach so far beyond what they hold, which is more than the rounding of f32.
+const MARGIN: f32 = 1e-5;
+
+/// The triangles of a scene about its middle, half the scene being 1 across.
+struct Rays {
+    corners: Vec<[DVec3; 3]>,
+    bvh: CwBvh,
+}
+
+struct Bounds<'a>(&'a [DVec3; 3]);
+
+impl Boundable for Bounds<'_> {
+    fn aabb(&self) -> Aabb {
+        let mut bounds = Aabb::from_points(&self.0.map(|v| v.as_vec3a()));
+        bounds.min -= MARGIN;
+        bounds.max += MARGIN;
+        bounds
+    }
+}
+
+impl Rays {
+    fn new(scene: &Scene) -> Self {
+        let (origin, unit) = scene.local_frame();
+        let corners: Vec<[DVec3; 3]> = (scene.triangles.iter())
+            .map(|t| scene.corners(t).map(|p| (p - origin) / unit))
+            .collect();
+        let bounds: Vec<Bounds> = corners.iter().map(Bounds).collect();
+        let bvh = build_cwbvh(
+            &bounds,
+            BvhBuildParams::fastest_build(),
+            &mut Duration::default(),
+        );
+        Self { corners, bvh }
+    }
+
+    /// A point light far outside shines from the edge of what f32 can tell apart.
+    fn inside(&self, place: DVec3) -> DVec3 {
+        place.clamp(DVec3::splat(-100.0), DVec3::splat(100.0))
+    }
+
+    /// The triangle that a ray meets first, the place, and the triangle's normal.
+    fn first_met(&self, from: DVec3, direction: DVec3) -> Option<(usize, DVec3, DVec3)> {
+        let ray = Ray::new_inf(from.as_vec3a(), direction.as_vec3a());
+        let mut nearest = f64::INFINITY;
+        let mut found = None;
+        self.bvh.ray_traverse(ray, &mut RayHit::none(), |_, place| {
+            let t = self.bvh.primitive_indices[place] as usize;
+            let Some(distance) = crossing(self.corners[t], from, direction) else {
+                return f32::INFINITY;
+            };
+            if distance < nearest {
+                (nearest, found) = (distance, Some(t));
+            }
+            distance as f32
+        });
+        let t = found?;
+        let [a, b, c] = self.corners[t];
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        Some((t, from + nearest * direction, normal))
+    }
+}
+
+/// How far along a ray it goes through a triangle (Möller and Trumbore 1997).
+fn crossing([a, b, c]: [DVec3; 3], from: DVec3, direction: DVec3) -> Option<f64> {
+    let (ab, ac, way) = (b - a, c - a, from - a);
+    let over = direction.cross(ac);
+    let whole = ab.dot(over);
+    let across = way.cross(ab);
+    let (u, v) = (way.dot(over) / whole, direction.dot(across) / whole);
+    let distance = ac.dot(across) / whole;
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance > 0.0).then_some(distance)
+}
