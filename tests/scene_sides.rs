@@ -221,8 +221,7 @@ fn both_sides_of_a_curtain_are_lit() {
     let curtain = "mtllib a.mtl\nusemtl box\nv 0 0.02 -0.9\nv 0 1.9 -0.9\nv 0 1.9 0.9\nv 0 0.02 0.9\nf 1 2 3 4\n";
     fs::write(dir.path().join("curtain.obj"), curtain).unwrap();
     let path = dir.path().join("a.toml");
-    let text =
-        format!("[[mesh]]\nfile = 'a.obj'\n[[mesh]]\nfile = 'curtain.obj'\nsides = 'both'\n");
+    let text = "[[mesh]]\nfile = 'a.obj'\n[[mesh]]\nfile = 'curtain.obj'\nsides = 'both'\n";
     fs::write(&path, text).unwrap();
     let scene = load(path.to_str().unwrap(), &LoadOptions::default()).unwrap();
     let scene = scene.refined(&Default::default());

@@ -7,8 +7,9 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::material::MadeUp;
+use super::mesh_file::MeshFile;
 use super::said::Said;
-use super::sides::{self, Sides};
+use super::sides::{self, Choice, Sides};
 use super::uv::{OnSurface, box_projection};
 use super::{ImportOptions, Material, Scene, Triangle};
 use crate::error::{Error, Result};
@@ -70,8 +71,8 @@ pub(super) struct Assembly {
     /// Corners of each triangle in their order, the least first.
     known: HashSet<[u32; 3]>,
     projected: usize,
-    /// Whether the sides of each triangle may be found, `[triangle]`.
-    free: Vec<bool>,
+    /// What is left to be found of the sides of each triangle, `[triangle]`.
+    choices: Vec<Choice>,
 }
 
 impl Assembly {
@@ -85,7 +86,7 @@ impl Assembly {
             welded: HashMap::new(),
             known: HashSet::new(),
             projected: 0,
-            free: Vec::new(),
+            choices: Vec::new(),
         }
     }
 
@@ -155,6 +156,53 @@ impl Assembly {
         Ok(())
     }
 
+    /// Adds a file's mesh with all that it says, its lights and its cameras. Names of lights and
+    /// cameras that are taken get a number.
+    ///
+    /// # Errors
+    /// A position that is not finite.
+    pub fn add(&mut self, file: MeshFile, sides: Option<Sides>) -> Result<()> {
+        let MeshFile {
+            mesh,
+            two_sided,
+            point_lights,
+            cameras,
+        } = file;
+        let materials = self.add_materials(&mesh.materials);
+        let first = self.scene.triangles.len();
+        self.add_mesh(&mesh, &materials)?;
+        match sides {
+            None if two_sided.contains(&true) => {
+                let of_scene = (materials.iter().zip(&two_sided)).filter(|(_, two)| **two);
+                let two_sided: Vec<u32> = of_scene.map(|(&material, _)| material).collect();
+                let of = |t: &Triangle| match two_sided.contains(&t.material) {
+                    true => Choice::Two,
+                    false => Choice::One,
+                };
+                let new = self.scene.triangles[first..].iter();
+                self.choices.extend(new.map(of));
+            }
+            _ => self.give_sides(first, sides),
+        }
+        let scene = &mut self.scene;
+        for mut light in point_lights {
+            light.name = free_name(light.name, scene.point_lights.iter().map(|l| &l.name));
+            scene.point_lights.push(light);
+        }
+        for mut camera in cameras {
+            camera.name = free_name(camera.name, scene.cameras.iter().map(|c| &c.name));
+            scene.cameras.push(camera);
+        }
+        scene.warnings.extend(mesh.said.warnings);
+        let made_up = mesh.made_up.iter().map(MadeUp::to_string);
+        for note in mesh.said.notes.into_iter().chain(made_up) {
+            if !scene.notes.contains(&note) {
+                scene.notes.push(note);
+            }
+        }
+        Ok(())
+    }
+
     /// Gives the triangles from `first` on the sides that are asked for; those of none are found.
     pub fn give_sides(&mut self, first: usize, sides: Option<Sides>) {
         match sides {
@@ -170,8 +218,11 @@ impl Assembly {
                 }
             }
         }
-        self.free
-            .resize(self.scene.triangles.len(), sides.is_none());
+        let choice = match sides {
+            None => Choice::One,
+            Some(_) => Choice::None,
+        };
+        self.choices.resize(self.scene.triangles.len(), choice);
     }
 
     fn weld(&mut self, position: DVec3) -> u32 {
@@ -189,8 +240,15 @@ impl Assembly {
 
     /// The scene, with the sides found that were not given, unless `import` leaves them.
     pub fn into_imported(mut self, import: &ImportOptions) -> Scene {
-        if !import.sides_as_given {
-            sides::turn_dark(&mut self.scene, &self.free);
+        let backs = match import.sides_as_given {
+            true => sides::of_sheets(&self.scene, &self.choices),
+            false => sides::turn_dark(&mut self.scene, &self.choices),
+        };
+        for t in backs {
+            let back = sides::turned(&self.scene.triangles[t]);
+            if self.known.insert(least_first(back.vertices)) {
+                self.scene.triangles.push(back);
+            }
         }
         self.into_scene()
     }
@@ -204,6 +262,19 @@ impl Assembly {
         }
         self.scene
     }
+}
+
+/// A name that no other has: with a number if it is taken.
+pub(super) fn free_name<'a>(
+    name: String,
+    taken: impl Iterator<Item = &'a String> + Clone,
+) -> String {
+    let numbered = |number: usize| match number {
+        1 => name.clone(),
+        _ => format!("{name}.{number}"),
+    };
+    let is_free = |name: &String| !taken.clone().any(|other| other == name);
+    (1..).map(numbered).find(is_free).unwrap_or_default()
 }
 
 /// Corners in their order, the least first.

@@ -9,7 +9,7 @@ use super::material::TextureCache;
 #[cfg(feature = "formats")]
 use super::scene_file;
 use super::text_file::stem;
-use super::{Scene, builtin, check, obj};
+use super::{Scene, builtin, check, mesh_file};
 use crate::error::{Error, Result};
 
 /// How a scene is read.
@@ -55,13 +55,12 @@ pub fn load(spec: &str, options: &LoadOptions) -> Result<Scene> {
         return builtin::build(spec, options);
     }
     let path = Path::new(spec);
-    let extension = path
-        .extension()
-        .map(|e| e.to_string_lossy().to_lowercase())
-        .unwrap_or_default();
-    if !matches!(extension.as_str(), "obj" | "toml") {
+    let ending = mesh_file::ending(path);
+    let is_mesh = mesh_file::ENDINGS.contains(&ending.as_str());
+    if !is_mesh && ending != "toml" {
         return Err(Error::Usage(format!(
-            "scene \"{spec}\" is neither a built-in scene ({}) nor a path that ends in .obj or .toml",
+            "scene \"{spec}\" is neither a built-in scene ({}) nor a path that ends in .obj, .gltf, \
+             .glb or .toml",
             builtin::NAMES.join(", ")
         )));
     }
@@ -71,31 +70,20 @@ pub fn load(spec: &str, options: &LoadOptions) -> Result<Scene> {
             builtin::NAMES.join(", ")
         )));
     }
-    match extension.as_str() {
-        "obj" => load_obj(path, &options.import),
-        #[cfg(feature = "formats")]
-        _ => scene_file::load(path, &options.import),
-        #[cfg(not(feature = "formats"))]
-        _ => Err(Error::Usage(format!(
-            "scene {spec}: scene.toml needs the Cargo feature `formats`"
-        ))),
+    if is_mesh {
+        return load_mesh(path, &options.import);
     }
+    #[cfg(feature = "formats")]
+    return scene_file::load(path, &options.import);
+    #[cfg(not(feature = "formats"))]
+    Err(Error::Usage(format!(
+        "scene {spec}: scene.toml needs the Cargo feature `formats`"
+    )))
 }
 
-fn load_obj(path: &Path, import: &ImportOptions) -> Result<Scene> {
-    let mut mesh = obj::read(path, &mut TextureCache::default())?;
-    if import.z_up {
-        mesh.turn_z_up();
-    }
+fn load_mesh(path: &Path, import: &ImportOptions) -> Result<Scene> {
+    let read = mesh_file::read(path, import.z_up, &mut TextureCache::default())?;
     let mut assembly = Assembly::new(stem(path), Some(path));
-    let materials = assembly.add_materials(&mesh.materials);
-    assembly.add_mesh(&mesh, &materials)?;
-    assembly.give_sides(0, None);
-    assembly.scene.notes.extend(mesh.said.notes);
-    assembly.scene.warnings.extend(mesh.said.warnings);
-    assembly
-        .scene
-        .notes
-        .extend(mesh.made_up.iter().map(|made_up| made_up.to_string()));
+    assembly.add(read, None)?;
     check::finish(assembly.into_imported(import), import)
 }

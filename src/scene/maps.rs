@@ -117,7 +117,12 @@ impl NormalMap {
     /// A file that cannot be read or decoded; a texel outside 0..=1; a normal of length 0, or one
     /// that does not point out of the surface (z ≤ 0).
     pub fn load(path: &Path) -> Result<Self> {
-        let image = Channels::read(path)?;
+        Self::from_image(path, decode(path)?)
+    }
+
+    /// As [`Self::load`], of an image that was decoded; `path` names it.
+    pub(super) fn from_image(path: &Path, decoded: DynamicImage) -> Result<Self> {
+        let image = Channels::of(decoded);
         if let Some(at) = image.find(|texel| !texel.iter().all(|c| (0.0..=1.0).contains(c))) {
             return Err(image.refuse(path, at, "a normal is coded in 0..=1, where 0.5 is zero"));
         }
@@ -210,7 +215,10 @@ struct Channels {
 
 impl Channels {
     fn read(path: &Path) -> Result<Self> {
-        let decoded = decode(path)?;
+        Ok(Self::of(decode(path)?))
+    }
+
+    fn of(decoded: DynamicImage) -> Self {
         let (width, height) = (decoded.width(), decoded.height());
         let texels = match decoded {
             DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
@@ -223,11 +231,11 @@ impl Channels {
                 .map(|p| p.0.map(|code| f32::from(code) / f32::from(u16::MAX)))
                 .collect(),
         };
-        Ok(Self {
+        Self {
             width,
             height,
             texels,
-        })
+        }
     }
 
     fn find(&self, bad: impl Fn(&[f32; 3]) -> bool) -> Option<usize> {

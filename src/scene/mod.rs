@@ -6,6 +6,7 @@
 //!
 //! ```text
 //! .obj ─► obj_lint ─► obj + mtl ─┐
+//! .gltf, .glb ─► gltf_file ──────┤
 //! scene.toml ─► scene_file ──────┼─► assemble ─► check ─► Scene ─► write
 //! built-in name ─► builtin ──────┘
 //! ```
@@ -17,6 +18,8 @@ pub mod camera_path;
 mod check;
 mod displace;
 pub(crate) mod even_light;
+#[cfg(feature = "formats")]
+mod gltf_file;
 mod hash;
 mod heights_from_normals;
 mod load;
@@ -24,6 +27,7 @@ mod load;
 mod map_files;
 mod maps;
 mod material;
+mod mesh_file;
 mod mtl;
 mod mtl_maps;
 mod obj;

@@ -3,7 +3,7 @@
 use glam::{DAffine3, DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
-use super::assemble::Mesh;
+use super::mesh_file::MeshFile;
 
 /// One factor, or one for each axis; a negative one mirrors.
 #[derive(Debug, Clone, Copy, Deserialize, Serialize)]
@@ -47,9 +47,10 @@ impl Placement {
         Ok(Self(DAffine3::from_mat3_translation(matrix, translation)))
     }
 
-    /// Moves the mesh. A mirroring placement turns the winding as well, so that fronts stay fronts;
+    /// Moves a mesh with its lights and cameras. A mirroring placement turns the winding as well, so that fronts stay fronts;
     /// `reverse` turns it a second time.
-    pub fn apply(&self, mesh: &mut Mesh, reverse: bool) -> Result<(), String> {
+    pub fn apply(&self, file: &mut MeshFile, reverse: bool) -> Result<(), String> {
+        let mesh = &mut file.mesh;
         if self.0 != DAffine3::IDENTITY {
             for position in &mut mesh.positions {
                 *position = self.0.transform_point3(*position);
@@ -57,6 +58,14 @@ impl Placement {
                     return Err("a vertex is moved beyond every number".into());
                 }
             }
+        }
+        for light in &mut file.point_lights {
+            light.position = self.0.transform_point3(light.position);
+        }
+        for camera in &mut file.cameras {
+            camera.position = self.0.transform_point3(camera.position);
+            camera.look_at = self.0.transform_point3(camera.look_at);
+            camera.up = self.0.transform_vector3(camera.up);
         }
         if (self.0.matrix3.determinant() < 0.0) != reverse {
             for triangle in &mut mesh.triangles {

@@ -12,7 +12,7 @@ use super::material::{Asked, DEFAULT_KD, MadeUp, TextureCache};
 use super::placement::{Placement, Scale};
 use super::sides::Sides;
 use super::text_file::{read_text, stem};
-use super::{Camera, ImportOptions, Material, PointLight, Scene, check, obj};
+use super::{Camera, ImportOptions, Material, PointLight, Scene, check, mesh_file};
 use crate::error::{Error, Result};
 
 #[derive(Debug, Deserialize, Serialize)]
@@ -184,12 +184,14 @@ fn add_mesh(
         )
     };
     let placement = Placement::new(table.scale, table.rotate, table.translate).map_err(refuse)?;
-    let mut mesh = obj::read(&lines.path.with_file_name(&table.file), textures)?;
+    let path = lines.path.with_file_name(&table.file);
+    let mut read = mesh_file::read(&path, table.z_up || import.z_up, textures)?;
+    let mesh = &mut read.mesh;
 
     for (name, changes) in &file.material {
         let wanted = table.material.as_ref() == Some(name);
         if wanted || mesh.materials.iter().any(|m| m.name == *name) {
-            change_material(name, changes, lines, textures, &mut mesh)?;
+            change_material(name, changes, lines, textures, mesh)?;
             used.push(name.clone());
         }
     }
@@ -203,25 +205,11 @@ fn add_mesh(
         mesh.materials = vec![mesh.materials.swap_remove(index)];
         mesh.made_up.retain(|made_up| made_up.material == *name);
         mesh.triangles.iter_mut().for_each(|t| t.material = 0);
+        read.two_sided = read.two_sided.get(index).copied().into_iter().collect();
     }
-    if table.z_up || import.z_up {
-        mesh.turn_z_up();
-    }
-    placement.apply(&mut mesh, table.reverse).map_err(refuse)?;
+    placement.apply(&mut read, table.reverse).map_err(refuse)?;
 
-    let materials = assembly.add_materials(&mesh.materials);
-    let first = assembly.scene.triangles.len();
-    assembly.add_mesh(&mesh, &materials)?;
-    assembly.give_sides(first, table.sides);
-    assembly.scene.warnings.extend(mesh.said.warnings);
-    let notes = &mut assembly.scene.notes;
-    notes.extend(mesh.said.notes);
-    for made_up in mesh.made_up.iter().map(MadeUp::to_string) {
-        if !notes.contains(&made_up) {
-            notes.push(made_up);
-        }
-    }
-    Ok(())
+    assembly.add(read, table.sides)
 }
 
 /// Applies `[material.name]` to a mesh that has such a material or is assigned it.

@@ -4,7 +4,7 @@
 //! is. Random paths from the lights, off either side of what they meet, find the pieces that show
 //! light only their backs: a room whose normals point outward is one.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::time::Duration;
 
 use glam::DVec3;
@@ -33,6 +33,16 @@ pub(super) enum Sides {
     /// Both: each triangle is there twice, back to back.
     #[serde(rename = "both")]
     Both,
+}
+
+/// What is left to be found of the sides of a triangle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Choice {
+    None,
+    /// Which is the front.
+    One,
+    /// Its file has two: whether light falls on both.
+    Two,
 }
 
 /// Paths from the lights, and surfaces that each meets at most.
@@ -69,11 +79,34 @@ pub(super) fn face(scene: &mut Scene, first: usize, outward: bool) {
     }
 }
 
-/// Turns pieces that show light only their backs, of those triangles that are `free` to be,
-/// `[triangle]`, with a note.
-pub(super) fn turn_dark(scene: &mut Scene, free: &[bool]) {
+/// The triangles of two sides whose pieces are open, without those that emit: a lamp is a front.
+pub(super) fn of_sheets(scene: &Scene, choices: &[Choice]) -> Vec<usize> {
+    if !choices.contains(&Choice::Two) {
+        return Vec::new();
+    }
+    let pieces = pieces(&scene.triangles);
+    // How often each edge of a piece is run along, to and fro.
+    let mut edges: HashMap<([u32; 2], u32), [u32; 2]> = HashMap::new();
+    for (triangle, &piece) in scene.triangles.iter().zip(&pieces) {
+        let [a, b, c] = triangle.vertices;
+        for [p, q] in [[a, b], [b, c], [c, a]] {
+            let of = edges.entry(([p.min(q), p.max(q)], piece)).or_default();
+            of[usize::from(p < q)] += 1;
+        }
+    }
+    let ends = edges.iter().filter(|(_, of)| of[0] != of[1]);
+    let open: HashSet<u32> = ends.map(|((_, piece), _)| *piece).collect();
+    (0..choices.len())
+        .filter(|&t| choices[t] == Choice::Two && open.contains(&pieces[t]))
+        .filter(|&t| !scene.materials[scene.triangles[t].material as usize].emits())
+        .collect()
+}
+
+/// Turns pieces that show light only their backs, where there is a choice, with a note. Gives the
+/// triangles of two sides whose pieces show light both, without those that emit: a lamp is a front.
+pub(super) fn turn_dark(scene: &mut Scene, choices: &[Choice]) -> Vec<usize> {
     let Some(lights) = Lights::of(scene) else {
-        return;
+        return Vec::new();
     };
     let pieces = pieces(&scene.triangles);
     let count = pieces.iter().max().map_or(0, |&last| last as usize + 1);
@@ -96,9 +129,14 @@ pub(super) fn turn_dark(scene: &mut Scene, free: &[bool]) {
     }
     let emits = |t: &Triangle| scene.materials[t.material as usize].emits();
     let mut keeps = vec![false; count];
-    for ((t, &piece), &free) in scene.triangles.iter().zip(&pieces).zip(free) {
-        keeps[piece as usize] |= emits(t) || !free;
+    for ((t, &piece), &choice) in scene.triangles.iter().zip(&pieces).zip(choices) {
+        keeps[piece as usize] |= emits(t) || choice == Choice::None;
     }
+    let shows_both = |t: &usize| {
+        let [front, back] = met[pieces[*t] as usize];
+        choices[*t] == Choice::Two && front > 0 && back > 0 && !emits(&scene.triangles[*t])
+    };
+    let backs: Vec<usize> = (0..choices.len()).filter(shows_both).collect();
     let is_dark = |piece: u32| {
         let [front, back] = met[piece as usize];
         front == 0 && back >= ENOUGH && !keeps[piece as usize]
@@ -123,6 +161,7 @@ pub(super) fn turn_dark(scene: &mut Scene, free: &[bool]) {
             names.join(", ")
         ));
     }
+    backs
 }
 
 pub(super) fn turned(triangle: &Triangle) -> Triangle {

@@ -29,7 +29,11 @@ impl Texture {
     /// A file that cannot be read or decoded, or that passes the decoder's memory limit; a texel
     /// that is negative or not finite.
     pub fn load(path: &Path) -> Result<Self> {
-        let decoded = decode(path)?;
+        Self::from_image(path, decode(path)?)
+    }
+
+    /// As [`Self::load`], of an image that was decoded; `path` names it.
+    pub(super) fn from_image(path: &Path, decoded: DynamicImage) -> Result<Self> {
         let (width, height) = (decoded.width(), decoded.height());
         let texels = match decoded {
             DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {

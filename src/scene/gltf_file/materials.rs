@@ -1,0 +1,227 @@
+//! Materials of a glTF file as diffuse ones.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use gltf::material::AlphaMode;
+use gltf::texture::{TextureTransform, WrappingMode};
+
+use super::document::File;
+use super::images;
+use crate::error::{Error, Result};
+use crate::scene::assemble::free_name;
+use crate::scene::material::{DEFAULT_KD, MadeUp};
+use crate::scene::said::Said;
+use crate::scene::{Material, NormalMap, Texture};
+
+/// The materials of a file, and after them the one of primitives without any.
+pub(super) struct Materials {
+    pub list: Vec<Material>,
+    pub two_sided: Vec<bool>,
+    /// Where the maps of each lie, `[material]`.
+    pub places: Vec<Place>,
+    /// What there is to say of each, if it is used.
+    pub said: Vec<Said>,
+    pub made_up: Vec<MadeUp>,
+}
+
+/// Where a texture lies: its set of coordinates, and the transform.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Place {
+    pub set: u32,
+    offset: [f32; 2],
+    rotation: f32,
+    scale: [f32; 2],
+}
+
+impl Place {
+    const FIRST: Self = Self {
+        set: 0,
+        offset: [0.0; 2],
+        rotation: 0.0,
+        scale: [1.0; 2],
+    };
+
+    fn new(set: u32, transform: Option<TextureTransform>) -> Self {
+        let plain = Self { set, ..Self::FIRST };
+        transform.map_or(plain, |by| Self {
+            set: by.tex_coord().unwrap_or(set),
+            offset: by.offset(),
+            rotation: by.rotation(),
+            scale: by.scale(),
+        })
+    }
+
+    /// By a `KHR_texture_transform`, which the crate does not read of normal textures.
+    fn transformed(self, by: &serde_json::Value) -> Self {
+        let number = |value: &serde_json::Value| value.as_f64().map(|n| n as f32);
+        let pair = |key: &str, other: [f32; 2]| {
+            let values = by.get(key).and_then(|of| of.as_array());
+            let at = |k: usize| values.and_then(|of| number(of.get(k)?)).unwrap_or(other[k]);
+            [at(0), at(1)]
+        };
+        let set = by.get("texCoord").and_then(serde_json::Value::as_u64);
+        Self {
+            set: set.map_or(self.set, |set| set as u32),
+            offset: pair("offset", self.offset),
+            rotation: by.get("rotation").and_then(number).unwrap_or(self.rotation),
+            scale: pair("scale", self.scale),
+        }
+    }
+
+    /// glTF's v points down, from the top.
+    pub fn apply(&self, [u, v]: [f32; 2]) -> [f32; 2] {
+        let (sin, cos) = self.rotation.sin_cos();
+        let [u, v] = [u * self.scale[0], v * self.scale[1]];
+        let [x, y] = self.offset;
+        [cos * u + sin * v + x, 1.0 - (cos * v - sin * u + y)]
+    }
+}
+
+/// Maps by the image, each read once.
+#[derive(Default)]
+struct Maps {
+    colours: HashMap<usize, Arc<Texture>>,
+    normals: HashMap<usize, Arc<NormalMap>>,
+}
+
+impl Materials {
+    /// # Errors
+    /// A texture that cannot be used.
+    pub fn read(file: &File) -> Result<Self> {
+        let mut materials = Self {
+            list: Vec::new(),
+            two_sided: Vec::new(),
+            places: Vec::new(),
+            said: Vec::new(),
+            made_up: Vec::new(),
+        };
+        let mut maps = Maps::default();
+        for material in file.document.materials() {
+            materials.add(file, &material, &mut maps)?;
+        }
+        materials.list.push(Material {
+            name: materials.free_name("default"),
+            kd: [DEFAULT_KD; 3],
+            ..Material::default()
+        });
+        materials.two_sided.push(false);
+        materials.places.push(Place::FIRST);
+        materials.said.push(Said::default());
+        Ok(materials)
+    }
+
+    fn free_name(&self, name: &str) -> String {
+        free_name(name.to_owned(), self.list.iter().map(|m| &m.name))
+    }
+
+    fn add(&mut self, file: &File, from: &gltf::Material, maps: &mut Maps) -> Result<()> {
+        let number = from.index().unwrap_or(self.list.len());
+        let given = from.name().map(str::trim).filter(|name| !name.is_empty());
+        let name = match given {
+            Some(name) if !name.contains(char::is_control) => self.free_name(name),
+            _ => self.free_name(&format!("material {number}")),
+        };
+        let mut said = Said::default();
+        let about = |what: &str| format!("{}: material \"{name}\": {what}", file.path.display());
+        let surface = from.pbr_metallic_roughness();
+        let [r, g, b, alpha] = surface.base_color_factor();
+        let strength = from.emissive_strength().unwrap_or(1.0);
+        let mut material = Material {
+            name: name.clone(),
+            kd: [r, g, b],
+            ke: from.emissive_factor().map(|c| c * strength),
+            ..Material::default()
+        };
+        // Of the maps, the place of the relief counts, or else that of the reflectance.
+        let mut place = None;
+        if let Some(map) = from.normal_texture() {
+            let read = maps.normals(file, &map.texture())?;
+            material.map_normal = Some(NormalMap::scaled(read, map.scale()));
+            let plain = Place::new(map.tex_coord(), None);
+            let transform = map.extension_value("KHR_texture_transform");
+            place = Some(transform.map_or(plain, |by| plain.transformed(by)));
+        }
+        if let Some(map) = surface.base_color_texture() {
+            material.map_kd = Some(maps.colours(file, &map.texture())?);
+            let own = Place::new(map.tex_coord(), map.texture_transform());
+            let other = *place.get_or_insert(own);
+            if own != other {
+                said.warnings.push(about(
+                    "the base colour lies elsewhere than the normals, whose place it is given",
+                ));
+            }
+            let sampler = map.texture().sampler();
+            let repeats = |mode| mode == WrappingMode::Repeat;
+            if !(repeats(sampler.wrap_s()) && repeats(sampler.wrap_t())) {
+                said.notes
+                    .push(about("the base colour repeats outside 0..1"));
+            }
+        }
+        if let Some(map) = from.emissive_texture() {
+            let texture = maps.colours(file, &map.texture())?;
+            let mean = mean(&texture);
+            material.ke = std::array::from_fn(|c| material.ke[c] * mean[c]);
+            if material.emits() {
+                said.warnings
+                    .push(about("of the emission texture the mean is used"));
+            }
+        }
+        match from.alpha_mode() {
+            AlphaMode::Opaque => {}
+            AlphaMode::Mask => said.warnings.push(about("alpha masks are not used")),
+            AlphaMode::Blend if alpha < 1.0 || surface.base_color_texture().is_some() => {
+                said.warnings
+                    .push(about("surfaces are opaque: alpha is not used"));
+            }
+            AlphaMode::Blend => {}
+        }
+        if surface.metallic_factor() > 0.5 && surface.metallic_roughness_texture().is_none() {
+            said.notes
+                .push(about("a metal is taken as diffuse with its base colour"));
+        }
+        material.check().map_err(|what| Error::Material {
+            path: file.path.clone(),
+            material: name.clone(),
+            what,
+        })?;
+        self.two_sided.push(from.double_sided());
+        self.places.push(place.unwrap_or(Place::FIRST));
+        self.list.push(material);
+        self.said.push(said);
+        Ok(())
+    }
+}
+
+impl Maps {
+    fn colours(&mut self, file: &File, texture: &gltf::Texture) -> Result<Arc<Texture>> {
+        let image = texture.source();
+        if let Some(map) = self.colours.get(&image.index()) {
+            return Ok(map.clone());
+        }
+        let (path, decoded) = images::read(file, &image)?;
+        let map = Arc::new(Texture::from_image(&path, decoded)?);
+        self.colours.insert(image.index(), map.clone());
+        Ok(map)
+    }
+
+    fn normals(&mut self, file: &File, texture: &gltf::Texture) -> Result<Arc<NormalMap>> {
+        let image = texture.source();
+        if let Some(map) = self.normals.get(&image.index()) {
+            return Ok(map.clone());
+        }
+        let (path, decoded) = images::read(file, &image)?;
+        let map = Arc::new(NormalMap::from_image(&path, decoded)?);
+        self.normals.insert(image.index(), map.clone());
+        Ok(map)
+    }
+}
+
+/// Mean of the texels, linear RGB.
+fn mean(texture: &Texture) -> [f32; 3] {
+    let mut sum = [0.0_f64; 3];
+    for texel in &texture.texels {
+        (0..3).for_each(|c| sum[c] += f64::from(texel[c]));
+    }
+    sum.map(|sum| (sum / texture.texels.len() as f64) as f32)
+}

@@ -1,0 +1,224 @@
+//! glTF 2.0, `.gltf` and `.glb`.
+
+mod document;
+mod images;
+mod materials;
+mod primitives;
+
+use std::path::Path;
+
+use glam::{DAffine3, DMat4, DVec3};
+use gltf::khr_lights_punctual::Kind;
+
+use super::assemble::free_name;
+use super::mesh_file::MeshFile;
+use super::{Camera, PointLight};
+use crate::error::{Error, Result};
+use document::File;
+use materials::Materials;
+
+/// Lumens of a watt of green light, by which glTF's candelas are divided.
+const LUMENS_OF_A_WATT: f32 = 683.0;
+
+/// Reads the default scene of a file with its lights and cameras; all nodes if there is none.
+///
+/// # Errors
+/// A file that cannot be read or is no valid glTF; an extension that it requires and that is not
+/// known; data out of range; no triangle.
+pub(super) fn read(path: &Path) -> Result<MeshFile> {
+    let file = File::open(path)?;
+    let mut into = Reader {
+        path,
+        materials: Materials::read(&file)?,
+        file: &file,
+        found: MeshFile::default(),
+        skipped: Skipped::default(),
+    };
+    let scene = (file.document.default_scene()).or_else(|| file.document.scenes().next());
+    match scene {
+        Some(scene) => {
+            for node in scene.nodes() {
+                into.node(&node, DAffine3::IDENTITY, 0)?;
+            }
+        }
+        None => return Err(Error::file(path, "there is no scene in it")),
+    }
+    into.finish()
+}
+
+/// A file while its nodes are walked.
+struct Reader<'a> {
+    path: &'a Path,
+    file: &'a File,
+    materials: Materials,
+    found: MeshFile,
+    skipped: Skipped,
+}
+
+/// What has no meaning here.
+#[derive(Default)]
+struct Skipped {
+    lines: usize,
+    skins: usize,
+    colours: usize,
+    morphs: usize,
+    orthographic: usize,
+}
+
+/// Nodes above one another, at most: more are a circle.
+const DEEPEST: usize = 1000;
+
+impl Reader<'_> {
+    fn node(&mut self, node: &gltf::Node, above: DAffine3, depth: usize) -> Result<()> {
+        let refuse =
+            |what: String| Error::file(self.path, format!("node {}: {what}", node.index()));
+        if depth > DEEPEST {
+            return Err(refuse("it lies within itself, or 1,000 nodes deep".into()));
+        }
+        let matrix = node
+            .transform()
+            .matrix()
+            .map(|column| column.map(f64::from));
+        let placed = above * DAffine3::from_mat4(DMat4::from_cols_array_2d(&matrix));
+        if !placed.is_finite() {
+            return Err(refuse("its place is not finite".into()));
+        }
+        if let Some(mesh) = node.mesh() {
+            self.skipped.skins += usize::from(node.skin().is_some());
+            for primitive in mesh.primitives() {
+                self.primitive(&primitive, placed)?;
+            }
+        }
+        if let Some(light) = node.light() {
+            self.light(&light, node.name(), placed);
+        }
+        if let Some(camera) = node.camera() {
+            self.camera(&camera, node.name(), placed);
+        }
+        for child in node.children() {
+            self.node(&child, placed, depth + 1)?;
+        }
+        Ok(())
+    }
+
+    fn light(
+        &mut self,
+        light: &gltf::khr_lights_punctual::Light,
+        node: Option<&str>,
+        at: DAffine3,
+    ) {
+        let count = self.found.point_lights.len() + 1;
+        let name = node.or(light.name());
+        let name = name.map_or_else(|| format!("light {count}"), str::to_owned);
+        let warnings = &mut self.found.mesh.said.warnings;
+        match light.kind() {
+            Kind::Point => {
+                let strength = light.intensity() / LUMENS_OF_A_WATT;
+                self.found.point_lights.push(PointLight {
+                    name: free_name(name, self.found.point_lights.iter().map(|l| &l.name)),
+                    position: at.translation,
+                    intensity: light.color().map(|c| c * strength),
+                });
+                if light.range().is_some() {
+                    warnings.push(format!(
+                        "{}: a point light has a range, which is not used",
+                        self.path.display()
+                    ));
+                }
+            }
+            kind => {
+                let kind = match kind {
+                    Kind::Directional => "directional",
+                    _ => "spot",
+                };
+                warnings.push(format!(
+                    "{}: {kind} light \"{name}\" is not used",
+                    self.path.display()
+                ));
+            }
+        }
+    }
+
+    fn camera(&mut self, camera: &gltf::Camera, node: Option<&str>, at: DAffine3) {
+        let gltf::camera::Projection::Perspective(view) = camera.projection() else {
+            self.skipped.orthographic += 1;
+            return;
+        };
+        let count = self.found.cameras.len() + 1;
+        let name = node.or(camera.name());
+        let name = name.map_or_else(|| format!("camera {count}"), str::to_owned);
+        self.found.cameras.push(Camera {
+            name: free_name(name, self.found.cameras.iter().map(|c| &c.name)),
+            position: at.translation,
+            look_at: at.transform_point3(-DVec3::Z),
+            up: at.transform_vector3(DVec3::Y),
+            fov_y: f64::from(view.yfov()).to_degrees(),
+        });
+    }
+
+    fn finish(mut self) -> Result<MeshFile> {
+        if self.found.mesh.triangles.is_empty() {
+            return Err(Error::file(self.path, "there is no triangle in it"));
+        }
+        let path = self.path.display();
+        let said = &mut self.found.mesh.said;
+        let Skipped {
+            lines,
+            skins,
+            colours,
+            morphs,
+            orthographic,
+        } = self.skipped;
+        let say = |list: &mut Vec<String>, count: usize, what: &str| {
+            if count > 0 {
+                list.push(format!("{path}: {count} {what}"));
+            }
+        };
+        say(
+            &mut said.notes,
+            lines,
+            "primitives of points or lines are not used",
+        );
+        say(
+            &mut said.notes,
+            orthographic,
+            "orthographic cameras are not used",
+        );
+        say(
+            &mut said.warnings,
+            skins,
+            "skinned meshes stand as in their file: skins are not used",
+        );
+        say(
+            &mut said.warnings,
+            morphs,
+            "primitives have morph targets, which are not used",
+        );
+        say(
+            &mut said.warnings,
+            colours,
+            "primitives have colours at vertices, which are not used",
+        );
+        let used = |material: u32| {
+            let mut triangles = self.found.mesh.triangles.iter();
+            triangles.any(|t| t.material == material)
+        };
+        let used: Vec<bool> = (0..self.materials.list.len() as u32).map(used).collect();
+        let materials = self.materials;
+        for (material, said) in materials.said.into_iter().enumerate() {
+            if used[material] {
+                self.found.mesh.said.append(said);
+            }
+        }
+        self.found.mesh.materials = materials.list;
+        // The one of primitives without any comes last.
+        if used.last() == Some(&false) {
+            self.found.mesh.materials.pop();
+        }
+        self.found.mesh.made_up = materials.made_up;
+        self.found.two_sided = materials.two_sided;
+        // A camera that cannot be used is no reason to refuse the rest.
+        self.found.cameras.retain(|camera| camera.check().is_ok());
+        Ok(self.found)
+    }
+}
