@@ -192,6 +192,29 @@ fn bad_names_and_outputs() {
             "none.obj",
         ),
         (&["render", "cornell", "-o", "picture.bmp"], "picture.bmp"),
+        (&["bake", "cornell", "-o", "a.exr"], "a.exr"),
+        (
+            &[
+                "render",
+                "b.safetensors",
+                "--quality",
+                "draft",
+                "-o",
+                "p.png",
+            ],
+            "b.safetensors is a bake already, which --quality has no effect on",
+        ),
+        (
+            &[
+                "render",
+                "b.safetensors",
+                "-o",
+                "p.png",
+                "--patches",
+                "9000",
+            ],
+            "--patches",
+        ),
         (
             &["render", "missing.safetensors", "-o", "p.png"],
             "missing.safetensors",
@@ -268,6 +291,32 @@ fn bad_names_and_outputs() {
         .expect("the program runs");
     assert_eq!(run.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&run.stderr).contains("Vulkan"));
+}
+
+/// What goes to a file has no colours, unless they are asked for; --quiet leaves warnings.
+#[test]
+fn stderr_is_as_the_options_say() {
+    let folder = tempfile::tempdir().expect("a folder for the test");
+    std::fs::write(folder.path().join("room.obj"), ROOM).expect("written");
+    let materials = MATERIALS.replace("newmtl light", "d 0.5\nnewmtl light");
+    std::fs::write(folder.path().join("room.mtl"), materials).expect("written");
+    let stderr = |options: &[&str]| {
+        let args = [&["bake", "room.obj", "-o", "o.safetensors"], options].concat();
+        let run = mesolux(&args, folder.path());
+        assert!(run.status.success());
+        String::from_utf8(run.stderr).expect("UTF-8")
+    };
+    let plain = stderr(&[]);
+    assert!(
+        !plain.contains('\x1b') && plain.contains("INFO") && plain.contains("opaque"),
+        "{plain}"
+    );
+    assert!(stderr(&["--color", "always"]).contains("\x1b["));
+    let quiet = stderr(&["--quiet"]);
+    assert!(
+        !quiet.contains("INFO") && quiet.contains("room.mtl:3"),
+        "{quiet}"
+    );
 }
 
 #[test]

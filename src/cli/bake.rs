@@ -280,6 +280,12 @@ pub fn run(options: &Options) -> Result<()> {
     set_threads(options.threads)?;
     let settings = options.solve.settings()?;
     settings.check()?;
+    if (options.output.extension()).is_some_and(|e| !e.eq_ignore_ascii_case("safetensors")) {
+        return Err(Error::file(
+            &options.output,
+            "a bake is a .safetensors file; `render` draws pictures",
+        ));
+    }
     writable(&options.output)?;
     let scene = options.builtin.load(&options.scene)?;
     let read_seconds = start.elapsed().as_secs_f64();
@@ -443,7 +449,8 @@ pub fn writable(path: &std::path::Path) -> Result<()> {
         .prefix(".mesolux")
         .tempfile_in(folder)
         .map(|_| ())
-        .map_err(|e| Error::write(path, e))
+        // Its own text names the file that was tried.
+        .map_err(|e| Error::write(path, e.kind().into()))
 }
 
 fn peak_resident_bytes() -> Option<u64> {

@@ -16,10 +16,11 @@ mod show;
 #[cfg(feature = "window")]
 mod view;
 
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use mesolux::bake::solution::Bake;
 use mesolux::error::{Error, Result};
 use mesolux::scene::{ImportOptions, LoadOptions, OnInput, Refinement, Scene};
@@ -35,8 +36,33 @@ use tracing_subscriber::prelude::*;
 #[derive(Parser)]
 #[command(version, about)]
 struct Cli {
+    /// Say warnings and errors alone
+    #[arg(short, long, global = true)]
+    quiet: bool,
+    /// Colours on stderr
+    #[arg(long, global = true, value_name = "WHEN", value_enum, default_value_t = Colours::Auto)]
+    color: Colours,
     #[command(subcommand)]
     command: Command,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Colours {
+    /// On a terminal, unless NO_COLOR is set
+    Auto,
+    Always,
+    Never,
+}
+
+impl Colours {
+    fn are_shown(self) -> bool {
+        let refused = || std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+        match self {
+            Self::Auto => std::io::stderr().is_terminal() && !refused(),
+            Self::Always => true,
+            Self::Never => false,
+        }
+    }
 }
 
 #[derive(Subcommand)]
@@ -243,17 +269,23 @@ fn check_validation() -> Result<()> {
 }
 
 /// As `MESOLUX_LOG` asks: a level, or levels by module, such as `warn,mesolux::meso=debug`.
-fn log_to_stderr() {
+fn log_to_stderr(cli: &Cli) {
+    let level = if cli.quiet {
+        LevelFilter::WARN
+    } else {
+        LevelFilter::INFO
+    };
     let asked = std::env::var("MESOLUX_LOG").ok();
     let filter = asked.and_then(|asked| asked.parse::<Targets>().ok());
     // The window's library warns of what desktops lack and it does without.
     let by_itself = || {
         Targets::new()
-            .with_default(LevelFilter::INFO)
+            .with_default(level)
             .with_target("winit", LevelFilter::ERROR)
     };
     let lines = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
+        .with_ansi(cli.color.are_shown())
         .without_time()
         .with_target(false);
     tracing_subscriber::registry()
@@ -265,11 +297,13 @@ fn log_to_stderr() {
 pub fn main() -> ExitCode {
     #[cfg(feature = "window")]
     let start = std::time::Instant::now();
-    let cli = Cli::parse();
-    log_to_stderr();
+    let matches = Cli::command().get_matches();
+    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    let given = matches.subcommand().map_or(&matches, |(_, given)| given);
+    log_to_stderr(&cli);
     let done = match &cli.command {
         Command::Bake(options) => bake::run(options),
-        Command::Render(options) => render::run(options),
+        Command::Render(options) => render::run(options, given),
         #[cfg(feature = "window")]
         Command::View(options) => view::run(options, start),
         #[cfg(not(feature = "window"))]

@@ -42,7 +42,8 @@ const QUIET: Duration = Duration::from_secs(10);
 
 impl Bar {
     pub fn new() -> Self {
-        let bar = std::io::stderr().is_terminal().then(|| {
+        let shown = tracing::enabled!(tracing::Level::INFO) && std::io::stderr().is_terminal();
+        let bar = shown.then(|| {
             let bar = ProgressBar::new_spinner();
             if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}") {
                 bar.set_style(style);

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use clap::Args;
+use clap::parser::ValueSource;
+use clap::{ArgMatches, Args, Id};
 
 use super::bake::{SolveOptions, bake_visibly, origin, writable};
 use super::camera::CameraOptions;
@@ -64,7 +65,30 @@ pub fn size(text: &str) -> std::result::Result<(u32, u32), String> {
     ))
 }
 
-pub fn run(options: &Options) -> Result<()> {
+/// Options of a bake that drawing one uses as well.
+const USED_WITH_A_BAKE: [&str; 2] = ["cache", "no_cache"];
+
+/// # Errors
+/// An option on the command line that says how a scene is read or baked, beside a bake.
+fn refuse_baking(given: &ArgMatches, bake: &str) -> Result<()> {
+    for group in ["SolveOptions", "Builtin"] {
+        let Ok(Some(options)) = given.try_get_many::<Id>(group) else {
+            continue;
+        };
+        for option in options {
+            let is_given = given.value_source(option.as_str()) == Some(ValueSource::CommandLine);
+            if is_given && !USED_WITH_A_BAKE.contains(&option.as_str()) {
+                return Err(Error::Usage(format!(
+                    "{bake} is a bake already, which --{} has no effect on",
+                    option.as_str().replace('_', "-")
+                )));
+            }
+        }
+    }
+    Ok(())
+}
+
+pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
     FileKind::of(&options.output)?;
     if let Some(ev) = options.exposure
         && !(-64.0..=64.0).contains(&ev)
@@ -86,6 +110,9 @@ pub fn run(options: &Options) -> Result<()> {
             )));
         }
         return run_reference(options);
+    }
+    if is_bake {
+        refuse_baking(given, &options.input)?;
     }
     let settings = options.solve.settings()?;
     let folder = settings.relief.cache.as_deref();
