@@ -46,6 +46,7 @@ pub(super) fn read(path: &Path, textures: &mut TextureCache) -> Result<Library> 
             true => 1.0,
             false => DEFAULT_KD,
         };
+        let default_ke = if maps.has_emission() { 1.0 } else { 0.0 };
         if material.diffuse.is_none() {
             library.made_up.push(MadeUp {
                 material: material.name.clone(),
@@ -58,7 +59,7 @@ pub(super) fn read(path: &Path, textures: &mut TextureCache) -> Result<Library> 
                 .map_or([default; 3], |kd| kd.map(|c| c as f32)),
             ke: material
                 .emissive
-                .map_or([0.0; 3], |ke| ke.map(|c| c as f32)),
+                .map_or([default_ke; 3], |ke| ke.map(|c| c as f32)),
             name: material.name,
             ..Material::default()
         };

@@ -13,6 +13,7 @@ use crate::error::Result;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Reflectance,
+    Emission,
     Displacement,
     /// Heights or normals.
     Bump,
@@ -22,6 +23,7 @@ enum Kind {
 fn kind(keyword: &str) -> Option<Kind> {
     match keyword {
         "map_Kd" => Some(Kind::Reflectance),
+        "map_Ke" => Some(Kind::Emission),
         "map_Disp" | "map_disp" | "disp" => Some(Kind::Displacement),
         "map_Bump" | "map_bump" | "bump" => Some(Kind::Bump),
         "norm" | "map_Norm" | "map_norm" => Some(Kind::Normal),
@@ -37,6 +39,7 @@ pub(super) fn is_keyword(keyword: &str) -> bool {
 #[derive(Debug, Default)]
 pub(super) struct Maps {
     reflectance: Option<Map>,
+    emission: Option<Map>,
     displacement: Option<Map>,
     bump: Option<Map>,
     normal: Option<Map>,
@@ -80,6 +83,7 @@ impl Maps {
         });
         match kind {
             Kind::Reflectance => self.reflectance = map,
+            Kind::Emission => self.emission = map,
             Kind::Displacement => self.displacement = map,
             Kind::Bump => self.bump = map,
             Kind::Normal => self.normal = map,
@@ -89,6 +93,10 @@ impl Maps {
 
     pub fn has_reflectance(&self) -> bool {
         self.reflectance.is_some()
+    }
+
+    pub fn has_emission(&self) -> bool {
+        self.emission.is_some()
     }
 
     /// Reads the maps into `material`; their paths are relative to `file`.
@@ -107,6 +115,16 @@ impl Maps {
             material.map_kd = Some(textures.texture(map.asked(file, &name), &map.file)?);
         }
         let mut used: Vec<&Map> = self.reflectance.iter().collect();
+        if let Some(map) = &self.emission {
+            let texture = textures.texture(map.asked(file, &name), &map.file)?;
+            let (mean, ke) = (texture.mean(), material.ke);
+            material.ke = std::array::from_fn(|c| ke[c] * mean[c]);
+            let what = match material.emits() {
+                true => "gives its mean to the whole surface",
+                false => "has no effect: it is black, or Ke is 0 (without Ke it counts as 1)",
+            };
+            said.warnings.push(map.warning(file, &name, what));
+        }
         let passed_over = |said: &mut Said, kept: &Map, other: &Map| {
             said.notes.push(format!(
                 "material \"{name}\" has {} and {}: the latter was passed over",
@@ -166,6 +184,11 @@ impl Map {
         }
     }
 
+    fn warning(&self, file: &Path, material: &str, what: &str) -> String {
+        let (file, line, keyword) = (file.display(), self.line, &self.keyword);
+        format!("{file}:{line}: material \"{material}\": {keyword} {what}")
+    }
+
     fn scale(&self) -> f32 {
         self.options.scale.unwrap_or(1.0)
     }
@@ -174,14 +197,7 @@ impl Map {
 /// The one place of all maps of a material on its surface: that of the relief, which light depends
 /// on by direction, or else of the reflectance.
 fn on_surface(file: &Path, material: &str, used: &[&Map], said: &mut Said) -> OnSurface {
-    let warn = |map: &Map, what: &str| {
-        format!(
-            "{}:{}: material \"{material}\": {} {what}",
-            file.display(),
-            map.line,
-            map.keyword
-        )
-    };
+    let warn = |map: &Map, what: &str| map.warning(file, material, what);
     for map in used {
         for option in &map.options.unused {
             (said.warnings).push(warn(map, &format!("option {option} is not used")));

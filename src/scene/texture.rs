@@ -72,6 +72,15 @@ impl Texture {
         })
     }
 
+    /// Mean of the texels, linear RGB.
+    pub(super) fn mean(&self) -> [f32; 3] {
+        let mut sum = [0.0_f64; 3];
+        for texel in &self.texels {
+            (0..3).for_each(|c| sum[c] += f64::from(texel[c]));
+        }
+        sum.map(|sum| (sum / self.texels.len() as f64) as f32)
+    }
+
     /// Bilinear, repeating; v is up, so v = 0 is the bottom edge. Texel centres lie at
     /// half-integers.
     pub fn sample_bilinear(&self, u: f32, v: f32) -> [f32; 3] {

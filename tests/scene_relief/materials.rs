@@ -226,7 +226,8 @@ fn maps_lie_where_their_options_say() {
 
 #[test]
 fn what_would_change_the_light_and_is_not_used_is_a_warning() {
-    let dir = folder(&[]);
+    let lamp = rgb_float(2, 1, |x, _| [4.0 * x as f32, 1.0, 0.5]);
+    let dir = folder(&[("lamp.exr", &lamp)]);
     for (lines, words) in [
         (
             "d 0.5",
@@ -241,8 +242,8 @@ fn what_would_change_the_light_and_is_not_used_is_a_warning() {
             "a.mtl:4: material \"m\": map_d is not used",
         ),
         (
-            "map_Ke lamp.png",
-            "a.mtl:4: material \"m\": map_Ke is not used",
+            "map_Ke lamp.exr",
+            "a.mtl:4: material \"m\": map_Ke gives its mean",
         ),
         ("shine 3", "a.mtl:4: material \"m\": shine is not used"),
     ] {
@@ -252,4 +253,10 @@ fn what_would_change_the_light_and_is_not_used_is_a_warning() {
     }
     let scene = square(&dir, "d 1\nTr 0\nKs 0.5 0.5 0.5\nNi 1.45\nillum 2").unwrap();
     assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    // Blender writes no Ke beside a texture of it.
+    let mtl = "newmtl m\nKd 0.5 0.5 0.5\nmap_Ke lamp.exr\n";
+    std::fs::write(dir.path().join("a.mtl"), mtl).unwrap();
+    let path = dir.path().join("a.obj");
+    let scene = load(path.to_str().unwrap(), &LoadOptions::default()).unwrap();
+    assert_eq!(scene.materials[0].ke, [2.0, 1.0, 0.5]);
 }

@@ -160,7 +160,7 @@ impl Materials {
         }
         if let Some(map) = from.emissive_texture() {
             let texture = maps.colours(file, &map.texture())?;
-            let mean = mean(&texture);
+            let mean = texture.mean();
             material.ke = std::array::from_fn(|c| material.ke[c] * mean[c]);
             if material.emits() {
                 said.warnings
@@ -215,13 +215,4 @@ impl Maps {
         self.normals.insert(image.index(), map.clone());
         Ok(map)
     }
-}
-
-/// Mean of the texels, linear RGB.
-fn mean(texture: &Texture) -> [f32; 3] {
-    let mut sum = [0.0_f64; 3];
-    for texel in &texture.texels {
-        (0..3).for_each(|c| sum[c] += f64::from(texel[c]));
-    }
-    sum.map(|sum| (sum / texture.texels.len() as f64) as f32)
 }
