@@ -320,6 +320,28 @@ fn stderr_is_as_the_options_say() {
 }
 
 #[test]
+fn completions_and_manual_pages_know_every_command() {
+    let folder = tempfile::tempdir().expect("a folder for the test");
+    for shell in ["bash", "zsh", "fish"] {
+        let run = mesolux(&["completions", shell], folder.path());
+        let text = String::from_utf8(run.stdout).expect("UTF-8");
+        assert!(
+            run.status.success() && text.contains("sides-as-given"),
+            "{shell}"
+        );
+    }
+    let run = mesolux(&["man", "-o", "pages"], folder.path());
+    assert!(run.status.success());
+    for command in [
+        "", "-bake", "-render", "-view", "-compare", "-scene", "-info", "-bench",
+    ] {
+        let path = folder.path().join(format!("pages/mesolux{command}.1"));
+        let page = std::fs::read_to_string(&path).expect("a page");
+        assert!(page.contains(".SH NAME"), "{}", path.display());
+    }
+}
+
+#[test]
 fn bakes_and_renders_files_of_every_kind() {
     let folder = tempfile::tempdir().expect("a folder for the test");
     std::fs::write(folder.path().join("room.obj"), ROOM).expect("written");

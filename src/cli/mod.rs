@@ -12,6 +12,7 @@ mod reference;
 mod render;
 mod scene;
 mod series;
+mod shell;
 mod show;
 #[cfg(feature = "window")]
 mod view;
@@ -82,6 +83,8 @@ enum Command {
     Scene(scene::Options),
     Info(info::Options),
     Bench(bench::Options),
+    Completions(shell::CompletionsOptions),
+    Man(shell::ManOptions),
 }
 
 /// How a scene is read: options of built-in scenes, and how finely others are cut.
@@ -315,6 +318,8 @@ pub fn main() -> ExitCode {
         Command::Scene(options) => scene::run(options),
         Command::Info(options) => info::run(options),
         Command::Bench(options) => bench::run(options),
+        Command::Completions(options) => shell::completions(options),
+        Command::Man(options) => shell::man(options),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
