@@ -218,7 +218,8 @@ fn both_sides_of_a_curtain_are_lit() {
     other.reverse();
     room.quad("lamp", other);
     room.write(dir.path());
-    let curtain = "mtllib a.mtl\nusemtl box\nv 0 0.02 -0.9\nv 0 1.9 -0.9\nv 0 1.9 0.9\nv 0 0.02 0.9\nf 1 2 3 4\n";
+    let curtain = "mtllib a.mtl\nusemtl box\nv 0 0.02 -0.9\nv 0 1.9 -0.9\n\
+        v 0 1.9 0.9\nv 0 0.02 0.9\nf 1 2 3 4\n";
     fs::write(dir.path().join("curtain.obj"), curtain).unwrap();
     let path = dir.path().join("a.toml");
     let text = "[[mesh]]\nfile = 'a.obj'\n[[mesh]]\nfile = 'curtain.obj'\nsides = 'both'\n";

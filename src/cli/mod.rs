@@ -32,8 +32,8 @@ use tracing_subscriber::prelude::*;
 /// buffers.
 ///
 /// SCENE is a built-in name (cornell, cornell-relief, bowl-and-bunny, fruit-platter), an .obj, .gltf
-/// or .glb file, or a scene.toml. Results go to files and stdout, everything else to stderr. Exit code 2 means
-/// that an input was wrong; nothing is written then.
+/// or .glb file, or a scene.toml. Results go to files and stdout, everything else to stderr. Exit
+/// code 2 means that an input was wrong; nothing is written then.
 #[derive(Parser)]
 #[command(version, about)]
 struct Cli {

@@ -105,7 +105,8 @@ pub(super) fn of_sheets(scene: &Scene, choices: &[Choice]) -> Vec<usize> {
 /// Turns pieces that show light only their backs, where there is a choice, with a note. Gives the
 /// triangles of two sides whose pieces show light both, without those that emit: a lamp is a front.
 pub(super) fn turn_dark(scene: &mut Scene, choices: &[Choice]) -> Vec<usize> {
-    let Some(lights) = Lights::of(scene) else {
+    let is_given = choices.iter().all(|&choice| choice == Choice::None);
+    let Some(lights) = Lights::of(scene).filter(|_| !is_given) else {
         return Vec::new();
     };
     let pieces = pieces(&scene.triangles);
@@ -227,7 +228,7 @@ enum Light {
 
 impl Lights {
     fn of(scene: &Scene) -> Option<Self> {
-        let (origin, unit) = scene.local_frame();
+        let (origin, unit) = frame(scene);
         let within = |p: DVec3| (p - origin) / unit;
         let (mut list, mut sum) = (Vec::new(), 0.0);
         let mut add = |light, power: f64| {
@@ -286,13 +287,23 @@ fn diffuse(normal: DVec3, state: &mut u64) -> DVec3 {
     (normal + uniform(state)).normalize_or(normal)
 }
 
-/// Height of a path's start above a surface, where half the scene is 1.
-const ABOVE: f64 = 1e-6;
+/// Half the scene in the frame of [`Rays`]. obvhs skips a box that a ray leaves within its own 10⁻⁴:
+/// at this scale every box reaches further beyond its triangle.
+const SCALE: f64 = 1024.0;
+
+/// Height of a path's start above a surface.
+const ABOVE: f64 = 1e-6 * SCALE;
 
 /// Boxes reach so far beyond what they hold, which is more than the rounding of f32.
-const MARGIN: f32 = 1e-5;
+const MARGIN: f32 = 1.0 / 128.0;
 
-/// The triangles of a scene about its middle, half the scene being 1 across.
+/// The middle of a scene, and the unit of [`Rays`] in scene units.
+fn frame(scene: &Scene) -> (DVec3, f64) {
+    let (origin, unit) = scene.local_frame();
+    (origin, unit / SCALE)
+}
+
+/// The triangles of a scene about its middle, coordinates in −[`SCALE`]..[`SCALE`].
 struct Rays {
     corners: Vec<[DVec3; 3]>,
     bvh: CwBvh,
@@ -311,7 +322,7 @@ impl Boundable for Bounds<'_> {
 
 impl Rays {
     fn new(scene: &Scene) -> Self {
-        let (origin, unit) = scene.local_frame();
+        let (origin, unit) = frame(scene);
         let corners: Vec<[DVec3; 3]> = (scene.triangles.iter())
             .map(|t| scene.corners(t).map(|p| (p - origin) / unit))
             .collect();
@@ -324,9 +335,9 @@ impl Rays {
         Self { corners, bvh }
     }
 
-    /// A point light far outside shines from the edge of what f32 can tell apart.
+    /// A point light far outside the scene is moved closer, to where f32 is still precise enough.
     fn inside(&self, place: DVec3) -> DVec3 {
-        place.clamp(DVec3::splat(-100.0), DVec3::splat(100.0))
+        place.clamp(DVec3::splat(-100.0 * SCALE), DVec3::splat(100.0 * SCALE))
     }
 
     /// The triangle that a ray meets first, the place, and the triangle's normal.

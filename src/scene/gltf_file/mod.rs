@@ -199,11 +199,10 @@ impl Reader<'_> {
             colours,
             "primitives have colours at vertices, which are not used",
         );
-        let used = |material: u32| {
-            let mut triangles = self.found.mesh.triangles.iter();
-            triangles.any(|t| t.material == material)
-        };
-        let used: Vec<bool> = (0..self.materials.list.len() as u32).map(used).collect();
+        let mut used = vec![false; self.materials.list.len()];
+        for triangle in &self.found.mesh.triangles {
+            used[triangle.material as usize] = true;
+        }
         let materials = self.materials;
         for (material, said) in materials.said.into_iter().enumerate() {
             if used[material] {
