@@ -6,8 +6,8 @@ mod common;
 use common::{Solved, solve};
 use glam::{DVec3, Vec3};
 use mesolux::mesh::elements::Elements;
-use mesolux::scene::PointLight;
 use mesolux::scene::shapes::Shapes;
+use mesolux::scene::{Lights, PointLight};
 use mesolux::solver::Settings;
 
 /// A closed room with a ball and a lamp in the ceiling. Walls on one side reflect `rho`, all else
@@ -40,19 +40,19 @@ fn arrived(solved: &Solved) -> f64 {
         .sum()
 }
 
-fn emitted(elements: &Elements, lights: &[PointLight]) -> f64 {
+fn emitted(elements: &Elements, lights: &Lights) -> f64 {
     let each = elements.emitted.iter().zip(&elements.area);
     let lamps: f64 = each
         .map(|(light, area)| f64::from(light.element_sum()) * area)
         .sum();
     let sphere = 4.0 * std::f64::consts::PI / elements.unit.powi(2);
     let of_light = |light: &PointLight| f64::from(light.intensity.iter().sum::<f32>()) * sphere;
-    lamps + lights.iter().map(of_light).sum::<f64>()
+    lamps + lights.points.iter().map(of_light).sum::<f64>()
 }
 
 #[test]
 fn no_more_is_missing_than_the_bound_says() {
-    holds(&[0.5, 0.9, 0.999], &[]);
+    holds(&[0.5, 0.9, 0.999], &Lights::NONE);
 }
 
 /// Its light at an element is no share of what the element sees.
@@ -62,11 +62,12 @@ fn nor_by_a_point_light() {
         name: "bulb".into(),
         position: DVec3::new(0.8, 0.5, 0.9),
         intensity: [0.3, 0.2, 0.1],
+        beam: None,
     };
-    holds(&[0.9], &[light]);
+    holds(&[0.9], &light.into());
 }
 
-fn holds(reflectances: &[f32], lights: &[PointLight]) {
+fn holds(reflectances: &[f32], lights: &Lights) {
     for &rho in reflectances {
         let emitted = emitted(&room(rho), lights);
         let solve_to = |residual: f64, shots: Option<u32>| {

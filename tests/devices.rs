@@ -196,7 +196,7 @@ fn so_they_do_when_they_are_interrupted_and_go_on() {
     let interrupted = |devices: &[Arc<Device>]| {
         let elements =
             bake::elements(&devices[0], &scene, &settings).expect("the relief fits the device");
-        let lights = &scene.point_lights;
+        let lights = &scene.lights;
         let mut solver = Solver::on_devices(devices, elements, lights, &settings, None)
             .expect("the scene fits the device");
         let mut parts = Vec::new();
@@ -226,7 +226,7 @@ fn so_they_do_when_they_are_interrupted_and_go_on() {
 fn several_devices_keep_and_relight_as_one() {
     let first = scene(true, true);
     let mut relit = first.clone();
-    relit.point_lights[0].position.x += 0.3;
+    relit.lights.points[0].position.x += 0.3;
     let settings = settings();
     let all = devices(2);
     let made = [1, 2].map(|count| {

@@ -209,7 +209,8 @@ fn stops_and_goes_on_in_either_loop() {
         }
         let device = device();
         let elements = mesolux::bake::elements(&device, &build.scene, &settings).expect("plain");
-        let mut solver = Solver::new(&device, elements, &[], &settings).expect("it fits");
+        let mut solver = Solver::new(&device, elements, &mesolux::scene::Lights::NONE, &settings)
+            .expect("it fits");
         solver.run(|_| false).expect("it is stopped");
         let report = solver.report();
         assert_eq!(report.stop, StopReason::Interrupted);

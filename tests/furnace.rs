@@ -13,7 +13,7 @@ use mesolux::solver::{Estimator, Settings};
 fn errors(estimator: Estimator) -> (f64, f64) {
     let solved = solve(
         occluded_elements(20, 3, 0.9),
-        &[],
+        &mesolux::scene::Lights::NONE,
         &Settings {
             estimator,
             ..Settings::default()
@@ -55,7 +55,11 @@ fn radiosity_is_one_everywhere() {
 fn irradiance_is_that_of_all_emitters() {
     let mut elements = occluded_elements(20, 3, 0.0);
     elements.emitted.fill(Vec3::ONE);
-    let solved = solve(elements, &[], &Settings::default());
+    let solved = solve(
+        elements,
+        &mesolux::scene::Lights::NONE,
+        &Settings::default(),
+    );
     let (mut sum, mut area, mut max) = (0.0, 0.0, 0f64);
     for (e, a) in solved.irradiance.iter().zip(&solved.area) {
         let error = f64::from(e.x) - 1.0;

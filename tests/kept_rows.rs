@@ -200,7 +200,7 @@ fn relit_scene() -> Build {
     build.scene.materials[lamp].ke = [0.5, 4.0, 1.0];
     // So weakly that the same emitters are strong, which see from places of their own.
     build.scene.materials[0].ke = [0.1, 0.0, 0.0];
-    build.scene.point_lights.clear();
+    build.scene.lights.points.clear();
     build.point_light(DVec3::new(0.8, 0.3, 0.2), 0.5);
     build
 }
@@ -278,7 +278,7 @@ fn relights(emitter_hemicube: Option<u32>) {
 
     // Without a point light nothing is left to draw.
     let mut lamps = scene(true).0.scene;
-    lamps.point_lights.clear();
+    lamps.lights.points.clear();
     let solved = solve(&lamps, Some(&kept));
     let report = solved.report();
     assert_eq!((report.hemicubes, report.emitters_by_rays), (0, 0));

@@ -100,8 +100,13 @@ fn room_with_a_bell() -> (Build, std::ops::Range<usize>, DVec3, [DVec3; 2]) {
 fn eyes_are_not_covered() {
     let (build, _, low, sides) = room_with_a_bell();
     let elements = Elements::new(&build.scene);
-    let solver = Solver::new(&device(), elements, &[], &Settings::default())
-        .expect("the scene fits the device");
+    let solver = Solver::new(
+        &device(),
+        elements,
+        &mesolux::scene::Lights::NONE,
+        &Settings::default(),
+    )
+    .expect("the scene fits the device");
     let elements = &solver.problem.elements;
     let place = |p: DVec3| elements.origin + elements.unit * p;
     // A place on the line of a side is beneath neither.
@@ -293,8 +298,13 @@ fn near_factors_are_what_is_seen() {
     // Sources of many members.
     let mut settings = Settings::default();
     settings.grouping.max_area = 1.0 / 192.0;
-    let solver = Solver::new(&device(), Elements::new(&build.scene), &[], &settings)
-        .expect("the scene fits the device");
+    let solver = Solver::new(
+        &device(),
+        Elements::new(&build.scene),
+        &mesolux::scene::Lights::NONE,
+        &settings,
+    )
+    .expect("the scene fits the device");
     let (elements, near) = (&solver.problem.elements, &solver.problem.near);
     let (mut compared, mut squares, mut apart) = (0, 0.0, 0.0_f64);
     for (s, source) in solver.problem.sources.list.iter().enumerate() {
@@ -350,7 +360,7 @@ fn weights_sum_to_the_area_of_their_source() {
     let solver = Solver::new(
         &device(),
         Elements::new(&build.scene),
-        &[],
+        &mesolux::scene::Lights::NONE,
         &Settings::default(),
     )
     .expect("the scene fits the device");

@@ -279,7 +279,7 @@ fn merged_elements_leave_the_light_as_it_is() {
     let build = cornell(16);
     let bake = |merging| {
         let elements = Elements::new(&build.scene);
-        solve(elements, &[], &settings(merging))
+        solve(elements, &mesolux::scene::Lights::NONE, &settings(merging))
     };
     let (merged, apart) = (bake(true), bake(false));
     assert_eq!(apart.report.skipped.triangles_merged, 0);
@@ -305,7 +305,7 @@ fn merged_elements_show_the_same_planes() {
         let mut solver = Solver::new(
             &device(),
             Elements::new(&build.scene),
-            &[],
+            &mesolux::scene::Lights::NONE,
             &settings(merging),
         )
         .expect("the scene fits the device");
@@ -363,7 +363,13 @@ fn the_pixel_estimator_draws_every_element() {
         ..settings(true)
     };
     let elements = Elements::new(&build.scene);
-    let solver = Solver::new(&device(), elements, &[], &settings).expect("it fits the device");
+    let solver = Solver::new(
+        &device(),
+        elements,
+        &mesolux::scene::Lights::NONE,
+        &settings,
+    )
+    .expect("it fits the device");
     assert_eq!(
         solver.problem.occluders,
         Occluders::elements(&solver.problem.elements)

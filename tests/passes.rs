@@ -80,7 +80,7 @@ fn solve_so(build: &Build, settings: &Settings) -> Solver {
     Solver::new(
         &device(),
         Elements::new(&build.scene),
-        &build.scene.point_lights,
+        &build.scene.lights,
         settings,
     )
     .expect("the scene fits the device")

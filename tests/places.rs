@@ -10,7 +10,7 @@ use mesolux::solver::{Place, Settings, Solver};
 
 fn solved(build: &Build) -> Solver {
     let elements = Elements::new(&build.scene);
-    let lights = &build.scene.point_lights;
+    let lights = &build.scene.lights;
     let mut solver = Solver::new(&device(), elements, lights, &Settings::default())
         .expect("the scene fits the device");
     solver.run(|_| true).expect("it is solved");

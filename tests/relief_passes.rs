@@ -90,7 +90,7 @@ fn solver_by(estimator: Estimator, transport: Transport, k: u32, shots: Option<u
     let device = device();
     let elements = mesolux::bake::elements(&device, &build.scene, &settings)
         .expect("the relief fits the device");
-    Solver::new(&device, elements, &build.scene.point_lights, &settings)
+    Solver::new(&device, elements, &build.scene.lights, &settings)
         .expect("the scene fits the device")
 }
 
@@ -269,7 +269,8 @@ fn near_parts_bring_light_as_their_twin() {
     };
     let device = device();
     let elements = mesolux::bake::elements(&device, &build.scene, &settings).expect("it fits");
-    let solver = Solver::new(&device, elements, &[], &settings).expect("it fits");
+    let solver =
+        Solver::new(&device, elements, &mesolux::scene::Lights::NONE, &settings).expect("it fits");
     let on = &solver.problem;
     let relief = on.elements.relief.as_ref().expect("it has relief");
     let (connections, occluders) = (&on.connections, &on.occluders);

@@ -56,7 +56,7 @@ fn the_counts_are_those_of_the_paper() {
         assert_eq!(scene.name, name);
         assert_eq!(scene.cameras[0].name, "front");
         assert_eq!(
-            scene.point_lights.len(),
+            scene.lights.points.len(),
             usize::from(name == "bowl-and-bunny")
         );
         let area_lights = scene.materials.iter().filter(|m| m.emits()).count();

@@ -33,7 +33,7 @@ fn same(a: &Scene, b: &Scene) {
     assert_eq!(a.name, b.name);
     assert_eq!(a.vertices, b.vertices);
     assert_eq!(a.triangles, b.triangles);
-    assert_eq!(a.point_lights, b.point_lights);
+    assert_eq!(a.lights.points, b.lights.points);
     assert_eq!(a.cameras, b.cameras);
     assert_eq!(a.materials.len(), b.materials.len());
     for (a, b) in a.materials.iter().zip(&b.materials) {
@@ -257,7 +257,7 @@ fn without_a_material_file_surfaces_are_grey_and_lights_may_come_from_the_scene_
         .collect();
     assert_eq!(names, ["default", "red"]);
     assert!(scene.materials.iter().all(|m| m.kd == [0.5; 3]));
-    assert_eq!(scene.point_lights[0].name, "light 1");
+    assert_eq!(scene.lights.points[0].name, "light 1");
 }
 
 #[test]

@@ -167,7 +167,7 @@ fn nodes_place_meshes_lights_and_cameras() {
     let [low, high] = [scene.bounds().0, scene.bounds().1];
     assert!(low.distance(DVec3::new(0.0, -1.0, 4.0)) < 1e-6, "{low}");
     assert!(high.distance(DVec3::new(0.0, 1.0, 6.0)) < 1e-6, "{high}");
-    let light = &scene.point_lights[0];
+    let light = &scene.lights.points[0];
     assert_eq!(
         (light.name.as_str(), light.intensity),
         ("bulb", [1.0, 0.5, 0.25])

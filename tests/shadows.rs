@@ -237,10 +237,11 @@ fn contacts_leak_no_light_and_surfaces_do_not_shadow_themselves() {
         .position(Material::emits)
         .expect("a lamp");
     scene.materials[lamp].ke = [0.0; 3];
-    scene.point_lights.push(PointLight {
+    scene.lights.points.push(PointLight {
         name: "test".into(),
         position: DVec3::new(0.4, 1.5, 0.5),
         intensity: [1.0; 3],
+        beam: None,
     });
     // A card a millimetre above the floor, a hundredth of a pixel.
     let mut build = Build::new();
@@ -309,10 +310,11 @@ fn open_triangles_follow_no_ways() {
         material.map_height = None;
     }
     let mut two_lamps = room(false, 0.3);
-    two_lamps.point_lights.push(PointLight {
+    two_lamps.lights.points.push(PointLight {
         name: "test".into(),
         position: DVec3::new(1.7, 1.2, 1.6),
         intensity: [0.3; 3],
+        beam: None,
     });
     for (name, scene) in [
         ("a lamp", &room(false, 0.3)),

@@ -58,7 +58,7 @@ pub fn solve_on(
     if let Some(kept) = kept {
         kept.check(scene, settings)?;
     }
-    let lights = &scene.point_lights;
+    let lights = &scene.lights;
     let mut solver = Solver::on_devices(devices, elements, lights, settings, kept)?;
     solver.run(go_on)?;
     Ok(solver)

@@ -43,7 +43,7 @@ pub fn run(device: &Arc<Device>, scene: &Scene, hemicube: u32, rounds: usize) ->
         solvers.push(Solver::new(
             device,
             Elements::new(scene),
-            &scene.point_lights,
+            &scene.lights,
             &settings,
         )?);
     }

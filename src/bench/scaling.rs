@@ -192,7 +192,7 @@ fn bake(
     let elements = Elements::new(&scene);
     let elements_seconds = start.elapsed().as_secs_f64();
     let start = Instant::now();
-    let mut solver = Solver::new(device, elements, &scene.point_lights, &settings)?;
+    let mut solver = Solver::new(device, elements, &scene.lights, &settings)?;
     let setup_seconds = start.elapsed().as_secs_f64();
     let start = Instant::now();
     solver.run(|_| go_on())?;

@@ -173,7 +173,7 @@ fn begin(device: &Arc<Device>, scene: &Scene, options: &Options, how: How<'_>) -
     let elements = bake::elements(device, scene, &settings)?;
     let relief_seconds = start.elapsed().as_secs_f64();
     let meso_elements = elements.relief.as_ref().map_or(0, |r| r.count() as u64);
-    let solver = Solver::new(device, elements, &scene.point_lights, &settings)?;
+    let solver = Solver::new(device, elements, &scene.lights, &settings)?;
     Ok(Under {
         row: Row {
             scene: scene.name.clone(),

@@ -63,7 +63,8 @@ impl Lights {
             }
         }
         let point_lights: Vec<_> = scene
-            .point_lights
+            .lights
+            .points
             .iter()
             .map(|light| Point {
                 place: geometry.inside(light.position),

@@ -68,7 +68,7 @@ fn shining(scene: &Scene) -> Vec<Shining> {
             strength: emitted * (share / emitted.element_sum()),
         });
     }
-    points.extend(scene.point_lights.iter().map(|light| Shining {
+    points.extend(scene.lights.points.iter().map(|light| Shining {
         position: light.position,
         normal: None,
         area: 0.0,

@@ -58,7 +58,7 @@ impl Shafts {
             .iter()
             .map(|l| l.lamp())
             .collect();
-        lamps.extend(scene.point_lights.iter().map(|light| Lamp {
+        lamps.extend(scene.lights.points.iter().map(|light| Lamp {
             ends: vec![seen(light.position)],
             plane: None,
         }));

@@ -165,7 +165,7 @@ impl Assembly {
         let MeshFile {
             mesh,
             two_sided,
-            point_lights,
+            lights,
             cameras,
         } = file;
         let materials = self.add_materials(&mesh.materials);
@@ -185,9 +185,14 @@ impl Assembly {
             _ => self.give_sides(first, sides),
         }
         let scene = &mut self.scene;
-        for mut light in point_lights {
-            light.name = free_name(light.name, scene.point_lights.iter().map(|l| &l.name));
-            scene.point_lights.push(light);
+        let known = &mut scene.lights;
+        for mut light in lights.points {
+            light.name = free_name(light.name, known.points.iter().map(|l| &l.name));
+            known.points.push(light);
+        }
+        for mut sun in lights.suns {
+            sun.name = free_name(sun.name, known.suns.iter().map(|l| &l.name));
+            known.suns.push(sun);
         }
         for mut camera in cameras {
             camera.name = free_name(camera.name, scene.cameras.iter().map(|c| &c.name));

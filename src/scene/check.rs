@@ -72,7 +72,8 @@ fn has_light(scene: &Scene) -> bool {
     let emits: Vec<bool> = scene.materials.iter().map(|m| m.emits()).collect();
     scene.triangles.iter().any(|t| emits[t.material as usize])
         || scene
-            .point_lights
+            .lights
+            .points
             .iter()
             .any(|light| light.intensity.iter().any(|&c| c > 0.0))
 }

@@ -28,8 +28,8 @@ impl Scene {
         }
         length(&mut hash, self.materials.len());
         self.materials.iter().for_each(|m| material(&mut hash, m));
-        length(&mut hash, self.point_lights.len());
-        for light in &self.point_lights {
+        length(&mut hash, self.lights.points.len());
+        for light in &self.lights.points {
             light
                 .position
                 .to_array()

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::assemble::Mesh;
 use super::material::TextureCache;
-use super::{Camera, PointLight, obj};
+use super::{Camera, Lights, obj};
 use crate::error::{Error, Result};
 
 /// What such a file holds.
@@ -13,7 +13,7 @@ pub(super) struct MeshFile {
     pub mesh: Mesh,
     /// Whether surfaces of each material have two sides, `[material]`; none has beyond the list.
     pub two_sided: Vec<bool>,
-    pub point_lights: Vec<PointLight>,
+    pub lights: Lights,
     pub cameras: Vec<Camera>,
 }
 

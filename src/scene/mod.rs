@@ -22,6 +22,7 @@ pub(crate) mod even_light;
 mod gltf_file;
 mod hash;
 mod heights_from_normals;
+mod lights;
 mod load;
 #[cfg(feature = "formats")]
 mod map_files;
@@ -41,6 +42,7 @@ mod said;
 mod scene_file;
 pub mod shapes;
 mod sides;
+pub mod sky;
 mod text_file;
 mod texture;
 mod tile;
@@ -54,6 +56,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 pub use displace::{displace, relief_normals};
+pub use lights::{Beam, Lights, PointLight, Sun, Web};
 pub use load::{ImportOptions, LoadOptions, load};
 pub use maps::{HeightMap, NormalMap};
 pub use material::Material;
@@ -74,7 +77,7 @@ pub struct Scene {
     /// In the order of the input.
     pub triangles: Vec<Triangle>,
     pub materials: Vec<Material>,
-    pub point_lights: Vec<PointLight>,
+    pub lights: Lights,
     pub cameras: Vec<Camera>,
     /// Triangles without area that were left out.
     pub dropped_degenerate: usize,
@@ -126,16 +129,6 @@ pub struct Triangle {
     pub uv: [[f32; 2]; 3],
     /// Index into [`Scene::materials`].
     pub material: u32,
-}
-
-/// A point light: irradiance at distance d is `intensity · cos θ / d²`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PointLight {
-    pub name: String,
-    /// Scene units.
-    pub position: DVec3,
-    /// Radiant intensity, W·sr⁻¹, RGB.
-    pub intensity: [f32; 3],
 }
 
 #[derive(Debug, Clone, PartialEq)]

@@ -59,7 +59,7 @@ impl Placement {
                 }
             }
         }
-        for light in &mut file.point_lights {
+        for light in &mut file.lights.points {
             light.position = self.0.transform_point3(light.position);
         }
         for camera in &mut file.cameras {

@@ -127,12 +127,12 @@ pub(super) fn load(path: &Path, import: &ImportOptions) -> Result<Scene> {
     for (index, table) in file.point_light.iter().enumerate() {
         let light = point_light(table.get_ref(), index);
         let problem = check_light(&light)
-            .or_else(|| taken(&light.name, scene.point_lights.iter().map(|l| &l.name)));
+            .or_else(|| taken(&light.name, scene.lights.points.iter().map(|l| &l.name)));
         if let Some(what) = problem {
             let what = format!("point light \"{}\": {what}", light.name);
             return Err(lines.error(table.span().start, what));
         }
-        scene.point_lights.push(light);
+        scene.lights.points.push(light);
     }
     for (index, table) in file.camera.iter().enumerate() {
         let camera = camera(table.get_ref(), index);
@@ -286,6 +286,7 @@ fn point_light(table: &PointLightTable, index: usize) -> PointLight {
             .unwrap_or_else(|| format!("light {}", index + 1)),
         position: DVec3::from(table.position),
         intensity: table.intensity,
+        beam: None,
     }
 }
 

@@ -254,10 +254,11 @@ impl Shapes {
 
     /// Adds a grey point light, W·sr⁻¹.
     pub fn point_light(&mut self, position: DVec3, intensity: f32) {
-        self.scene.point_lights.push(PointLight {
+        self.scene.lights.points.push(PointLight {
             name: "lamp".into(),
             position,
             intensity: [intensity; 3],
+            beam: None,
         });
     }
 }

@@ -244,7 +244,7 @@ impl Lights {
             let emitted = luminance(scene.materials[triangle.material as usize].ke);
             add(Light::Triangle(corners), area * emitted);
         }
-        for light in &scene.point_lights {
+        for light in &scene.lights.points {
             // Power over π, as that of the triangles.
             let power = 4.0 * luminance(light.intensity) / (unit * unit);
             add(Light::Point(within(light.position)), power);

@@ -119,7 +119,8 @@ fn tables(scene: &Scene) -> SceneFile {
             ..MeshTable::default()
         })],
         point_light: scene
-            .point_lights
+            .lights
+            .points
             .iter()
             .map(|light| {
                 bare(PointLightTable {

@@ -42,7 +42,7 @@ use crate::error::{Error, Result};
 use crate::mesh::elements::Elements;
 use crate::passes::buffers::download;
 use crate::passes::types::{CouplingTarget, Reflected, Slot};
-use crate::scene::{PointLight, Scene};
+use crate::scene::{Lights, Scene};
 use crate::vk::Device;
 
 pub use ambient::Ambient;
@@ -94,7 +94,7 @@ impl Solver {
     pub fn new(
         device: &Arc<Device>,
         elements: Elements,
-        lights: &[PointLight],
+        lights: &Lights,
         settings: &Settings,
     ) -> Result<Self> {
         Self::on_devices(&[Arc::clone(device)], elements, lights, settings, None)
@@ -109,7 +109,7 @@ impl Solver {
     pub fn relit(
         device: &Arc<Device>,
         elements: Elements,
-        lights: &[PointLight],
+        lights: &Lights,
         settings: &Settings,
         kept: &Visibility,
     ) -> Result<Self> {
@@ -126,7 +126,7 @@ impl Solver {
     pub fn on_devices(
         devices: &[Arc<Device>],
         elements: Elements,
-        lights: &[PointLight],
+        lights: &Lights,
         settings: &Settings,
         kept: Option<&Visibility>,
     ) -> Result<Self> {

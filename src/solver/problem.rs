@@ -18,7 +18,7 @@ use crate::passes::batch::Hemicubes;
 use crate::passes::buffers::{SceneBuffers, State};
 use crate::passes::relief_buffers::ReliefBuffers;
 use crate::passes::types::ShadowOccluder;
-use crate::scene::{PointLight, Scene};
+use crate::scene::{Lights, Scene};
 use crate::vk::{Commands, Device};
 
 /// The light by which elements were grouped.
@@ -26,7 +26,7 @@ use crate::vk::{Commands, Device};
 pub(super) struct GroupedBy {
     /// See [`Elements::emitted_by_material`].
     pub emitted: Vec<Vec3>,
-    pub lights: Vec<PointLight>,
+    pub lights: Lights,
 }
 
 /// A scene to be lit.
@@ -51,7 +51,7 @@ impl Problem {
     pub(super) fn new(
         device: &Arc<Device>,
         mut elements: Elements,
-        lights: &[PointLight],
+        lights: &Lights,
         settings: &Settings,
         kept: Option<&Visibility>,
     ) -> Result<Self> {
@@ -64,7 +64,7 @@ impl Problem {
             Some(kept) => kept.grouped_by(),
             None => GroupedBy {
                 emitted: elements.emitted_by_material(),
-                lights: lights.to_vec(),
+                lights: lights.clone(),
             },
         };
         let (mut sources, connections) = match kept {
@@ -137,7 +137,7 @@ impl Problem {
         let before = self.elements.emitted.clone();
         self.elements.set_emission(scene);
         let mut sources = self.sources.clone();
-        let relit = sources.relight(&self.elements, &scene.point_lights, self.settings.seed);
+        let relit = sources.relight(&self.elements, &scene.lights, self.settings.seed);
         if relit.is_err() || sources.list.len() != self.sources.list.len() {
             self.elements.emitted = before;
             let other = || Error::Usage("another number of point lights: bake again".into());
@@ -180,7 +180,7 @@ impl Problem {
 /// Groups the elements into sources by this light, and lights these.
 fn group(
     elements: &mut Elements,
-    lights: &[PointLight],
+    lights: &Lights,
     settings: &Settings,
     by: &GroupedBy,
 ) -> Result<(Sources, Connections)> {

@@ -14,8 +14,8 @@ use crate::mesh::occluders::Occluders;
 use crate::mesh::sources;
 use crate::passes::batch::BatchSize;
 use crate::passes::buffers::SceneBuffers;
-use crate::scene::Scene;
 use crate::scene::shapes::Shapes;
+use crate::scene::{Lights, Scene};
 use crate::vk::{Candidate, Device, Instance};
 
 /// Opens the device asked for, by index or part of its name, or else the best one that can run this
@@ -80,7 +80,8 @@ pub fn ids_come_back_right(device: &Arc<Device>) -> Result<bool> {
     const SIZE: u32 = 16;
     let mut elements = Elements::new(&open_box());
     let settings = Settings::default();
-    let (sources, connections) = sources::build(&mut elements, &[], &settings.grouping, 0);
+    let (sources, connections) =
+        sources::build(&mut elements, &Lights::NONE, &settings.grouping, 0);
     let occluders = Occluders::elements(&elements);
     let near = NearPairs::none(&elements, sources.list.len());
     let scene = SceneBuffers::new(device, &elements, &sources, &connections, &occluders, &near)?;

@@ -19,7 +19,7 @@ use crate::mesh::sources::Source;
 use crate::meso::Transport;
 use crate::passes::kept_rows::RestoredSize;
 use crate::passes::types::{KeptRow, KeptState};
-use crate::scene::{PointLight, Scene};
+use crate::scene::{Lights, PointLight, Scene, Sun};
 
 /// Form factors of the sources of a scene that had been drawn, for the same scene with other
 /// emission and point lights.
@@ -47,6 +47,9 @@ struct Header {
     emitted: Vec<[f32; 3]>,
     /// Position and radiant intensity of the point lights then.
     lights: Vec<([f64; 3], [f32; 3])>,
+    /// Direction and irradiance of the suns then.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    suns: Vec<([f64; 3], [f32; 3])>,
     /// Sources that are no point lights.
     surfaces: usize,
     chunk_words: u32,
@@ -71,7 +74,7 @@ fn hexadecimal(hash: Sha256) -> String {
 
 fn key(scene: &Scene, settings: &Settings) -> String {
     let mut unlit = scene.clone();
-    unlit.point_lights.clear();
+    unlit.lights = Lights::default();
     unlit.materials.iter_mut().for_each(|m| m.ke = [0.0; 3]);
     let mut hash = Sha256::new();
     hash.update(unlit.hash());
@@ -218,8 +221,11 @@ impl Visibility {
         let mut header = Header {
             key: key(scene, &problem.settings),
             emitted: emitted.iter().map(Vec3::to_array).collect(),
-            lights: (lights.iter())
+            lights: (lights.points.iter())
                 .map(|l| (l.position.to_array(), l.intensity))
+                .collect(),
+            suns: (lights.suns.iter())
+                .map(|l| (l.towards.to_array(), l.irradiance))
                 .collect(),
             surfaces,
             chunk_words: kept.chunk_words,
@@ -299,7 +305,20 @@ impl Visibility {
     }
 
     pub(super) fn grouped_by(&self) -> GroupedBy {
-        let lights = self.header.lights.iter();
+        let light = |&(position, intensity): &([f64; 3], [f32; 3])| PointLight {
+            name: String::new(),
+            position: position.into(),
+            intensity,
+            beam: None,
+        };
+        let sun = |&(towards, irradiance): &([f64; 3], [f32; 3])| Sun {
+            name: String::new(),
+            towards: towards.into(),
+            irradiance,
+            angle: 0.0,
+        };
+        let lights = self.header.lights.iter().map(light);
+        let suns = self.header.suns.iter().map(sun);
         GroupedBy {
             emitted: self
                 .header
@@ -308,13 +327,11 @@ impl Visibility {
                 .copied()
                 .map(Vec3::from)
                 .collect(),
-            lights: lights
-                .map(|&(position, intensity)| PointLight {
-                    name: String::new(),
-                    position: position.into(),
-                    intensity,
-                })
-                .collect(),
+            lights: Lights {
+                points: lights.collect(),
+                suns: suns.collect(),
+                sky: None,
+            },
         }
     }
 

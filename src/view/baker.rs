@@ -200,7 +200,7 @@ impl Work {
                     ..flat(settings)
                 };
                 let elements = Elements::new(scene);
-                let solver = Solver::new(&device, elements, &scene.point_lights, &settings)?;
+                let solver = Solver::new(&device, elements, &scene.lights, &settings)?;
                 self.shared.latest().sources = Some(solver.source_of_triangles());
                 (self.wake)();
                 solver
@@ -218,7 +218,7 @@ impl Work {
         self.tell(epoch, Some(Stage::Device));
         let device = self.choice.open_baking()?;
         self.tell(epoch, Some(Stage::Scene));
-        let lights = &scene.point_lights;
+        let lights = &scene.lights;
         let raised = settings.relief.transport != Transport::Lambert;
         if raised && scene.materials.iter().any(Material::has_relief) {
             // What takes longest comes after the first light.
@@ -248,7 +248,7 @@ impl Work {
         let device = self.choice.open_baking()?;
         let settings = self.given.settings.clone();
         let elements = bake::elements(&device, &scene, &settings)?;
-        let lights = &scene.point_lights;
+        let lights = &scene.lights;
         let solver = Solver::new(&device, elements, lights, &settings)?;
         self.start(scene, solver, epoch);
         if let Some(solving) = &mut self.solving {
@@ -299,7 +299,7 @@ impl Work {
         };
         let device = self.choice.open_baking()?;
         let elements = bake::elements(&device, &scene, &settings)?;
-        match Solver::relit(&device, elements, &scene.point_lights, &settings, kept) {
+        match Solver::relit(&device, elements, &scene.lights, &settings, kept) {
             Ok(solver) => self.start(scene, solver, epoch),
             Err(Error::Usage(_)) => return self.bake(scene, &settings, epoch),
             Err(error) => return Err(error),

@@ -37,7 +37,7 @@ pub fn lamps(scene: &Scene) -> Vec<Lamp> {
             position,
         }
     };
-    let points = scene.point_lights.iter().enumerate();
+    let points = scene.lights.points.iter().enumerate();
     let points = points.map(|(i, l)| {
         let number = format!("point light {}", i + 1);
         let name = if l.name.is_empty() { &number } else { &l.name };
@@ -91,9 +91,9 @@ pub fn lit(scene: &Scene, lamps: &[Lamp]) -> Scene {
     for lamp in lamps {
         match lamp.place {
             Place::Point(i) => {
-                scene.point_lights[i].intensity = lamp.light();
+                scene.lights.points[i].intensity = lamp.light();
                 if let Some(position) = lamp.position {
-                    scene.point_lights[i].position = position;
+                    scene.lights.points[i].position = position;
                 }
             }
             Place::Material(i) => scene.materials[i].ke = lamp.light(),
@@ -105,7 +105,7 @@ pub fn lit(scene: &Scene, lamps: &[Lamp]) -> Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Material, PointLight};
+    use crate::scene::{Lights, Material, PointLight};
 
     #[test]
     fn lamps_are_the_lights_and_light_the_scene() {
@@ -118,18 +118,19 @@ mod tests {
                     ..Material::default()
                 },
             ],
-            point_lights: vec![PointLight {
+            lights: Lights::from(PointLight {
                 name: "bulb".into(),
                 position: DVec3::ONE,
                 intensity: [3.0; 3],
-            }],
+                beam: None,
+            }),
             ..Scene::default()
         };
         let mut all = lamps(&scene);
         let names: Vec<_> = all.iter().map(|l| l.name.as_str()).collect();
         assert_eq!(names, ["bulb", "lamp"]);
         let same = lit(&scene, &all);
-        assert_eq!(same.point_lights, scene.point_lights);
+        assert_eq!(same.lights.points, scene.lights.points);
         assert_eq!(same.materials[1].ke, [4.0, 2.0, 0.0]);
         let words = |values: &str| -> Vec<String> { values.split(' ').map(Into::into).collect() };
         all[0]
@@ -143,7 +144,7 @@ mod tests {
             .set("strength", &words("-1"))
             .expect_err("no light is negative");
         let other = lit(&scene, &all);
-        assert_eq!(other.point_lights[0].position, DVec3::new(1.0, 2.0, 3.0));
+        assert_eq!(other.lights.points[0].position, DVec3::new(1.0, 2.0, 3.0));
         assert_eq!(other.materials[1].ke, [8.0, 4.0, 0.0]);
     }
 }

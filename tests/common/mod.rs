@@ -15,7 +15,7 @@ use mesolux::bench::relief_room::{REPEAT, TEXELS};
 use mesolux::mesh::elements::Elements;
 use mesolux::render::{Picture, side_by_side};
 use mesolux::scene::shapes::Shapes;
-use mesolux::scene::{PointLight, Scene};
+use mesolux::scene::{Lights, Scene};
 use mesolux::solver::ReliefLight;
 use mesolux::solver::{Light, Report, Settings, Solver, open_device};
 use mesolux::vk::{Device, validation_log};
@@ -121,7 +121,7 @@ impl Build {
         let device = device();
         let elements = mesolux::bake::elements(&device, &self.scene, settings)
             .expect("the relief fits the device");
-        solve(elements, &self.scene.point_lights, settings)
+        solve(elements, &self.scene.lights, settings)
     }
 }
 
@@ -147,7 +147,7 @@ impl Solved {
     }
 }
 
-pub fn solve(elements: Elements, lights: &[PointLight], settings: &Settings) -> Solved {
+pub fn solve(elements: Elements, lights: &Lights, settings: &Settings) -> Solved {
     let mut solver =
         Solver::new(&device(), elements, lights, settings).expect("the scene fits the device");
     solver.run(|_| true).expect("the device solves the scene");

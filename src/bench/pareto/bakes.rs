@@ -137,7 +137,7 @@ impl Try {
         let start = Instant::now();
         let settings = self.settings(grid)?;
         let elements = bake::elements(device, scene, &settings)?;
-        let mut solver = Solver::new(device, elements, &scene.point_lights, &settings)?;
+        let mut solver = Solver::new(device, elements, &scene.lights, &settings)?;
         let mut taken = start.elapsed();
         let mut done = Done {
             rows: Vec::new(),

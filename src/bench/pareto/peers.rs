@@ -221,7 +221,8 @@ impl Ask {
                 .collect(),
             points: job
                 .fine
-                .point_lights
+                .lights
+                .points
                 .iter()
                 .map(|l| Point {
                     position: l.position.to_array(),

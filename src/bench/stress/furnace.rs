@@ -7,6 +7,7 @@ use crate::bake::quality::Quality;
 use crate::error::Result;
 use crate::mesh::elements::Elements;
 use crate::mesh::sources::Grouping;
+use crate::scene::Lights;
 use crate::scene::shapes::Shapes;
 use crate::solver::Settings;
 
@@ -99,7 +100,7 @@ fn occluders(context: &Context) -> Result<Vec<Check>> {
             (elements, bake, OCCLUDERS_RMS, OCCLUDERS_MOST)
         }
     };
-    let solved = context.solve_elements(elements, &[], &bake)?;
+    let solved = context.solve_elements(elements, &Lights::NONE, &bake)?;
     let (rms, most) = solved.off_one(0..solved.area.len());
     Ok(vec![
         Check::at_most("rms off 1", rms, rms_limit),

@@ -22,7 +22,7 @@ use crate::bake;
 use crate::error::{Error, Result};
 use crate::mesh::elements::Elements;
 use crate::scene::shapes::Shapes;
-use crate::scene::{LoadOptions, PointLight, Scene, load, write_scene};
+use crate::scene::{Lights, LoadOptions, Scene, load, write_scene};
 use crate::solver::{Report, Settings, Solver};
 use crate::vk::Device;
 
@@ -261,14 +261,14 @@ impl Solved {
 impl Context {
     fn solve(&self, scene: &Scene, settings: &Settings) -> Result<Solved> {
         let elements = bake::elements(&self.device, scene, settings)?;
-        self.solve_elements(elements, &scene.point_lights, settings)
+        self.solve_elements(elements, &scene.lights, settings)
     }
 
     /// Rejects a solution with NaN or negative light, in every case.
     fn solve_elements(
         &self,
         elements: Elements,
-        lights: &[PointLight],
+        lights: &Lights,
         settings: &Settings,
     ) -> Result<Solved> {
         let mut solver = Solver::new(&self.device, elements, lights, settings)?;

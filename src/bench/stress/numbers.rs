@@ -86,7 +86,7 @@ fn scale(context: &Context) -> Result<Vec<Check>> {
         for v in &mut scene.vertices {
             *v *= factor;
         }
-        for light in &mut scene.point_lights {
+        for light in &mut scene.lights.points {
             light.position *= factor;
             light.intensity = light.intensity.map(|i| i * (factor * factor) as f32);
         }
@@ -104,7 +104,7 @@ fn offset(context: &Context) -> Result<Vec<Check>> {
         for v in &mut scene.vertices {
             *v = (*v * 20f64.exp2()).round() / 20f64.exp2() + offset;
         }
-        for light in &mut scene.point_lights {
+        for light in &mut scene.lights.points {
             light.position += offset;
         }
         context.solve(&scene, &fine())
@@ -115,7 +115,7 @@ fn offset(context: &Context) -> Result<Vec<Check>> {
 
 fn no_emission(context: &Context) -> Result<Vec<Check>> {
     let mut scene = room(0.0).scene;
-    scene.point_lights.clear();
+    scene.lights.points.clear();
     let said = match through_files(&scene) {
         Ok(_) => String::new(),
         Err(error) => error.to_string(),

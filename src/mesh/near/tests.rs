@@ -7,6 +7,7 @@ use super::seen::{Before, Seen};
 use crate::math::form_factor::to_triangle;
 use crate::mesh::elements::Elements;
 use crate::mesh::sources::{self, Grouping};
+use crate::scene::Lights;
 use crate::scene::shapes::Shapes;
 
 /// Irrational steps, for places and normals that spread evenly.
@@ -21,7 +22,7 @@ fn scene() -> (Elements, Vec<Seen>, Vec<[DVec3; 2]>) {
     shapes.sphere(DVec3::new(0.6, 0.5, 0.9), 0.3, 4, true, 0);
     shapes.weld();
     let mut elements = Elements::new(&shapes.scene);
-    let (sources, _) = sources::build(&mut elements, &[], &Grouping::default(), 0);
+    let (sources, _) = sources::build(&mut elements, &Lights::NONE, &Grouping::default(), 0);
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for c in &elements.centroid {
         (low, high) = (low.min(*c), high.max(*c));

@@ -8,7 +8,7 @@ use crate::mesh::elements::Elements;
 use crate::mesh::near::blocked;
 use crate::mesh::occluders::Occluders;
 use crate::mesh::shadow_tree::ShadowTree;
-use crate::scene::PointLight;
+use crate::scene::Lights;
 use crate::scene::even_light::{EvenLight, LightPlace, Surface, luminance};
 use crate::structs::ShadowOccluder;
 
@@ -27,11 +27,7 @@ pub(super) struct Lit<'a> {
 
 impl<'a> Lit<'a> {
     /// None where nothing emits.
-    pub fn new(
-        elements: &'a Elements,
-        connections: &Connections,
-        lights: &[PointLight],
-    ) -> Option<Self> {
+    pub fn new(elements: &'a Elements, connections: &Connections, lights: &Lights) -> Option<Self> {
         let surface = |e: usize| Surface {
             corners: elements.triangle(e),
             emitted: luminance(elements.emitted[e].into()),
@@ -40,7 +36,7 @@ impl<'a> Lit<'a> {
         // In an order that does not depend on that of the input.
         let order = morton_order(elements);
         let surfaces: Vec<Surface> = order.iter().map(|&e| surface(e as usize)).collect();
-        let points = lights.iter().map(|light| {
+        let points = lights.points.iter().map(|light| {
             let position = (light.position - elements.origin) / elements.unit;
             let square = elements.unit * elements.unit;
             (position, luminance(light.intensity) / square)

@@ -18,7 +18,7 @@ use crate::error::{Error, Result};
 use crate::mesh::charts::Connections;
 use crate::mesh::contour::Loop;
 use crate::mesh::elements::Elements;
-use crate::scene::PointLight;
+use crate::scene::Lights;
 use cut::{Limits, cut};
 pub(crate) use eyes::least_strong;
 use eyes::{move_eyes, turn_frames};
@@ -157,7 +157,7 @@ impl Sources {
     ///
     /// # Errors
     /// An element emits that belongs to no source because it was black.
-    pub fn relight(&mut self, elements: &Elements, lights: &[PointLight], seed: u64) -> Result<()> {
+    pub fn relight(&mut self, elements: &Elements, lights: &Lights, seed: u64) -> Result<()> {
         self.list.retain(|s| s.kind != KIND_POINT);
         let mut covered = vec![false; elements.len()];
         for source in &mut self.list {
@@ -177,7 +177,7 @@ impl Sources {
                 elements.input_index[e]
             )));
         }
-        for light in lights {
+        for light in &lights.points {
             self.list.extend(point(light, elements));
         }
         turn_frames(&mut self.list, seed);
@@ -189,7 +189,7 @@ impl Sources {
 /// its own, so that the pixel grids of different hemicubes do not align.
 pub fn build(
     elements: &mut Elements,
-    lights: &[PointLight],
+    lights: &Lights,
     grouping: &Grouping,
     seed: u64,
 ) -> (Sources, Connections) {
@@ -235,7 +235,7 @@ pub fn build(
         }
     }
     sources.relief = plain.unwrap_or(sources.list.len())..sources.list.len();
-    for light in lights {
+    for light in &lights.points {
         sources.list.extend(point(light, elements));
     }
     turn_frames(&mut sources.list, seed);
@@ -266,7 +266,10 @@ mod tests {
                 ..Grouping::default()
             };
             let mut elements = Elements::new(&shapes.scene);
-            build(&mut elements, &[], &grouping, 0).0.list.len()
+            build(&mut elements, &Lights::NONE, &grouping, 0)
+                .0
+                .list
+                .len()
         };
         assert_eq!(count(48), count(usize::MAX));
     }
@@ -282,7 +285,10 @@ mod tests {
                 max_area: 1.0,
                 ..Grouping::default()
             };
-            build(&mut elements, &[], &grouping, 0).0.list.len() as f64
+            build(&mut elements, &Lights::NONE, &grouping, 0)
+                .0
+                .list
+                .len() as f64
         };
         // 20,480 elements, 81,920 and 327,680.
         let [coarse, fine, finer] = [5, 6, 7].map(count);

@@ -8,7 +8,7 @@ use super::grid::{Part, Room};
 use super::stage::{self, Stage, diffuse, even_share};
 use super::{bunny, relief_maps, solid};
 use crate::error::Result;
-use crate::scene::{Camera, LoadOptions, Material, PointLight, Scene};
+use crate::scene::{Camera, Lights, LoadOptions, Material, PointLight, Scene};
 
 const NAME: &str = "bowl-and-bunny";
 const PATCHES: usize = 73_256;
@@ -75,11 +75,12 @@ pub(super) fn build(options: &LoadOptions) -> Result<Scene> {
             diffuse("glaze", [0.16, 0.30, 0.58]),
         ],
         solids: vec![figure, bowl],
-        point_lights: vec![PointLight {
+        lights: Lights::from(PointLight {
             name: "bulb".into(),
             position: DVec3::new(0.36, 0.62, 0.16),
             intensity: [0.62, 0.56, 0.46],
-        }],
+            beam: None,
+        }),
         camera: Camera {
             name: "front".into(),
             position: DVec3::new(0.575, 0.32, -0.30),

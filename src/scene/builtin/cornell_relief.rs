@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::stage::{self, Stage, even_share};
 use super::{cornell, relief_maps, solid, statue};
 use crate::error::Result;
-use crate::scene::{LoadOptions, Material, Scene};
+use crate::scene::{Lights, LoadOptions, Material, Scene};
 
 const NAME: &str = "cornell-relief";
 const PATCHES: usize = 83_160;
@@ -49,7 +49,7 @@ pub(super) fn build(options: &LoadOptions) -> Result<Scene> {
         material_of: cornell::material_of,
         materials,
         solids: vec![horse],
-        point_lights: Vec::new(),
+        lights: Lights::default(),
         camera: cornell::camera(),
     };
     stage.build(options)

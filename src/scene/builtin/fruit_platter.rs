@@ -10,7 +10,7 @@ use super::stage::{self, Stage, diffuse, even_share};
 use super::{fruit, relief_maps, solid};
 use crate::error::{Error, Result};
 use crate::scene::assemble::Mesh;
-use crate::scene::{Camera, LoadOptions, Material, Scene};
+use crate::scene::{Camera, Lights, LoadOptions, Material, Scene};
 
 const NAME: &str = "fruit-platter";
 const PATCHES: usize = 76_304;
@@ -107,7 +107,7 @@ pub(super) fn build(options: &LoadOptions) -> Result<Scene> {
         material_of,
         materials,
         solids,
-        point_lights: Vec::new(),
+        lights: Lights::default(),
         camera: Camera {
             name: "front".into(),
             position: DVec3::new(0.70, 0.47, -0.30),

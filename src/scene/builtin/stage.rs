@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::scene::assemble::{Assembly, Mesh, MeshTriangle, is_degenerate};
 use crate::scene::material::TextureCache;
 use crate::scene::uv::box_projection;
-use crate::scene::{Camera, LoadOptions, Material, PointLight, Scene, check, obj};
+use crate::scene::{Camera, Lights, LoadOptions, Material, Scene, check, obj};
 
 /// A scene of solids in a room, complete except for the number of elements.
 pub(super) struct Stage {
@@ -23,7 +23,7 @@ pub(super) struct Stage {
     pub materials: Vec<Material>,
     /// With texture coordinates and materials.
     pub solids: Vec<Mesh>,
-    pub point_lights: Vec<PointLight>,
+    pub lights: Lights,
     pub camera: Camera,
 }
 
@@ -56,7 +56,7 @@ impl Stage {
             assembly.scene.notes.extend(solid.said.notes);
         }
         let scene = &mut assembly.scene;
-        scene.point_lights = self.point_lights;
+        scene.lights = self.lights;
         scene.cameras.push(self.camera);
         assert_eq!(
             scene.triangles.len(),

@@ -107,17 +107,18 @@ impl Reader<'_> {
         node: Option<&str>,
         at: DAffine3,
     ) {
-        let count = self.found.point_lights.len() + 1;
+        let count = self.found.lights.points.len() + 1;
         let name = node.or(light.name());
         let name = name.map_or_else(|| format!("light {count}"), str::to_owned);
         let warnings = &mut self.found.mesh.said.warnings;
         match light.kind() {
             Kind::Point => {
                 let strength = light.intensity() / LUMENS_OF_A_WATT;
-                self.found.point_lights.push(PointLight {
-                    name: free_name(name, self.found.point_lights.iter().map(|l| &l.name)),
+                self.found.lights.points.push(PointLight {
+                    name: free_name(name, self.found.lights.points.iter().map(|l| &l.name)),
                     position: at.translation,
                     intensity: light.color().map(|c| c * strength),
+                    beam: None,
                 });
                 if light.range().is_some() {
                     warnings.push(format!(

@@ -32,7 +32,7 @@ impl<'a> Shadows<'a> {
         };
         let surfaces: Vec<Surface> = (0..input.triangles.len()).map(surface).collect();
         let points =
-            (input.point_lights.iter()).map(|light| (light.position, luminance(light.intensity)));
+            (input.lights.points.iter()).map(|light| (light.position, luminance(light.intensity)));
         Some(Self {
             input,
             surroundings,

@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use super::*;
 use crate::mesh::elements::Elements;
 use crate::mesh::sources::{self, Grouping};
+use crate::scene::Lights;
 use crate::scene::shapes::Shapes;
 
 /// A closed room whose sources exchange light at random, so that all that is sent arrives.
@@ -36,7 +37,7 @@ fn room(white: f32, mixed: bool) -> Room {
         // So evenly that no element is cut into several sources.
         elements.emitted[e] = glam::Vec3::new(1.0, 2.0, 3.0) * (1 + e % 2) as f32;
     }
-    let (sources, _) = sources::build(&mut elements, &[], &Grouping::default(), 0);
+    let (sources, _) = sources::build(&mut elements, &Lights::NONE, &Grouping::default(), 0);
     let list = sources.list;
     let mut state = 1_u64;
     let mut random = || {
