@@ -16,9 +16,13 @@ shared! {
     FACES = 5;
     /// Most triangles of a meshlet.
     MESHLET_TRIANGLES = 64;
-    /// `Source::kind`: a group of elements; one of the two hemispheres about a point light.
+    /// `Source::kind`: a group of elements; one of the two hemispheres about a point light; a sun;
+    /// a part of the sky; a point light whose intensity depends on the direction.
     KIND_SURFACE = 0;
     KIND_POINT = 1;
+    KIND_SUN = 2;
+    KIND_SKY = 3;
+    KIND_BEAM = 4;
     /// Invocations of a workgroup of the passes with one invocation an element, source or pixel.
     GROUP = 64;
     /// Invocations of the one workgroup that selects sources.
@@ -40,6 +44,13 @@ shared! {
     SOURCE_EYES = 128;
     /// The first of those are its ends: where they are seen as its eye is, no silhouette cuts it.
     SOURCE_ENDS = 4;
+    /// Of the places on a light without a surface: those that an element asks first. Where these
+    /// agree, no edge cuts the light.
+    FIRST_EYES = 8;
+    /// Elements that an invocation surveys: they share what it loads of a direction.
+    SURVEY_ELEMENTS = 4;
+    /// Invocations that share the rays of an element that an edge cuts a light for.
+    LIGHT_LANES = 8;
     /// Bits of a listed element, and above them of the share of a source that it sees.
     LISTED_BITS = 25;
     SHARE_BITS = 7;

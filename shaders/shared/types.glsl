@@ -2,7 +2,8 @@
 
 #extension GL_EXT_scalar_block_layout : require
 
-// A group of neighbouring, nearly coplanar elements that shoots together, or half of a point light.
+// A group of neighbouring, nearly coplanar elements that shoots together, half of a point light, or
+// a light at an infinite distance: a sun, a part of the sky.
 struct Source {
     vec3 eye;          // what it sees from: a place on the group's surface, or the point light
     float area;
@@ -19,8 +20,8 @@ struct Source {
     uint first_contour;
     uint contour_count;
     uint component;    // the connected component it lies on
-    vec3 middle;       // centroid of the area
-    float facing;      // area that a far place in the direction of `normal` sees
+    vec3 middle;       // centroid of the area; of a far light the mean of its directions
+    float facing;      // area that a far place in the direction of `normal` sees; of a far light its solid angle / π
     float part_radius; // of the largest part's ball
     uint first_part;   // a curved source's members, a few put together
     uint part_count;

@@ -10,7 +10,7 @@ use super::elements::Elements;
 use super::near::{PartTree, first_met};
 use super::shadow_tree::ShadowTree;
 use super::sources::{Source, SourcePlace};
-use crate::constants::{KIND_POINT, SOURCE_EYES};
+use crate::constants::SOURCE_EYES;
 use crate::structs::ShadowOccluder;
 
 /// Directions that a place looks in, evenly by what a surface receives from them.
@@ -33,7 +33,7 @@ pub fn open_eyes(
     occluders: &ShadowTree<ShadowOccluder>,
 ) -> usize {
     let moved = sources.par_iter_mut().enumerate().map(|(turn, source)| {
-        if source.kind == KIND_POINT {
+        if !source.is_surface() {
             return 0;
         }
         let tree = PartTree::of(elements, source);

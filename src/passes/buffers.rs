@@ -51,6 +51,8 @@ pub struct SceneBuffers {
     /// Places on each source, `[source][SOURCE_EYES]`.
     pub eyes: Buffer,
     pub contours: Buffer,
+    /// Shares of the intensity of beams by angle.
+    pub webs: Buffer,
     pub meshlets: Buffer,
     pub components: Buffer,
     /// Form factors from near elements without and with a relief.
@@ -96,6 +98,7 @@ impl SceneBuffers {
             list,
             contours,
             parts,
+            webs,
         } = Outlined::new(&sources.list);
         let meshlets: Vec<Meshlet> =
             meshlets::build(elements, connections, occluders, &sources.chart)
@@ -128,6 +131,7 @@ impl SceneBuffers {
             sources: upload(device, "sources", &list, texels)?,
             eyes: upload(device, "eyes", &eyes(sources), texels)?,
             contours: upload(device, "contours", &contours, texels)?,
+            webs: upload(device, "webs", &webs, texels)?,
             meshlets: upload(device, "meshlets", &meshlets, storage)?,
             components: upload(device, "components", &components, storage)?,
             near_rows: NearBuffers::new(device, &near.rows)?,
@@ -212,6 +216,8 @@ struct Outlined {
     contours: Vec<[f32; 4]>,
     /// Centroid and sum of area times normal, eight words a part.
     parts: Vec<[f32; 8]>,
+    /// Of beams, `[row][column]` of each, to whole texels.
+    webs: Vec<f32>,
 }
 
 impl Outlined {
@@ -220,8 +226,15 @@ impl Outlined {
             list: Vec::with_capacity(sources.len()),
             contours: Vec::new(),
             parts: Vec::new(),
+            webs: Vec::new(),
         };
         for source in sources {
+            if let Some(web) = &source.web {
+                let (first, rows) = (outlined.webs.len() as u32, web.rows);
+                outlined.list.push(Source::beam(source, (first, web.columns), rows));
+                outlined.webs.extend(&web.shares);
+                continue;
+            }
             let corners = contour_corners(source);
             let outline = (outlined.contours.len() as u32, corners.len() as u32);
             let first_part = outlined.parts.len() as u32;
@@ -233,6 +246,8 @@ impl Outlined {
                 [x, y, z, u, v, w, 0.0, 0.0]
             }));
         }
+        let texels = outlined.webs.len().div_ceil(4);
+        outlined.webs.resize(4 * texels, 0.0);
         outlined
     }
 }

@@ -12,6 +12,7 @@ pub mod gather;
 pub mod item_buffer;
 pub mod keep;
 pub mod kept_rows;
+pub mod light_rows;
 pub mod measure;
 pub mod measure_relief;
 pub mod near_rows;

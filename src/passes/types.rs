@@ -41,6 +41,16 @@ impl Source {
     }
 }
 
+impl Source {
+    /// A beam, whose shares stand from `first` on in so many columns and rows.
+    pub fn beam(source: &sources::Source, (first, columns): (u32, u32), rows: u32) -> Self {
+        Self {
+            part_count: rows,
+            ..Self::new(source, (first, columns), 0)
+        }
+    }
+}
+
 /// A source's outline as the shader walks it: each loop's corners and its first once more; w is 1
 /// where a loop starts.
 pub fn contour_corners(source: &sources::Source) -> Vec<[f32; 4]> {

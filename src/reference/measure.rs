@@ -2,7 +2,6 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::constants::KIND_POINT;
 use crate::mesh::elements::Elements;
 use crate::mesh::sources::Source;
 
@@ -15,7 +14,7 @@ pub fn measure(
     irradiance: &[Vec3],
 ) -> Vec<DVec3> {
     let of_source = |source: &Source| {
-        if source.kind == KIND_POINT {
+        if !source.is_surface() {
             return DVec3::ZERO;
         }
         let range = source.members();

@@ -8,7 +8,6 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::constants::KIND_POINT;
 use crate::mesh::elements::Elements;
 use crate::mesh::sources::Source;
 use crate::passes::types::CouplingTarget;
@@ -47,7 +46,7 @@ impl Targets {
         let mut words = 0;
         let mut coloured = Vec::new();
         for (s, source) in sources.iter().enumerate() {
-            if source.kind == KIND_POINT || source.members().all(|e| even[e] == Vec3::ZERO) {
+            if !source.is_surface() || source.members().all(|e| even[e] == Vec3::ZERO) {
                 continue;
             }
             let Some(reflectance) = one_reflectance(source) else {

@@ -10,6 +10,7 @@ use crate::passes::buffers::SceneBuffers;
 use crate::passes::cull::Culling;
 use crate::passes::form_factors::{Care, FormFactors};
 use crate::passes::fresh_rows::FreshRows;
+use crate::passes::light_rows::LightRows;
 use crate::passes::near_rows::NearRows;
 use crate::passes::normalise::Normalise;
 use crate::vk::{Buffer, Commands, Device, Stage};
@@ -24,6 +25,7 @@ pub(super) enum Evaluate {
         normalise: Option<Normalise>,
     },
     Pixels(BinPixels),
+    Lights(LightRows),
 }
 
 impl Evaluate {
@@ -54,7 +56,7 @@ impl Evaluate {
     pub fn shares(&self) -> Option<&Buffer> {
         match self {
             Self::Receivers { normalise, .. } => Some(&normalise.as_ref()?.shares),
-            Self::Pixels(_) => None,
+            Self::Pixels(_) | Self::Lights(_) => None,
         }
     }
 
@@ -76,6 +78,7 @@ impl Evaluate {
                 }
             }
             Self::Pixels(bin) => bin.record(cmd),
+            Self::Lights(rows) => rows.record(cmd),
         }
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
     }

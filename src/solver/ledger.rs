@@ -5,10 +5,12 @@ use glam::{DVec3, Vec3};
 use super::Problem;
 use super::coupling::{CouplingRow, Targets};
 use super::gather::LitRow;
+use super::makers::RowKind;
 use super::near::Sent;
 use super::progress::Bound;
 use super::rows::looks_closer;
 use super::system::System;
+use crate::constants::KIND_SKY;
 use crate::passes::types::KeptRow;
 use crate::vk::Device;
 
@@ -23,17 +25,18 @@ pub(super) struct Ledger {
 /// Sources that are to be drawn, with the power that they have to send.
 pub(super) struct Candidates {
     pub powers: Vec<(u32, f64)>,
-    /// Whether they are strong emitters.
-    pub strong: bool,
+    /// Of all of them.
+    pub kind: RowKind,
 }
 
 /// What has been done with a source.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Drawn {
-    /// It emits strongly.
-    pub strong: bool,
+    pub kind: RowKind,
     /// Its elements have a relief.
     pub relief: bool,
+    /// It is a part of the sky.
+    pub is_sky: bool,
     pub under_way: bool,
     /// Times that it was drawn.
     pub times: u32,
@@ -76,8 +79,9 @@ impl Ledger {
         let mut system = System::new(targets, list, memory, bound.importance());
         let looks = looks_closer(device, &on.settings);
         let drawn = |(s, strong): (usize, bool)| Drawn {
-            strong: looks && strong,
+            kind: RowKind::new(&list[s], looks && strong),
             relief: on.sources.relief.contains(&s),
+            is_sky: list[s].kind == KIND_SKY,
             row: row(s),
             ..Drawn::default()
         };
@@ -104,10 +108,10 @@ impl Ledger {
         }
     }
 
-    /// Sources that are to be drawn, with their unshot power, and whether they are strong: the
-    /// strong emitters; after them all others, until little is left; and then what still emits.
+    /// Sources that are to be drawn, with their unshot power, of one kind: the
+    /// strong emitters, then other lights; after them all others, until little is left; and then what still emits.
     pub fn undrawn(&self) -> Option<Candidates> {
-        let (mut strong, mut emitting, mut others) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut first, mut emitting, mut others) = (Vec::new(), Vec::new(), Vec::new());
         let (mut missing, mut squared) = (0.0, 0.0);
         for (s, drawn) in self.sources.iter().enumerate() {
             if self.system.is_drawn(s) || drawn.under_way {
@@ -118,8 +122,8 @@ impl Ledger {
                 continue;
             }
             let candidate = (s as u32, power);
-            if drawn.strong {
-                strong.push(candidate);
+            if drawn.kind != RowKind::Common {
+                first.push((drawn.kind, candidate));
             } else if emitted > 0.0 {
                 emitting.push(candidate);
             } else {
@@ -128,10 +132,11 @@ impl Ledger {
                 others.push(candidate);
             }
         }
-        if !strong.is_empty() {
+        if let Some(kind) = first.iter().map(|(kind, _)| *kind).min() {
+            let of_kind = first.into_iter().filter(|(of, _)| *of == kind);
             return Some(Candidates {
-                powers: strong,
-                strong: true,
+                powers: of_kind.map(|(_, candidate)| candidate).collect(),
+                kind,
             });
         }
         let bound = self.bound;
@@ -142,7 +147,7 @@ impl Ledger {
         }
         (!powers.is_empty()).then_some(Candidates {
             powers,
-            strong: false,
+            kind: RowKind::Common,
         })
     }
 
@@ -163,11 +168,12 @@ impl Ledger {
             kept_back += power;
             owing.pop();
         }
-        let strong = owing.iter().any(|&(s, _)| self.sources[s as usize].strong);
-        owing.retain(|&(s, _)| self.sources[s as usize].strong == strong);
-        (!owing.is_empty()).then_some(Candidates {
+        let kind_of = |&(s, _): &(u32, f64)| self.sources[s as usize].kind;
+        let kind = owing.iter().map(kind_of).min()?;
+        owing.retain(|candidate| kind_of(candidate) == kind);
+        Some(Candidates {
             powers: owing,
-            strong,
+            kind,
         })
     }
 
@@ -223,11 +229,16 @@ impl Ledger {
         drawn.scale = Some(row.scale);
         drawn.emission_gathered |= self.system.emission_is_shot(s);
         drawn.directed |= drawn.relief && drawn.times > 1;
+        // Light of the sky counts as indirect.
+        let (emitted, reflected) = match drawn.is_sky {
+            true => (Vec3::ZERO, emitted + sent),
+            false => (emitted, sent),
+        };
         Some(LitRow {
             row,
             source: s as u32,
             emitted,
-            reflected: sent,
+            reflected,
         })
     }
 

@@ -2,7 +2,7 @@
 
 use super::drawing::Drawing;
 use super::{Problem, Solver};
-use crate::constants::{KIND_POINT, NONE};
+use crate::constants::NONE;
 use crate::error::Result;
 use crate::passes::batch::BatchSize;
 
@@ -23,7 +23,7 @@ impl Solver {
     pub fn source_of_triangles(&self) -> Vec<u32> {
         let mut of_element = vec![NONE; self.problem.elements.len()];
         for (s, source) in self.problem.sources.list.iter().enumerate().rev() {
-            if source.kind != KIND_POINT {
+            if source.is_surface() {
                 of_element[source.members()].fill(s as u32);
             }
         }

@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use super::rows::{Looks, RowMaker, RowParts, emitter_looks};
 use super::{Estimator, Problem};
+use crate::constants::KIND_BEAM;
 use crate::error::Result;
+use crate::mesh::sources::Source;
 use crate::passes::buffers::{SceneBuffers, upload};
 use crate::passes::fresh_rows::{FreshRows, RowShape};
 use crate::passes::kept_rows::KeptRows;
@@ -12,18 +14,43 @@ use crate::passes::occluder_tree::OccluderTree;
 use crate::passes::types::{CouplingTarget, MesoElement};
 use crate::vk::{BufferUse, Device};
 
+/// How the rows of a source are made.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum RowKind {
+    /// It emits strongly, and is looked at with more care.
+    Strong,
+    /// It is a sun or a part of the sky.
+    Far,
+    /// A light whose intensity depends on the direction.
+    Beam,
+    #[default]
+    Common,
+}
+
+impl RowKind {
+    /// `strong`: whether it emits strongly, and such are looked at with more care.
+    pub fn new(source: &Source, strong: bool) -> Self {
+        match source.kind {
+            KIND_BEAM => Self::Beam,
+            _ if source.is_far() => Self::Far,
+            _ if strong => Self::Strong,
+            _ => Self::Common,
+        }
+    }
+}
+
 /// Rows of a batch, of sources of one kind.
 #[derive(Debug, Clone)]
 pub(super) struct Batch {
     pub sources: Vec<u32>,
-    /// Whether they emit strongly, and are looked at with more care.
-    pub strong: bool,
+    pub kind: RowKind,
 }
 
 /// The row makers of a device.
 pub(super) struct Makers {
     pub all: RowMaker,
-    pub emitters: Option<RowMaker>,
+    /// Of other kinds.
+    others: Vec<(RowKind, RowMaker)>,
 }
 
 /// What the makers of every device are made from.
@@ -33,8 +60,8 @@ pub(super) struct TeamParts<'a> {
     pub targets: &'a [CouplingTarget],
     /// Elements with a relief.
     pub meso: &'a [MesoElement],
-    /// Whether strong emitters are to be drawn.
-    pub strong: bool,
+    /// Kinds of the sources that are to be drawn.
+    pub kinds: &'a [RowKind],
 }
 
 impl Makers {
@@ -65,22 +92,29 @@ impl Makers {
             occluders: occluders.as_ref(),
             kept,
         };
-        let looks = match parts.strong {
-            true => emitter_looks(device, settings),
-            false => None,
-        };
-        let emitters = looks.map(|looks| RowMaker::new(device, &row_parts, looks));
+        let mut others = Vec::new();
+        for kind in [RowKind::Strong, RowKind::Far, RowKind::Beam] {
+            let looks = match kind {
+                _ if !parts.kinds.contains(&kind) => None,
+                RowKind::Strong => emitter_looks(device, settings),
+                RowKind::Far => Some(Looks::Lights { beams: false }),
+                _ => Some(Looks::Lights { beams: true }),
+            };
+            if let Some(looks) = looks {
+                others.push((kind, RowMaker::new(device, &row_parts, looks)?));
+            }
+        }
         let all = RowMaker::new(device, &row_parts, Looks::Hemicubes(settings.hemicube))?;
-        Ok(Self {
-            all,
-            emitters: emitters.transpose()?,
-        })
+        Ok(Self { all, others })
     }
 
-    pub fn of(&mut self, strong: bool) -> &mut RowMaker {
-        match (&mut self.emitters, strong) {
-            (Some(emitters), true) => emitters,
-            _ => &mut self.all,
-        }
+    /// Whether it makes rows of a kind other than as those of all others.
+    pub fn has(&self, kind: RowKind) -> bool {
+        self.others.iter().any(|(of, _)| *of == kind)
+    }
+
+    pub fn of(&mut self, kind: RowKind) -> &mut RowMaker {
+        let other = self.others.iter_mut().find(|(of, _)| *of == kind);
+        other.map_or(&mut self.all, |(_, maker)| maker)
     }
 }

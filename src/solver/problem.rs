@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::{Estimator, Settings, Visibility};
-use crate::constants::{KIND_POINT, LISTED_BITS};
+use crate::constants::LISTED_BITS;
 use crate::error::{Error, Result};
 use crate::mesh::charts::Connections;
 use crate::mesh::elements::Elements;
@@ -13,7 +13,7 @@ use crate::mesh::near::NearPairs;
 use crate::mesh::occluders::Occluders;
 use crate::mesh::open_eyes::open_eyes;
 use crate::mesh::shadow_tree::ShadowTree;
-use crate::mesh::sources::{self, Sources};
+use crate::mesh::sources::{self, Source, Sources, far_power};
 use crate::passes::batch::Hemicubes;
 use crate::passes::buffers::{SceneBuffers, State};
 use crate::passes::relief_buffers::ReliefBuffers;
@@ -71,7 +71,7 @@ impl Problem {
             Some(_) => group(&mut elements, lights, settings, &grouped_by)?,
             None => sources::build(&mut elements, lights, &settings.grouping, settings.seed),
         };
-        let surfaces = sources.list.iter().filter(|s| s.kind != KIND_POINT).count();
+        let surfaces = sources.list.iter().filter(|s| s.is_surface()).count();
         if kept.is_some_and(|kept| kept.surfaces() != surfaces) {
             let what = "kept form factors are of other sources: bake again with --keep-visibility";
             return Err(Error::Usage(what.into()));
@@ -84,6 +84,7 @@ impl Problem {
             Estimator::Receiver => {
                 let tree = ShadowTree::new(occluders.casters(&elements, &connections));
                 open_eyes(&elements, &mut sources.list, &tree);
+                far_power(&elements, &mut sources.list, &tree);
                 let list = &sources.list;
                 let near = match kept {
                     Some(kept) => kept.near(&elements, list)?,
@@ -92,6 +93,10 @@ impl Problem {
                 (tree, near)
             }
             Estimator::Pixel => {
+                if sources.list.iter().any(Source::is_far) {
+                    let what = "suns, skies, spots and IES files need the `receiver` estimator";
+                    return Err(Error::Usage(what.into()));
+                }
                 let none = NearPairs::none(&elements, sources.list.len());
                 (ShadowTree::default(), none)
             }
@@ -138,13 +143,15 @@ impl Problem {
         self.elements.set_emission(scene);
         let mut sources = self.sources.clone();
         let relit = sources.relight(&self.elements, &scene.lights, self.settings.seed);
+        far_power(&self.elements, &mut sources.list, &self.occluder_tree);
         if relit.is_err() || sources.list.len() != self.sources.list.len() {
             self.elements.emitted = before;
             let other = || Error::Usage("another number of point lights: bake again".into());
             return Err(relit.err().unwrap_or_else(other));
         }
         let places = sources.list.iter().zip(&self.sources.list);
-        let moved = places.map(|(now, before)| now.eye != before.eye).collect();
+        let moved = places.map(|(now, before)| now.eye != before.eye || now.is_far());
+        let moved = moved.collect();
         self.sources = sources;
         self.scene.write_sources(device, &self.sources.list)?;
         Commands::run(device, "no light", |cmd| {

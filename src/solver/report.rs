@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
+use super::makers::RowKind;
 use super::rows::{Row, Stages, emitter_face};
 use super::{Estimator, Problem};
 use crate::meso::{Class, Relief, Transport};
@@ -254,7 +255,7 @@ impl Report {
     }
 
     /// Counts a row: of a strong emitter or not, drawn before or not.
-    pub(super) fn add(&mut self, row: &Row, area: f64, strong: bool, again: bool) {
+    pub(super) fn add(&mut self, row: &Row, area: f64, kind: RowKind, again: bool) {
         if let Some(share) = row.share.filter(|_| !again) {
             let sums = self.raw_sums.get_or_insert_default();
             sums.add(
@@ -267,7 +268,7 @@ impl Report {
         let [doubtful, silhouettes] = row.resolved;
         self.by_rays.doubtful += doubtful;
         self.by_rays.silhouettes += silhouettes;
-        self.add_drawn(&row.counts, strong);
+        self.add_drawn(&row.counts, kind == RowKind::Strong);
         self.drawn_again += u64::from(again);
         self.skipped.receivers_facing_away += u64::from(row.facing_away);
     }

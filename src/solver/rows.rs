@@ -18,6 +18,7 @@ use crate::passes::couple::Couple;
 use crate::passes::fresh_rows::FreshRows;
 use crate::passes::keep::Keep;
 use crate::passes::kept_rows::KeptRows;
+use crate::passes::light_rows::LightRows;
 use crate::passes::occluder_tree::OccluderTree;
 use crate::passes::types::{CouplingTarget, KeptRow, ReceiverList, Slot};
 use crate::vk::{Buffer, BufferUse, Commands, Device, Stage, Timestamps};
@@ -106,6 +107,8 @@ pub(super) enum Looks {
     /// Hemicubes of so many pixels a side.
     Hemicubes(u32),
     Rays,
+    /// Rays to lights without surfaces.
+    Lights { beams: bool },
 }
 
 /// Makes rows of the sources that it is asked for, two batches at a time.
@@ -145,13 +148,19 @@ impl RowMaker {
                 };
                 (Some(drawing), batch)
             }
-            Looks::Rays => {
+            Looks::Rays | Looks::Lights { .. } => {
                 let tree = parts.occluders.expect("rays have occluders").clone();
                 let sight = Sight::Rays(tree);
                 (None, Batch::new(device, fresh.slot_count, sight)?)
             }
         };
-        let evaluate = Evaluate::new(device, settings, scene, parts.meso, &batch, fresh)?;
+        let evaluate = match looks {
+            Looks::Lights { beams } => {
+                let rows = LightRows::new(device, scene, &batch, fresh, parts.meso, beams)?;
+                Evaluate::Lights(rows)
+            }
+            _ => Evaluate::new(device, settings, scene, parts.meso, &batch, fresh)?,
+        };
         let couple = Couple::new(device, scene, &batch, fresh, parts.targets)?;
         let keep = (parts.kept)
             .map(|kept| Keep::new(device, &batch.slots, batch.slot_count, fresh, kept))

@@ -5,7 +5,7 @@ use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::thread::{self, JoinHandle};
 
-use super::makers::{Batch, Makers, TeamParts};
+use super::makers::{Batch, Makers, RowKind, TeamParts};
 use super::rows::{FactorWords, Factors, Made, Row, Stages};
 
 use crate::error::{Error, Result};
@@ -66,13 +66,13 @@ impl Several {
         self.keeper.slots
     }
 
-    /// Whether each batch under way is of strong emitters.
-    pub fn under_way(&self) -> impl Iterator<Item = bool> {
-        self.under_way.iter().map(|batch| batch.strong)
+    /// The kind of each batch under way.
+    pub fn under_way(&self) -> impl Iterator<Item = RowKind> {
+        self.under_way.iter().map(|batch| batch.kind)
     }
 
     pub fn submit(&mut self, batch: Batch) {
-        let jobs = batch.sources.iter().map(|&source| (source, batch.strong));
+        let jobs = batch.sources.iter().map(|&source| (source, batch.kind));
         self.board.notes().wanted.extend(jobs);
         self.board.changed.notify_all();
         self.under_way.push_back(batch);
@@ -186,8 +186,8 @@ struct Board {
 
 #[derive(Default)]
 struct Notes {
-    /// Sources to be drawn, and whether they emit strongly.
-    wanted: VecDeque<(u32, bool)>,
+    /// Sources to be drawn.
+    wanted: VecDeque<(u32, RowKind)>,
     /// Sources that a worker takes at once, at most.
     share: usize,
     rows: HashMap<u32, Row>,
@@ -236,11 +236,11 @@ impl Board {
         while notes.wanted.is_empty() && !notes.closed && !busy {
             notes = self.wait(notes);
         }
-        let &(_, strong) = notes.wanted.front().filter(|_| !notes.closed)?;
-        let of_kind = notes.wanted.iter().take_while(|job| job.1 == strong);
+        let &(_, kind) = notes.wanted.front().filter(|_| !notes.closed)?;
+        let of_kind = notes.wanted.iter().take_while(|job| job.1 == kind);
         let count = of_kind.count().min(notes.share.max(1));
         let sources = notes.wanted.drain(..count).map(|job| job.0).collect();
-        Some(Batch { sources, strong })
+        Some(Batch { sources, kind })
     }
 }
 
@@ -288,21 +288,21 @@ fn work(board: &Board, makers: &mut Makers) -> Result<()> {
             let Some(mut batch) = board.claim(!under_way.is_empty()) else {
                 break;
             };
-            let maker = makers.of(batch.strong);
+            let maker = makers.of(batch.kind);
             // Only a device with little memory has fewer slots than its share.
             let more = batch
                 .sources
                 .split_off(batch.sources.len().min(maker.slots()));
             for source in more.into_iter().rev() {
-                board.notes().wanted.push_front((source, batch.strong));
+                board.notes().wanted.push_front((source, batch.kind));
             }
             maker.submit(&batch.sources)?;
-            under_way.push_back(batch.strong);
+            under_way.push_back(batch.kind);
         }
-        let Some(strong) = under_way.pop_front() else {
+        let Some(kind) = under_way.pop_front() else {
             return Ok(());
         };
-        if let Some(made) = makers.of(strong).take()? {
+        if let Some(made) = makers.of(kind).take()? {
             let mut notes = board.notes();
             notes.stages += made.stages;
             notes

@@ -15,7 +15,7 @@ use settling::MOST_TURNS;
 use super::coupling::CouplingRow;
 use super::gather::{Gathering, LitRow};
 use super::ledger::{Candidates, Drawn, Ledger};
-use super::makers::{Batch, TeamParts};
+use super::makers::{Batch, RowKind, TeamParts};
 use super::near::NearLight;
 use super::progress::{Bound, Watch};
 use super::rows::{Factors, Made};
@@ -23,7 +23,6 @@ use super::team::Team;
 use super::turns::Turns;
 use super::visibility::Visibility;
 use super::{DrawnBatch, Problem, Report, StopReason, VISIBILITY_MEMORY};
-use crate::constants::KIND_POINT;
 use crate::error::Result;
 use crate::passes::fresh_rows::RowShape;
 use crate::passes::kept_rows::{KeptRows, KeptSize};
@@ -93,7 +92,7 @@ impl Spine {
         if let Some(restored) = restored {
             kept.restore(device, restored.state(), restored.chunks())?;
         }
-        let not_lights = |s: usize| on.sources.list[s].kind != KIND_POINT;
+        let not_lights = |s: usize| on.sources.list[s].is_surface();
         let rows = |s: usize| restored?.row(s).filter(|_| not_lights(s));
         let coupling = |s, words| restored?.coupling(s, words);
         Ok(Self {
@@ -126,11 +125,12 @@ impl Spine {
         self.brought = true;
         self.ledger = Ledger::new(&self.devices[0], on, bound, |s| rows[s], coupling);
         // Other devices hold lights where they were, and those that were drawn first may have been
-        // all that emitted strongly.
-        let to_draw = |drawn: &Drawn| drawn.strong && drawn.row.is_none();
-        let strong = self.ledger.sources.iter().any(to_draw);
+        // all of their kind.
+        let kinds = self.kinds_to_draw();
+        let makes = |team: &Team, kind| kind == RowKind::Common || team.has(kind);
         let team = self.team.take();
-        self.team = team.filter(|team| team.is_alone() && (!strong || team.has_emitters()));
+        let fits = |team: &Team| team.is_alone() && kinds.iter().all(|&kind| makes(team, kind));
+        self.team = team.filter(fits);
         let kept: Vec<KeptRow> = self.ledger.sources.iter().filter_map(|d| d.row).collect();
         self.kept.forget(&self.devices[0], &dropped, &kept)
     }
@@ -264,20 +264,20 @@ impl Spine {
             Phase::First => self.ledger.undrawn(),
             Phase::Again => self.ledger.owing(),
         };
-        let Some(Candidates { powers, strong }) = candidates.filter(|_| left > 0) else {
+        let Some(Candidates { powers, kind }) = candidates.filter(|_| left > 0) else {
             return Ok(None);
         };
         let mut candidates = powers;
         let team = self.team(on)?;
-        if !team.has_room(strong) {
+        if !team.has_room(kind) {
             return Ok(None);
         }
         // Powers that differ by rounding alone are equal.
         let power = |(_, power): &(u32, f64)| *power as f32;
         candidates.sort_by(|a, b| power(b).total_cmp(&power(a)).then(a.0.cmp(&b.0)));
-        candidates.truncate(team.slots(strong).min(left));
+        candidates.truncate(team.slots(kind).min(left));
         let sources = candidates.into_iter().map(|(s, _)| s).collect();
-        Ok(Some(Batch { sources, strong }))
+        Ok(Some(Batch { sources, kind }))
     }
 
     /// Solves the system, keeps the rows of a batch, and gathers by those that find no room.
@@ -289,7 +289,7 @@ impl Spine {
             report.add(
                 &row,
                 on.sources.list[s].area,
-                self.ledger.sources[s].strong,
+                self.ledger.sources[s].kind,
                 self.ledger.sources[s].times > 0,
             );
             let Factors::Kept(place) = row.factors else {
@@ -357,7 +357,7 @@ impl Spine {
     pub fn draw_alone(&mut self, on: &Problem, sources: &[u32]) -> Result<DrawnBatch> {
         self.team(on)?.submit(Batch {
             sources: sources.to_vec(),
-            strong: false,
+            kind: RowKind::Common,
         })?;
         let Some(team) = &mut self.team else {
             unreachable!("it was made above")
@@ -371,8 +371,18 @@ impl Spine {
                 .map(|row| row.coupling.iter().map(|word| word * row.scale).collect())
                 .collect(),
             items: team.items()?,
-            slots: team.slots(false) as u32,
+            slots: team.slots(RowKind::Common) as u32,
         })
+    }
+
+    /// Kinds of the sources without a row.
+    fn kinds_to_draw(&self) -> Vec<RowKind> {
+        let without_row = |drawn: &&Drawn| drawn.row.is_none();
+        let undrawn = self.ledger.sources.iter().filter(without_row);
+        let mut kinds: Vec<RowKind> = undrawn.map(|drawn| drawn.kind).collect();
+        kinds.sort_unstable();
+        kinds.dedup();
+        kinds
     }
 
     /// The team, which is made when it is first asked for.
@@ -384,11 +394,12 @@ impl Spine {
                     Some(relief) => meso_elements(&on.elements, relief),
                     None => Vec::new(),
                 };
+                let kinds = self.kinds_to_draw();
                 let parts = TeamParts {
                     problem: on,
                     targets: &self.ledger.system.targets.list,
                     meso: &meso,
-                    strong: (self.ledger.sources.iter()).any(|d| d.strong && d.row.is_none()),
+                    kinds: &kinds,
                 };
                 Team::new(&self.devices, parts, &self.kept)?
             }

@@ -66,7 +66,7 @@ impl System {
                 KIND_POINT => std::f64::consts::TAU,
                 _ => source.area,
             },
-            is_surface: source.kind != KIND_POINT,
+            is_surface: source.is_surface(),
             drawn: false,
             row: None,
             emission_shot: false,

@@ -7,7 +7,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::makers::{Batch, Makers, TeamParts};
+use super::makers::{Batch, Makers, RowKind, TeamParts};
 use super::rows::Made;
 use super::several::Several;
 use crate::error::Result;
@@ -20,7 +20,7 @@ pub(super) enum Team {
     Alone {
         makers: Makers,
         /// The batches under way.
-        strong: VecDeque<bool>,
+        kinds: VecDeque<RowKind>,
     },
     Several(Several),
 }
@@ -31,7 +31,7 @@ impl Team {
         if let [device] = devices {
             return Ok(Self::Alone {
                 makers: Makers::new(device, parts, &parts.problem.scene, Some(kept))?,
-                strong: VecDeque::new(),
+                kinds: VecDeque::new(),
             });
         }
         Ok(Self::Several(Several::new(devices, parts, kept)?))
@@ -41,33 +41,33 @@ impl Team {
         matches!(self, Self::Alone { .. })
     }
 
-    /// Whether strong emitters are looked at with more care than all others.
-    pub fn has_emitters(&self) -> bool {
-        matches!(self, Self::Alone { makers, .. } if makers.emitters.is_some())
+    /// Whether rows of a kind are made other than those of all others.
+    pub fn has(&self, kind: RowKind) -> bool {
+        matches!(self, Self::Alone { makers, .. } if makers.has(kind))
     }
 
     /// Sources of a batch of one kind, at most.
-    pub fn slots(&mut self, strong: bool) -> usize {
+    pub fn slots(&mut self, kind: RowKind) -> usize {
         match self {
-            Self::Alone { makers, .. } => makers.of(strong).slots(),
+            Self::Alone { makers, .. } => makers.of(kind).slots(),
             Self::Several(several) => several.slots(),
         }
     }
 
     /// Whether another batch can begin: two may be under way, of one kind.
-    pub fn has_room(&self, strong: bool) -> bool {
-        let under_way: Vec<bool> = match self {
-            Self::Alone { strong, .. } => strong.iter().copied().collect(),
+    pub fn has_room(&self, kind: RowKind) -> bool {
+        let under_way: Vec<RowKind> = match self {
+            Self::Alone { kinds, .. } => kinds.iter().copied().collect(),
             Self::Several(several) => several.under_way().collect(),
         };
-        under_way.len() < SCRATCH as usize && under_way.iter().all(|&of| of == strong)
+        under_way.len() < SCRATCH as usize && under_way.iter().all(|&of| of == kind)
     }
 
     pub fn submit(&mut self, batch: Batch) -> Result<()> {
         match self {
-            Self::Alone { makers, strong } => {
-                makers.of(batch.strong).submit(&batch.sources)?;
-                strong.push_back(batch.strong);
+            Self::Alone { makers, kinds } => {
+                makers.of(batch.kind).submit(&batch.sources)?;
+                kinds.push_back(batch.kind);
             }
             Self::Several(several) => several.submit(batch),
         }
@@ -77,8 +77,8 @@ impl Team {
     /// The oldest batch under way, kept; none if there is none.
     pub fn take(&mut self, kept: &KeptRows) -> Result<Option<Made>> {
         match self {
-            Self::Alone { makers, strong } => match strong.pop_front() {
-                Some(strong) => makers.of(strong).take(),
+            Self::Alone { makers, kinds } => match kinds.pop_front() {
+                Some(kind) => makers.of(kind).take(),
                 None => Ok(None),
             },
             Self::Several(several) => several.take(kept),

@@ -11,7 +11,7 @@ use super::coupling::CouplingRow;
 use super::problem::GroupedBy;
 use super::{Problem, Settings};
 use crate::atomic_file::write_atomically;
-use crate::constants::{KIND_POINT, NONE};
+use crate::constants::NONE;
 use crate::error::{Error, Result};
 use crate::mesh::elements::Elements;
 use crate::mesh::near::NearPairs;
@@ -203,7 +203,7 @@ impl Visibility {
         };
         let mut chunks = kept.chunks;
         while chunks.pop_if(|chunk| chunk.is_empty()).is_some() {}
-        let surface = |source: &&Source| source.kind != KIND_POINT;
+        let surface = |source: &&Source| source.is_surface();
         let surfaces = problem.sources.list.iter().filter(surface).count();
         let mut lists = Lists {
             rows: kept.rows.iter().map(|row| row.unwrap_or(none)).collect(),

@@ -20,7 +20,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::constants::{KIND_POINT, NONE};
+use crate::constants::NONE;
 use crate::mesh::elements::Elements;
 use crate::mesh::shadow_tree::ShadowTree;
 use crate::mesh::sources::Source;
@@ -150,9 +150,9 @@ impl NearPairs {
             nearness: *nearness,
         };
         let found: Vec<OfSource> = (sources.par_iter())
-            .map(|source| match source.kind {
-                KIND_POINT => OfSource::default(),
-                _ => search.source(source, &receivers),
+            .map(|source| match source.is_surface() {
+                true => search.source(source, &receivers),
+                false => OfSource::default(),
             })
             .collect();
         let weights = weights(elements, sources, &found);

@@ -35,10 +35,7 @@ impl<'a> Outlook<'a> {
         sources: &'a [Source],
         occluders: &'a ShadowTree<ShadowOccluder>,
     ) -> Self {
-        let seen = |source: &Source| match source.kind {
-            KIND_POINT => None,
-            _ => Some(Seen::new(elements, source)),
-        };
+        let seen = |source: &Source| source.is_surface().then(|| Seen::new(elements, source));
         let seen: Vec<Option<Seen>> = sources.par_iter().map(seen).collect();
         let counts = seen.iter().flatten().map(|seen| seen.tree.part_count());
         Self {

@@ -11,6 +11,9 @@ use crate::mesh::elements::Elements;
 /// Turns the hemicube of each source about its axis by an angle of its own.
 pub(super) fn turn_frames(sources: &mut [Source], seed: u64) {
     for (i, source) in sources.iter_mut().enumerate() {
+        if source.is_far() {
+            continue;
+        }
         (source.tangent, source.bitangent) = turned_frame(source.normal, seed, i as u64);
     }
 }

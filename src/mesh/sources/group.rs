@@ -127,6 +127,7 @@ pub(super) fn group(
         radius: corners().map(|v| v.distance(centroid)).fold(0.0, f64::max),
         cone,
         emitted: emitted.as_vec3(),
+        web: None,
         first_element: range.start as u32,
         element_count: range.len() as u32,
         places: Vec::new(),

@@ -7,21 +7,26 @@
 
 mod cut;
 mod eyes;
+mod far;
 mod group;
 mod lit;
 mod single;
 
+use std::sync::Arc;
+
 use glam::{DVec3, Vec3};
 
-use crate::constants::KIND_POINT;
+use crate::constants::{KIND_POINT, KIND_SURFACE};
 use crate::error::{Error, Result};
 use crate::mesh::charts::Connections;
 use crate::mesh::contour::Loop;
 use crate::mesh::elements::Elements;
-use crate::scene::Lights;
+use crate::scene::{Lights, Web};
 use cut::{Limits, cut};
 pub(crate) use eyes::least_strong;
 use eyes::{move_eyes, turn_frames};
+use far::far;
+pub(crate) use far::far_power;
 use group::group;
 use lit::Lit;
 use single::{halves, part, point};
@@ -96,6 +101,8 @@ pub struct Source {
     /// Radiosity from emission; a point light's radiant intensity over the square of the internal
     /// unit.
     pub emitted: Vec3,
+    /// Of a beam: shares of its intensity about the frame of `normal`, `tangent`, `bitangent`.
+    pub web: Option<Arc<Web>>,
     /// Members: a range of elements.
     pub first_element: u32,
     pub element_count: u32,
@@ -123,7 +130,18 @@ pub struct Part {
 }
 
 impl Source {
-    /// Its elements; of a point light none.
+    /// Whether it has elements.
+    pub fn is_surface(&self) -> bool {
+        self.kind == KIND_SURFACE
+    }
+
+    /// Whether it is a light without a surface that is asked for by rays alone: a sun, a part of
+    /// the sky, a beam.
+    pub fn is_far(&self) -> bool {
+        !self.is_surface() && self.kind != KIND_POINT
+    }
+
+    /// Its elements; of a light without a surface none.
     pub fn members(&self) -> std::ops::Range<usize> {
         let first = self.first_element as usize;
         first..first + self.element_count as usize
@@ -134,6 +152,7 @@ impl Source {
         let sum = f64::from(self.emitted.element_sum());
         match self.kind {
             KIND_POINT => 2.0 * std::f64::consts::PI * sum,
+            // Of a far light and of a beam: what arrives, see [`far_power`].
             _ => self.area * sum,
         }
     }
@@ -158,7 +177,7 @@ impl Sources {
     /// # Errors
     /// An element emits that belongs to no source because it was black.
     pub fn relight(&mut self, elements: &Elements, lights: &Lights, seed: u64) -> Result<()> {
-        self.list.retain(|s| s.kind != KIND_POINT);
+        self.list.retain(Source::is_surface);
         let mut covered = vec![false; elements.len()];
         for source in &mut self.list {
             let members = source.members();
@@ -177,9 +196,7 @@ impl Sources {
                 elements.input_index[e]
             )));
         }
-        for light in &lights.points {
-            self.list.extend(point(light, elements));
-        }
+        add_lights(&mut self.list, lights, elements);
         turn_frames(&mut self.list, seed);
         Ok(())
     }
@@ -235,12 +252,17 @@ pub fn build(
         }
     }
     sources.relief = plain.unwrap_or(sources.list.len())..sources.list.len();
-    for light in &lights.points {
-        sources.list.extend(point(light, elements));
-    }
+    add_lights(&mut sources.list, lights, elements);
     turn_frames(&mut sources.list, seed);
     move_eyes(&mut sources.list, elements, &limits, seed);
     (sources, connections)
+}
+
+fn add_lights(list: &mut Vec<Source>, lights: &Lights, elements: &Elements) {
+    for light in lights.points.iter().filter(|light| light.beam.is_none()) {
+        list.extend(point(light, elements));
+    }
+    list.extend(far(lights, elements));
 }
 
 pub(crate) fn triangle_area([a, b, c]: [DVec3; 3]) -> f64 {

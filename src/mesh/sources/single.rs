@@ -32,6 +32,7 @@ pub(super) fn part(
             .fold(0.0, f64::max),
         cone: 0.0,
         emitted: elements.emitted[e],
+        web: None,
         first_element: e as u32,
         element_count: 1,
         places: Vec::new(),
@@ -67,6 +68,7 @@ pub(super) fn point(light: &PointLight, elements: &Elements) -> [Source; 2] {
         emitted: (DVec3::from_array(light.intensity.map(f64::from))
             / (elements.unit * elements.unit))
             .as_vec3(),
+        web: None,
         first_element: 0,
         element_count: 0,
         places: Vec::new(),

@@ -5,7 +5,6 @@ use std::time::Instant;
 use glam::DVec3;
 
 use super::{MOST_SWEEPS, Spine, UNSOLVED};
-use crate::constants::KIND_POINT;
 use crate::error::Result;
 use crate::mesh::sources::Source;
 use crate::solver::{Problem, Report};
@@ -44,9 +43,9 @@ impl Spine {
 
     /// What the sources reflect of light from near ones, `[source]`.
     pub(super) fn reflected_near(&self, on: &Problem) -> Vec<DVec3> {
-        let of = |source: &Source| match source.kind {
-            KIND_POINT => DVec3::ZERO,
-            _ => self.near.reflected(on, source),
+        let of = |source: &Source| match source.is_surface() {
+            true => self.near.reflected(on, source),
+            false => DVec3::ZERO,
         };
         on.sources.list.iter().map(of).collect()
     }
