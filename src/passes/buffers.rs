@@ -129,7 +129,7 @@ impl SceneBuffers {
             weights: upload(device, "weights", &weights, storage)?,
             reflectance: upload(device, "reflectance", &reflectance, storage)?,
             sources: upload(device, "sources", &list, texels)?,
-            eyes: upload(device, "eyes", &eyes(sources), texels)?,
+            eyes: upload(device, "eyes", &eyes(&sources.list), texels)?,
             contours: upload(device, "contours", &contours, texels)?,
             webs: upload(device, "webs", &webs, texels)?,
             meshlets: upload(device, "meshlets", &meshlets, storage)?,
@@ -143,12 +143,18 @@ impl SceneBuffers {
 impl SceneBuffers {
     /// Other light of the same sources, and other places of point lights.
     pub fn write_sources(&self, device: &Arc<Device>, sources: &[sources::Source]) -> Result<()> {
-        write(device, &self.sources, &Outlined::new(sources).list)
+        let Outlined { list, webs, .. } = Outlined::new(sources);
+        write(device, &self.sources, &list)?;
+        if sources.iter().any(sources::Source::is_far) {
+            write(device, &self.eyes, &eyes(sources))?;
+            write(device, &self.webs, &webs)?;
+        }
+        Ok(())
     }
 }
 
 /// Places on each source, with the packed normals of curved ones, `[source][SOURCE_EYES]`.
-fn eyes(sources: &Sources) -> Vec<[f32; 4]> {
+fn eyes(sources: &[sources::Source]) -> Vec<[f32; 4]> {
     let of_source = |source: &sources::Source| {
         let texel = |k| {
             // A point light sees from one place, and so does a source whose light is not cut.
@@ -161,7 +167,7 @@ fn eyes(sources: &Sources) -> Vec<[f32; 4]> {
         };
         (0..SOURCE_EYES as usize).map(texel).collect::<Vec<_>>()
     };
-    sources.list.iter().flat_map(of_source).collect()
+    sources.iter().flat_map(of_source).collect()
 }
 
 /// The bits of a vector with components from -1 to 1, as `unpackSnorm4x8` reads them.
@@ -231,7 +237,9 @@ impl Outlined {
         for source in sources {
             if let Some(web) = &source.web {
                 let (first, rows) = (outlined.webs.len() as u32, web.rows);
-                outlined.list.push(Source::beam(source, (first, web.columns), rows));
+                outlined
+                    .list
+                    .push(Source::beam(source, (first, web.columns), rows));
                 outlined.webs.extend(&web.shares);
                 continue;
             }

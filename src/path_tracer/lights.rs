@@ -7,7 +7,8 @@ use glam::{DVec2, DVec3, Vec3};
 use super::geometry::{ABOVE, Geometry, Hit};
 use super::sampling::{Choice, on_triangle};
 use crate::picture::tone::luminance;
-use crate::scene::Scene;
+use crate::scene::sky::Sky;
+use crate::scene::{Beam, Scene};
 
 /// Emitters by power and point lights by intensity.
 pub struct Lights {
@@ -18,6 +19,9 @@ pub struct Lights {
     emitter_of: Vec<u32>,
     points: Choice,
     point_lights: Vec<Point>,
+    suns: Choice,
+    sun_discs: Vec<Disc>,
+    sky: Option<Sky>,
 }
 
 struct Emitter {
@@ -31,6 +35,15 @@ struct Point {
     place: DVec3,
     /// Irradiance at one internal unit.
     intensity: DVec3,
+    beam: Option<Beam>,
+}
+
+struct Disc {
+    towards: DVec3,
+    /// Sine of half the angle that it is seen under.
+    sine: f64,
+    /// Of a surface that faces its middle.
+    irradiance: DVec3,
 }
 
 /// Where a light path begins, internal units.
@@ -69,6 +82,14 @@ impl Lights {
             .map(|light| Point {
                 place: geometry.inside(light.position),
                 intensity: Vec3::from_array(light.intensity).as_dvec3() / geometry.unit.powi(2),
+                beam: light.beam.clone(),
+            })
+            .collect();
+        let sun_discs: Vec<_> = (scene.lights.suns.iter())
+            .map(|sun| Disc {
+                towards: sun.towards,
+                sine: (0.5 * sun.angle.to_radians()).sin(),
+                irradiance: Vec3::from_array(sun.irradiance).as_dvec3(),
             })
             .collect();
         let bright = |colour: DVec3| f64::from(luminance(colour.as_vec3().to_array()));
@@ -78,7 +99,16 @@ impl Lights {
             emitter_of,
             points: Choice::new(point_lights.iter().map(|p| bright(p.intensity))),
             point_lights,
+            suns: Choice::new(sun_discs.iter().map(|sun| bright(sun.irradiance))),
+            sun_discs,
+            sky: scene.lights.sky.clone(),
         }
+    }
+
+    /// Radiance of the sky from a direction.
+    pub fn sky(&self, direction: DVec3) -> DVec3 {
+        let sky = self.sky.as_ref();
+        sky.map_or(DVec3::ZERO, |sky| sky.radiance(direction))
     }
 
     /// The start of a light path, chosen by power among emitters and point lights; None where
@@ -121,7 +151,7 @@ impl Lights {
         }
     }
 
-    /// One sample of the irradiance at `place` from point lights, and of that from emitters
+    /// One sample of the irradiance at `place` from point lights and suns, and of that from emitters
     /// weighted by the balance heuristic (Veach 1997) against sampling directions with density cos
     /// θ / π.
     pub fn sample(
@@ -139,7 +169,21 @@ impl Lights {
             let to = light.place - place;
             let cosine = normal.dot(to.normalize_or_zero());
             if cosine > 0.0 && geometry.sees(above, light.place) {
-                sum += light.intensity * (cosine / (to.length_squared() * probability));
+                let share = light.beam.as_ref().map_or(1.0, |beam| beam.share(-to));
+                sum += light.intensity * (share * cosine / (to.length_squared() * probability));
+            }
+        }
+        if let Some((index, probability)) = self.suns.choose(choices.1) {
+            // Even over the disc's projection.
+            let sun = &self.sun_discs[index];
+            let (x, y) = sun.towards.any_orthonormal_pair();
+            let radius = sun.sine * at.x.sqrt();
+            let (sin, cos) = (2.0 * PI * at.y).sin_cos();
+            let middle = (1.0 - radius * radius).sqrt();
+            let to = middle * sun.towards + radius * (cos * x + sin * y);
+            let cosine = normal.dot(to);
+            if cosine > 0.0 && geometry.hit(above, to).is_none() {
+                sum += sun.irradiance * (cosine / probability);
             }
         }
         if let Some((index, probability)) = self.areas.choose(choices.1) {

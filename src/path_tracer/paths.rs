@@ -63,6 +63,10 @@ impl PathTracer<'_> {
             // Continue in a direction of density cos θ / π
             let direction = cosine_direction(normal, random.square());
             let Some(hit) = self.geometry.hit(place + ABOVE * normal, direction) else {
+                // The sky counts as indirect light.
+                if light != Light::Direct {
+                    sum += carried * PI * self.lights.sky(direction);
+                }
                 break;
             };
             if !hit.front {

@@ -1,6 +1,7 @@
 //! Light points that represent emitters and point lights where their light is drawn sharply, and
 //! the shadow casters.
 
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -16,7 +17,7 @@ use crate::mesh::sources::triangle_area;
 use crate::passes::shadow_rays::LightBuffers;
 use crate::passes::types::{LightPoint, ShadowTriangle};
 use crate::picture::Projection;
-use crate::scene::Scene;
+use crate::scene::{Scene, Sun};
 use crate::vk::Device;
 
 /// A light point in scene units.
@@ -28,22 +29,87 @@ struct Shining {
     strength: DVec3,
 }
 
+/// A triangle that emits.
+struct Emitter {
+    corners: [DVec3; 3],
+    radiance: DVec3,
+    /// Its area over its power.
+    area_of_power: f64,
+    /// Power of it and of all before it.
+    whole: f64,
+}
+
+/// Distance of what stands for suns, in sizes of the scene: shadows of places a size apart then
+/// turn by a tenth of a millirad, a hundredth of the sun's own angle.
+const FAR: f64 = 1e4;
+
+pub(super) fn sun_distance(scene: &Scene) -> f64 {
+    let (low, high) = scene.bounds();
+    FAR * low.distance(high)
+}
+
+/// Triangles in place of a sun, which face the scene, scene units; of one without a size as small
+/// ones as make a sharp shadow.
+pub(super) fn sun_disc(scene: &Scene, sun: &Sun) -> Vec<[DVec3; 3]> {
+    const SIDES: u32 = 24;
+    let (low, high) = scene.bounds();
+    let distance = sun_distance(scene);
+    let middle = low.midpoint(high) + distance * sun.towards;
+    let radius = distance * (0.5 * sun.angle.to_radians()).sin().max(1e-6);
+    let (x, y) = (-sun.towards).any_orthonormal_pair();
+    let corner = |i: u32| {
+        let angle = std::f64::consts::TAU * f64::from(i) / f64::from(SIDES);
+        middle + radius * (angle.cos() * x + angle.sin() * y)
+    };
+    (0..SIDES)
+        .map(|i| [middle, corner(i), corner(i + 1)])
+        .collect()
+}
+
 /// LIGHT_SETS sets of LIGHT_POINTS points on the emitters, distributed by power, if there are
 /// emitters; then the point lights.
 fn shining(scene: &Scene) -> Vec<Shining> {
     let mut whole = 0.0;
     // Each with the cumulative power up to and including it.
-    let emitters: Vec<(usize, DVec3, f64)> = scene
-        .triangles
-        .iter()
-        .enumerate()
-        .filter_map(|(e, t)| {
-            let emitted = DVec3::from(scene.materials[t.material as usize].ke.map(f64::from));
-            let power = emitted.element_sum() * triangle_area(scene.corners(t));
+    let mut emitters: Vec<Emitter> = Vec::new();
+    let mut area = 0.0;
+    for t in &scene.triangles {
+        let corners = scene.corners(t);
+        let radiance = DVec3::from(scene.materials[t.material as usize].ke.map(f64::from));
+        let of_triangle = triangle_area(corners);
+        let power = radiance.element_sum() * of_triangle;
+        area += of_triangle;
+        if power > 0.0 {
             whole += power;
-            (power > 0.0).then_some((e, emitted, whole))
-        })
-        .collect();
+            emitters.push(Emitter {
+                corners,
+                radiance,
+                area_of_power: 1.0 / radiance.element_sum(),
+                whole,
+            });
+        }
+    }
+    for sun in &scene.lights.suns {
+        let discs = sun_disc(scene, sun);
+        let irradiance = DVec3::from(sun.irradiance.map(f64::from));
+        // What arrives, over π as the power of the others: a convex body's shadow is a quarter of
+        // its area in the mean.
+        let power = irradiance.element_sum() * area / (4.0 * PI * discs.len() as f64);
+        let square = discs
+            .iter()
+            .map(|&corners| triangle_area(corners))
+            .sum::<f64>();
+        let distance = sun_distance(scene);
+        for corners in discs.into_iter().filter(|_| power > 0.0) {
+            whole += power;
+            emitters.push(Emitter {
+                corners,
+                radiance: irradiance * (distance * distance / square),
+                area_of_power: triangle_area(corners) / power,
+                whole,
+            });
+        }
+    }
     let share = whole / f64::from(LIGHT_POINTS);
     let mut points = Vec::new();
     // Number of points that each emitter has so far: those of the next set fall between them.
@@ -52,20 +118,21 @@ fn shining(scene: &Scene) -> Vec<Shining> {
         let (set, i_in_set) = (i / LIGHT_POINTS, i % LIGHT_POINTS);
         let in_share = (f64::from(set) + 0.5) / f64::from(LIGHT_SETS);
         let at = (f64::from(i_in_set) + in_share) * share;
-        let place = emitters.partition_point(|e| e.2 < at);
+        let place = emitters.partition_point(|e| e.whole < at);
         let place = place.min(emitters.len().saturating_sub(1));
-        let Some(&(e, emitted, _)) = emitters.get(place) else {
+        let Some(emitter) = emitters.get(place) else {
             break;
         };
-        let corners = scene.corners(&scene.triangles[e]);
+        let corners = emitter.corners;
         let [a, b, c] = corners;
+        let of_point = share * emitter.area_of_power;
         let position = spread(corners, taken[place]);
         taken[place] += 1;
         points.push(Shining {
             position,
             normal: Some((b - a).cross(c - a).normalize_or_zero()),
-            area: share / emitted.element_sum(),
-            strength: emitted * (share / emitted.element_sum()),
+            area: of_point,
+            strength: emitter.radiance * of_point,
         });
     }
     points.extend(scene.lights.points.iter().map(|light| Shining {

@@ -6,6 +6,7 @@
 
 use glam::{DVec3, Vec3};
 
+use super::lights::sun_disc;
 use crate::mesh::shadow_tree::ShadowTree;
 use crate::passes::types::{LitTriangle, ShadowTriangle};
 use crate::picture::Projection;
@@ -61,6 +62,14 @@ impl Shafts {
         lamps.extend(scene.lights.points.iter().map(|light| Lamp {
             ends: vec![seen(light.position)],
             plane: None,
+        }));
+        lamps.extend(scene.lights.suns.iter().map(|sun| {
+            Lamp {
+                ends: (sun_disc(scene, sun).iter().flatten())
+                    .map(|&corner| seen(corner))
+                    .collect(),
+                plane: None,
+            }
         }));
         if lamps.len() > MOST_LAMPS {
             lamps.clear();

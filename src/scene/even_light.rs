@@ -6,6 +6,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 
 use crate::math::form_factor::spread_in_triangle;
+use crate::scene::Lights;
 use crate::scene::maps::LUMINANCE;
 
 /// A triangle that emits and reflects, luminances.
@@ -37,10 +38,11 @@ pub(crate) struct EvenLight {
 
 impl EvenLight {
     /// By so many places on the emitters, and as many on all surfaces; point lights by position and
-    /// intensity. None where nothing emits.
+    /// intensity; far lights as [`far_lights`] gives them. None where nothing emits.
     pub fn new(
         surfaces: &[Surface],
         points: impl Iterator<Item = (DVec3, f64)>,
+        far: &[(DVec3, f64)],
         count: usize,
     ) -> Option<Self> {
         let areas: Vec<f64> = surfaces.iter().map(|s| area(s.corners)).collect();
@@ -59,7 +61,22 @@ impl EvenLight {
         });
         let mut places: Vec<LightPlace> = points.filter(|place| place.power > 0.0).collect();
         let of_points: f64 = places.iter().map(|place| 4.0 * place.power).sum();
-        let power = of_points + emitted.iter().sum::<f64>();
+        // A convex body's shadow is a quarter of its area in the mean.
+        let of_far: f64 = far
+            .iter()
+            .map(|(_, irradiance)| 0.25 * total * irradiance)
+            .sum();
+        let corners = || surfaces.iter().flat_map(|surface| surface.corners);
+        let low = corners().fold(DVec3::INFINITY, DVec3::min);
+        let high = corners().fold(DVec3::NEG_INFINITY, DVec3::max);
+        let distance = FAR * low.distance(high);
+        places.extend(far.iter().map(|(towards, irradiance)| LightPlace {
+            position: low.midpoint(high) + distance * *towards,
+            normal: None,
+            power: PI * irradiance * distance * distance,
+            area: 0.0,
+        }));
+        let power = of_points + of_far + emitted.iter().sum::<f64>();
         if power == 0.0 {
             return None;
         }
@@ -94,6 +111,36 @@ impl LightPlace {
             None => self.power * height / (PI * square * square.sqrt()),
         }
     }
+}
+
+/// Distance of what stands for far lights, in sizes of the scene.
+const FAR: f64 = 1e4;
+
+/// Directions of the whole sphere by which a sky is foreseen.
+const SKY_DIRECTIONS: usize = 32;
+
+/// Unit direction and irradiance, as luminance, of the suns and of directions of the sky.
+pub(crate) fn far_lights(lights: &Lights) -> Vec<(DVec3, f64)> {
+    let suns = lights.suns.iter();
+    let mut far: Vec<(DVec3, f64)> = suns
+        .map(|sun| (sun.towards, luminance(sun.irradiance)))
+        .collect();
+    if let Some(sky) = &lights.sky {
+        let share = 4.0 * PI / SKY_DIRECTIONS as f64;
+        for i in 0..SKY_DIRECTIONS {
+            // Even on the sphere: Fibonacci's spiral.
+            let z = 1.0 - (2.0 * i as f64 + 1.0) / SKY_DIRECTIONS as f64;
+            let angle = 2.399_963_23 * i as f64;
+            let around = (1.0 - z * z).sqrt();
+            let towards = DVec3::new(around * angle.cos(), z, around * angle.sin());
+            far.push((
+                towards,
+                share * luminance(sky.radiance(towards).as_vec3().to_array()),
+            ));
+        }
+    }
+    far.retain(|(_, irradiance)| *irradiance > 0.0);
+    far
 }
 
 pub(crate) fn luminance(colour: [f32; 3]) -> f64 {

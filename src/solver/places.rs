@@ -20,9 +20,9 @@ pub struct Place {
 /// Irradiance at a place, W·m⁻², RGB.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct LightAt {
-    /// Straight from emitters and point lights.
+    /// Straight from emitters, point lights and suns.
     pub direct: Vec3,
-    /// After one reflection and more.
+    /// From the sky, and after one reflection and more.
     pub indirect: Vec3,
 }
 
@@ -78,6 +78,12 @@ impl Solver {
             outlook.points(p, place.normal, |s, share| {
                 direct += share * on.sources.list[s].emitted.as_dvec3();
             });
+            outlook.far(p, place.normal, |s, share| {
+                direct += share * on.sources.list[s].emitted.as_dvec3();
+            });
+            if let Some(sky) = &on.sky {
+                indirect += outlook.sky(sky, p, place.normal);
+            }
             LightAt {
                 direct: direct.as_vec3(),
                 indirect: indirect.max(DVec3::ZERO).as_vec3(),

@@ -18,6 +18,7 @@ use crate::passes::batch::Hemicubes;
 use crate::passes::buffers::{SceneBuffers, State};
 use crate::passes::relief_buffers::ReliefBuffers;
 use crate::passes::types::ShadowOccluder;
+use crate::scene::sky::Sky;
 use crate::scene::{Lights, Scene};
 use crate::vk::{Commands, Device};
 
@@ -45,6 +46,7 @@ pub struct Problem {
     /// Sources of a batch.
     pub(super) slots: u32,
     pub(super) grouped_by: GroupedBy,
+    pub(super) sky: Option<Sky>,
 }
 
 impl Problem {
@@ -126,6 +128,7 @@ impl Problem {
             relief,
             slots,
             grouped_by,
+            sky: lights.sky.clone(),
         })
     }
 
@@ -144,15 +147,24 @@ impl Problem {
         let mut sources = self.sources.clone();
         let relit = sources.relight(&self.elements, &scene.lights, self.settings.seed);
         far_power(&self.elements, &mut sources.list, &self.occluder_tree);
-        if relit.is_err() || sources.list.len() != self.sources.list.len() {
+        let shares = |sources: &Sources| -> usize {
+            let webs = sources.list.iter().filter_map(|source| source.web.as_ref());
+            webs.map(|web| web.shares.len()).sum()
+        };
+        let alike = sources.list.len() == self.sources.list.len()
+            && shares(&sources) == shares(&self.sources);
+        if relit.is_err() || !alike {
             self.elements.emitted = before;
-            let other = || Error::Usage("another number of point lights: bake again".into());
+            let other = || {
+                Error::Usage("another number of lights, or of parts of the sky: bake again".into())
+            };
             return Err(relit.err().unwrap_or_else(other));
         }
         let places = sources.list.iter().zip(&self.sources.list);
         let moved = places.map(|(now, before)| now.eye != before.eye || now.is_far());
         let moved = moved.collect();
         self.sources = sources;
+        self.sky = scene.lights.sky.clone();
         self.scene.write_sources(device, &self.sources.list)?;
         Commands::run(device, "no light", |cmd| {
             self.state.buffers().for_each(|buffer| cmd.fill(buffer, 0));

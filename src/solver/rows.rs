@@ -108,7 +108,9 @@ pub(super) enum Looks {
     Hemicubes(u32),
     Rays,
     /// Rays to lights without surfaces.
-    Lights { beams: bool },
+    Lights {
+        beams: bool,
+    },
 }
 
 /// Makes rows of the sources that it is asked for, two batches at a time.

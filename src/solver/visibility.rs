@@ -19,6 +19,7 @@ use crate::mesh::sources::Source;
 use crate::meso::Transport;
 use crate::passes::kept_rows::RestoredSize;
 use crate::passes::types::{KeptRow, KeptState};
+use crate::scene::even_light::far_lights;
 use crate::scene::{Lights, PointLight, Scene, Sun};
 
 /// Form factors of the sources of a scene that had been drawn, for the same scene with other
@@ -47,9 +48,9 @@ struct Header {
     emitted: Vec<[f32; 3]>,
     /// Position and radiant intensity of the point lights then.
     lights: Vec<([f64; 3], [f32; 3])>,
-    /// Direction and irradiance of the suns then.
+    /// Direction and irradiance of the far lights then.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    suns: Vec<([f64; 3], [f32; 3])>,
+    far: Vec<([f64; 3], f64)>,
     /// Sources that are no point lights.
     surfaces: usize,
     chunk_words: u32,
@@ -224,8 +225,8 @@ impl Visibility {
             lights: (lights.points.iter())
                 .map(|l| (l.position.to_array(), l.intensity))
                 .collect(),
-            suns: (lights.suns.iter())
-                .map(|l| (l.towards.to_array(), l.irradiance))
+            far: (far_lights(lights).into_iter())
+                .map(|(towards, irradiance)| (towards.to_array(), irradiance))
                 .collect(),
             surfaces,
             chunk_words: kept.chunk_words,
@@ -311,14 +312,15 @@ impl Visibility {
             intensity,
             beam: None,
         };
-        let sun = |&(towards, irradiance): &([f64; 3], [f32; 3])| Sun {
+        // All of them as suns: they only say how evenly groups were lit.
+        let sun = |&(towards, irradiance): &([f64; 3], f64)| Sun {
             name: String::new(),
             towards: towards.into(),
-            irradiance,
+            irradiance: [irradiance as f32; 3],
             angle: 0.0,
         };
         let lights = self.header.lights.iter().map(light);
-        let suns = self.header.suns.iter().map(sun);
+        let suns = self.header.far.iter().map(sun);
         GroupedBy {
             emitted: self
                 .header

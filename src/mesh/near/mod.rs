@@ -13,6 +13,7 @@ mod places;
 mod rays;
 mod receivers;
 mod seen;
+mod sky_seen;
 #[cfg(test)]
 mod tests;
 

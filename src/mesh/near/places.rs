@@ -7,11 +7,13 @@ use super::pair::Search;
 use super::parts::Part;
 use super::rays::blocked;
 use super::seen::Seen;
+use super::sky_seen::sky_seen;
 use super::{Nearness, PartTree};
-use crate::constants::KIND_POINT;
+use crate::constants::{KIND_BEAM, KIND_POINT, KIND_SUN};
 use crate::mesh::elements::Elements;
 use crate::mesh::shadow_tree::ShadowTree;
 use crate::mesh::sources::Source;
+use crate::scene::sky::Sky;
 use crate::structs::ShadowOccluder;
 
 /// Of the view of a place: the share that a part fills at most, unless it is one member.
@@ -78,6 +80,34 @@ impl<'a> Outlook<'a> {
                 self.search.seen_from(place, normal, seen, factors, part);
             }
         }
+    }
+
+    /// Each sun and beam that a place sees any of: source, and form factor, or of a beam irradiance
+    /// for a unit of intensity.
+    pub fn far(&self, place: DVec3, normal: DVec3, mut each: impl FnMut(usize, f64)) {
+        for (s, source) in self.sources.iter().enumerate() {
+            if source.kind != KIND_SUN && source.kind != KIND_BEAM {
+                continue;
+            }
+            let count = source.places.len().max(1);
+            let along = |i: usize| {
+                let way = source.way_from(place, i);
+                let factor = source.factor_along(way, normal);
+                match factor > 0.0 && !blocked(self.search.occluders, place, place + way) {
+                    true => factor,
+                    false => 0.0,
+                }
+            };
+            let factor = (0..count).map(along).sum::<f64>() / count as f64;
+            if factor > 0.0 {
+                each(s, factor);
+            }
+        }
+    }
+
+    /// Irradiance by what a place sees of a sky.
+    pub fn sky(&self, sky: &Sky, place: DVec3, normal: DVec3) -> DVec3 {
+        sky_seen(sky, self.search.occluders, place, normal)
     }
 
     /// Each point light that a place sees: source, and irradiance for a unit of intensity.

@@ -96,7 +96,12 @@ fn sky(sky: &Sky) -> Vec<Source> {
         } else if lit.light > 0.0 {
             let size = part.solid_angle() / PI;
             let radiosity = PI * lit.radiance;
-            sources.push(source(KIND_SKY, lit.directions(&part, sky), size, radiosity));
+            sources.push(source(
+                KIND_SKY,
+                lit.directions(&part, sky),
+                size,
+                radiosity,
+            ));
         }
     }
     sources
@@ -129,22 +134,25 @@ pub(crate) fn far_power(
             places.push((a + v * (b - a) + w * (c - a), elements.normal[e]));
         }
     }
-    sources.par_iter_mut().filter(|s| s.is_far()).for_each(|source| {
-        let arrives = |(i, &(place, normal)): (usize, &(DVec3, DVec3))| {
-            let way = source.way_from(place, i % SOURCE_EYES as usize);
-            let factor = source.factor_along(way, normal);
-            match factor > 0.0 && !blocked(occluders, place, place + way) {
-                true => factor,
-                false => 0.0,
-            }
-        };
-        let share = places.iter().enumerate().map(arrives).sum::<f64>() / PLACES as f64;
-        let all = match source.kind {
-            KIND_BEAM => 4.0 * PI / whole,
-            _ => source.facing,
-        };
-        source.area = whole * share.max(LEAST_SHARE * all);
-    });
+    sources
+        .par_iter_mut()
+        .filter(|s| s.is_far())
+        .for_each(|source| {
+            let arrives = |(i, &(place, normal)): (usize, &(DVec3, DVec3))| {
+                let way = source.way_from(place, i % SOURCE_EYES as usize);
+                let factor = source.factor_along(way, normal);
+                match factor > 0.0 && !blocked(occluders, place, place + way) {
+                    true => factor,
+                    false => 0.0,
+                }
+            };
+            let share = places.iter().enumerate().map(arrives).sum::<f64>() / PLACES as f64;
+            let all = match source.kind {
+                KIND_BEAM => 4.0 * PI / whole,
+                _ => source.facing,
+            };
+            source.area = whole * share.max(LEAST_SHARE * all);
+        });
 }
 
 /// Of all that a light may give: what passes for arriving where no ray finds it.
@@ -236,8 +244,14 @@ impl Part {
         };
         [
             quarter(self.low, middle),
-            quarter(DVec2::new(middle.x, self.low.y), DVec2::new(self.high.x, middle.y)),
-            quarter(DVec2::new(self.low.x, middle.y), DVec2::new(middle.x, self.high.y)),
+            quarter(
+                DVec2::new(middle.x, self.low.y),
+                DVec2::new(self.high.x, middle.y),
+            ),
+            quarter(
+                DVec2::new(self.low.x, middle.y),
+                DVec2::new(middle.x, self.high.y),
+            ),
             quarter(middle, self.high),
         ]
     }
@@ -248,12 +262,20 @@ impl Lit {
     fn directions(&self, part: &Part, sky: &Sky) -> Vec<DVec3> {
         let whole = self.cumulated[GRID * GRID - 1];
         let row_end = |row: usize| self.cumulated[(row + 1) * GRID - 1];
-        let before = |cell: usize| if cell == 0 { 0.0 } else { self.cumulated[cell - 1] };
+        let before = |cell: usize| {
+            if cell == 0 {
+                0.0
+            } else {
+                self.cumulated[cell - 1]
+            }
+        };
         let direction = |i: usize| {
             let [u, v] = net(i);
             // By rows, and then within the row.
             let wanted = u * whole;
-            let row = (0..GRID - 1).find(|&row| row_end(row) > wanted).unwrap_or(GRID - 1);
+            let row = (0..GRID - 1)
+                .find(|&row| row_end(row) > wanted)
+                .unwrap_or(GRID - 1);
             let (first, end) = (before(row * GRID), row_end(row));
             let down = (wanted - first) / (end - first);
             let wanted = first + v * (end - first);

@@ -9,7 +9,7 @@ use crate::mesh::near::blocked;
 use crate::mesh::occluders::Occluders;
 use crate::mesh::shadow_tree::ShadowTree;
 use crate::scene::Lights;
-use crate::scene::even_light::{EvenLight, LightPlace, Surface, luminance};
+use crate::scene::even_light::{EvenLight, LightPlace, Surface, far_lights, luminance};
 use crate::structs::ShadowOccluder;
 
 /// Places on the lights, and on all surfaces.
@@ -41,7 +41,7 @@ impl<'a> Lit<'a> {
             let square = elements.unit * elements.unit;
             (position, luminance(light.intensity) / square)
         });
-        let light = EvenLight::new(&surfaces, points, PLACES)?;
+        let light = EvenLight::new(&surfaces, points, &far_lights(lights), PLACES)?;
         let occluders = Occluders::elements(elements);
         Some(Self {
             elements,

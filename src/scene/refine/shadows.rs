@@ -6,7 +6,7 @@ use obvhs::ray::Ray;
 use super::cutting::Cutting;
 use super::surroundings::Surroundings;
 use super::{Scene, area};
-use crate::scene::even_light::{EvenLight, Surface, luminance};
+use crate::scene::even_light::{EvenLight, Surface, far_lights, luminance};
 
 /// Places on the lights, evenly by power, and on all surfaces, evenly by what they reflect.
 const PLACES: usize = 48;
@@ -36,7 +36,7 @@ impl<'a> Shadows<'a> {
         Some(Self {
             input,
             surroundings,
-            light: EvenLight::new(&surfaces, points, PLACES)?,
+            light: EvenLight::new(&surfaces, points, &far_lights(&input.lights), PLACES)?,
         })
     }
 
