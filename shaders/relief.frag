@@ -38,6 +38,7 @@ layout(scalar, binding = 9) readonly buffer Nodes { ShadowNode shadow_nodes[]; }
 layout(scalar, binding = 10) readonly buffer Triangles { ShadowTriangle shadow_triangles[]; };
 // By prism, where it is lit so.
 layout(scalar, binding = 11) readonly buffer ParallelLights { ParallelLight parallel_lights[]; };
+layout(scalar, binding = 12) readonly buffer Webs { float webs[]; };
 
 layout(push_constant, scalar) uniform Parameters {
     vec3 x;

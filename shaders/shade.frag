@@ -19,6 +19,7 @@ layout(scalar, binding = 2) readonly buffer Nodes { ShadowNode shadow_nodes[]; }
 layout(scalar, binding = 3) readonly buffer Triangles { ShadowTriangle shadow_triangles[]; };
 // [drawn triangle]
 layout(scalar, binding = 4) readonly buffer LitTriangles { LitTriangle lit_triangles[]; };
+layout(scalar, binding = 5) readonly buffer Webs { float webs[]; };
 
 layout(push_constant, scalar) uniform Parameters {
     vec3 x;

@@ -11,6 +11,7 @@ use mesolux::math::form_factor::{spread_in_triangle, to_polygon};
 use mesolux::mesh::elements::Elements;
 use mesolux::path_tracer::PathTracer;
 use mesolux::picture::Light;
+use mesolux::reference::light_rows::light_rows;
 use mesolux::scene::sky::{Dome, Sky};
 use mesolux::scene::{Beam, PointLight, Sun, Web};
 use mesolux::solver::{Place, Settings, Solver};
@@ -367,4 +368,55 @@ fn mean_irradiance(tracer: &PathTracer<'_>, build: &Build, e: usize) -> (f64, f6
     let mean = found.iter().sum::<f64>() / 16.0;
     let spread: f64 = found.iter().map(|f| (f - mean).powi(2)).sum();
     (mean, spread / 16.0 / 15.0)
+}
+
+/// Light of every element against the sum of the twin's rows: a room with a ball, a hole and a
+/// corner of the sky.
+#[test]
+fn rows_are_those_of_the_twin() {
+    // Of the mean: rounding of rows and single rays along edges.
+    const MOST: f64 = 2e-2;
+    const MOST_RMS: f64 = 1e-3;
+    let mut build = Build::new();
+    let black = build.material(0.0, 0.0);
+    build.quad(DVec3::ZERO, DVec3::Z, DVec3::X, (8, 8), black);
+    build.quad(DVec3::ZERO, DVec3::Y, DVec3::Z, (8, 8), black);
+    build.quad(DVec3::ZERO, DVec3::X, DVec3::Y, (8, 8), black);
+    build.sphere(DVec3::new(0.5, 0.4, 0.5), 0.3, 2, true, black);
+    build.weld();
+    build.scene.lights.sky = Some(uniform(1.0));
+    build.scene.lights.suns.push(Sun {
+        name: "sun".into(),
+        towards: DVec3::new(0.5, 0.6, 0.62).normalize(),
+        irradiance: [1.0; 3],
+        angle: 5.0,
+    });
+    let elements = Elements::new(&build.scene);
+    let mut solver = Solver::new(
+        &device(),
+        elements,
+        &build.scene.lights,
+        &Settings::default(),
+    )
+    .expect("it fits");
+    solver.run(|_| true).expect("it is solved");
+    let light = solver.light().expect("the device gives it");
+    let problem = &solver.problem;
+    let occluders = problem
+        .occluders
+        .casters(&problem.elements, &problem.connections);
+    let mut expected = vec![0.0; problem.elements.len()];
+    for source in problem.sources.list.iter().filter(|s| s.emitted.x > 0.0) {
+        let row = light_rows(&problem.elements, &occluders, source);
+        for (sum, factor) in expected.iter_mut().zip(row) {
+            *sum += factor * f64::from(source.emitted.x);
+        }
+    }
+    let count = expected.len() as f64;
+    let mean = expected.iter().sum::<f64>() / count;
+    let errors = || (light.irradiance.iter().zip(&expected)).map(|(f, e)| f64::from(f.x) - e);
+    let worst = errors().fold(0.0_f64, |most, off| most.max(off.abs())) / mean;
+    let rms = (errors().map(|off| off * off).sum::<f64>() / count).sqrt() / mean;
+    println!("rms {rms:.2e}, worst {worst:.2e}");
+    assert!(worst < MOST && rms < MOST_RMS, "{worst} {rms}");
 }

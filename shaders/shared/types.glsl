@@ -235,10 +235,14 @@ struct ParallelLight {
 // A place that light comes straight from: a part of an emitter, or a point light.
 struct LightPoint {
     vec3 position;      // from the eye, internal units
-    uint kind;          // KIND_SURFACE or KIND_POINT
-    vec3 normal;
+    uint kind;          // KIND_SURFACE, KIND_POINT or KIND_BEAM
+    vec3 normal;        // of a beam its axis
     float area;         // of the part of an emitter
     vec3 strength;      // Le times its area, or radiant intensity
+    vec3 zero;          // of a beam: where its azimuth is 0
+    uint first_share;   // of a beam
+    uint rows;
+    uint columns;
 };
 
 // A relief as it is drawn.

@@ -140,6 +140,7 @@ impl Relief {
                 shadow_nodes: &lights.nodes,
                 shadow_triangles: &lights.triangles,
                 parallel_lights: &buffers.parallel_lights,
+                webs: &lights.webs,
             },
         )
     }

@@ -147,6 +147,7 @@ impl Shade {
                 shadow_nodes: &lights.nodes,
                 shadow_triangles: &lights.triangles,
                 lit_triangles: lit,
+                webs: &lights.webs,
             },
         )
     }

@@ -17,6 +17,8 @@ pub struct LightBuffers {
     pub points: Buffer,
     pub nodes: Buffer,
     pub triangles: Buffer,
+    /// Shares of the intensity of beams.
+    pub webs: Buffer,
     /// All light points, and those of emitters.
     pub counts: [u32; 2],
 }
@@ -26,13 +28,19 @@ impl LightBuffers {
     ///
     /// # Errors
     /// A device without the memory.
-    pub fn new(device: &Arc<Device>, points: &[LightPoint], tree: &ShadowTree) -> Result<Self> {
+    pub fn new(
+        device: &Arc<Device>,
+        points: &[LightPoint],
+        webs: &[f32],
+        tree: &ShadowTree,
+    ) -> Result<Self> {
         let emitters = points.iter().filter(|p| p.kind == KIND_SURFACE).count();
         let storage = BufferUse::Storage;
         Ok(Self {
             points: upload(device, "light points", points, storage)?,
             nodes: upload(device, "shadow nodes", tree.nodes(), storage)?,
             triangles: upload(device, "shadow triangles", &tree.triangles, storage)?,
+            webs: upload(device, "webs", webs, storage)?,
             counts: [points.len() as u32, emitters as u32],
         })
     }
@@ -59,7 +67,7 @@ impl ShadowRays {
     /// # Errors
     /// A device that lacks the memory or fails.
     pub fn run(&self, tree: &ShadowTree, rays: &[ShadowRay]) -> Result<Vec<bool>> {
-        let scene = LightBuffers::new(&self.device, &[], tree)?;
+        let scene = LightBuffers::new(&self.device, &[], &[], tree)?;
         let count = rays.len() as u32;
         let rays = upload(&self.device, "shadow rays", rays, BufferUse::Storage)?;
         let bytes = u64::from(count) * 4;

@@ -6,6 +6,7 @@ pub mod cull;
 pub mod disc;
 pub mod form_factors;
 pub mod item_buffer;
+pub mod light_rows;
 pub mod measure;
 pub mod near_to_relief;
 pub mod normalise;

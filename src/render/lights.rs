@@ -4,20 +4,20 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::Lighting;
 use super::seen_scene::SeenScene;
 use super::shafts::Shafts;
-use crate::constants::{KIND_POINT, KIND_SURFACE, LIGHT_POINTS, LIGHT_SETS};
+use crate::constants::{KIND_BEAM, KIND_POINT, KIND_SURFACE, LIGHT_POINTS, LIGHT_SETS};
 use crate::error::Result;
 use crate::mesh::shadow_tree::ShadowTree;
 use crate::mesh::sources::triangle_area;
 use crate::passes::shadow_rays::LightBuffers;
 use crate::passes::types::{LightPoint, ShadowTriangle};
 use crate::picture::Projection;
-use crate::scene::{Scene, Sun};
+use crate::scene::{Beam, Scene, Sun};
 use crate::vk::Device;
 
 /// A light point in scene units.
@@ -27,6 +27,7 @@ struct Shining {
     normal: Option<DVec3>,
     area: f64,
     strength: DVec3,
+    beam: Option<Beam>,
 }
 
 /// A triangle that emits.
@@ -133,6 +134,7 @@ fn shining(scene: &Scene) -> Vec<Shining> {
             normal: Some((b - a).cross(c - a).normalize_or_zero()),
             area: of_point,
             strength: emitter.radiance * of_point,
+            beam: None,
         });
     }
     points.extend(scene.lights.points.iter().map(|light| Shining {
@@ -140,6 +142,7 @@ fn shining(scene: &Scene) -> Vec<Shining> {
         normal: None,
         area: 0.0,
         strength: DVec3::from(light.intensity.map(f64::from)),
+        beam: light.beam.clone(),
     }));
     points
 }
@@ -169,9 +172,10 @@ fn spread(corners: [DVec3; 3], i: u32) -> DVec3 {
 }
 
 impl Shining {
-    fn seen_from(&self, projection: &Projection) -> LightPoint {
+    /// Appends the shares of a beam to `webs`.
+    fn seen_from(&self, projection: &Projection, webs: &mut Vec<f32>) -> LightPoint {
         let square = projection.unit * projection.unit;
-        LightPoint {
+        let mut point = LightPoint {
             position: ((self.position - projection.eye) / projection.unit).as_vec3(),
             kind: if self.normal.is_some() {
                 KIND_SURFACE
@@ -181,7 +185,20 @@ impl Shining {
             normal: self.normal.unwrap_or_default().as_vec3(),
             area: (self.area / square) as f32,
             strength: (self.strength / square).as_vec3(),
+            zero: Vec3::ZERO,
+            first_share: 0,
+            rows: 0,
+            columns: 0,
+        };
+        if let Some(beam) = &self.beam {
+            point.kind = KIND_BEAM;
+            point.normal = beam.axis.as_vec3();
+            point.zero = beam.zero.as_vec3();
+            point.first_share = webs.len() as u32;
+            (point.rows, point.columns) = (beam.web.rows, beam.web.columns);
+            webs.extend(&beam.web.shares);
         }
+        point
     }
 }
 
@@ -203,20 +220,21 @@ pub fn light_buffers(
         projection,
         ..
     } = *seen;
+    let mut webs = Vec::new();
     let points: Vec<_> = if lighting.sharp() {
         shining(scene)
             .iter()
-            .map(|point| point.seen_from(projection))
+            .map(|point| point.seen_from(projection, &mut webs))
             .collect()
     } else {
         Vec::new()
     };
     if points.is_empty() {
-        let none = LightBuffers::new(device, &points, &ShadowTree::default())?;
+        let none = LightBuffers::new(device, &points, &[], &ShadowTree::default())?;
         return Ok((none, None));
     }
     let tree = ShadowTree::new(casters(scene, lighting, projection));
-    let buffers = LightBuffers::new(device, &points, &tree)?;
+    let buffers = LightBuffers::new(device, &points, &webs, &tree)?;
     let shafts = if lighting.skip_open {
         Shafts::new(tree, scene, projection)
     } else {

@@ -69,7 +69,12 @@ impl Look<'_> {
         let (mut open, mut hidden) = (false, false);
         if cuts >= LEAST_CUTS {
             // A straight edge across the part leaves some of its corners on either side.
-            for corner in [low, high, DVec2::new(low.x, high.y), DVec2::new(high.x, low.y)] {
+            for corner in [
+                low,
+                high,
+                DVec2::new(low.x, high.y),
+                DVec2::new(high.x, low.y),
+            ] {
                 match self.sees(self.direction(corner)) {
                     Some(true) => open = true,
                     Some(false) => hidden = true,
