@@ -185,8 +185,22 @@ fn nodes_place_meshes_lights_and_cameras() {
             < 1e-6
     );
     assert!((camera.fov_y - 0.5_f64.to_degrees()).abs() < 1e-5);
-    assert_eq!(scene.warnings.len(), 2, "{:?}", scene.warnings);
-    assert!(scene.warnings[0].contains("spot light \"beam\" is not used"));
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    // Lights shine along −z of their nodes; the spot's cone is 45° wide where nothing is said.
+    let spot = &scene.lights.points[1];
+    assert_eq!(spot.name, "beam");
+    assert!(spot.share(-DVec3::Z) > 0.999 && spot.share(DVec3::new(1.1, 0.0, -1.0)) == 0.0);
+    // Measured: 1e-5.
+    let half = spot.share(DVec3::new(0.5, 0.0, -1.0));
+    let cosine = 1.0 / 1.25_f64.sqrt();
+    let edge = 0.5_f64.sqrt();
+    assert!(
+        (half - ((cosine - edge) / (1.0 - edge)).powi(2)).abs() < 1e-3,
+        "{half}"
+    );
+    let sun = &scene.lights.suns[0];
+    assert_eq!((sun.towards, sun.angle), (DVec3::Z, 0.0));
+    assert!((sun.irradiance[0] * 683.0 - 1.0).abs() < 1e-6);
 
     let mirrored = read_changed(|file| file["nodes"][0] = json!({"mesh": 0, "scale": [-1, 1, 1]}));
     assert!(normal(&mirrored.unwrap(), 0).z > 0.99);

@@ -230,6 +230,19 @@ impl Assembly {
         self.choices.resize(self.scene.triangles.len(), choice);
     }
 
+    /// Adds a lamp that is a surface; it emits from its fronts.
+    ///
+    /// # Errors
+    /// A position that is not finite.
+    #[cfg(feature = "formats")]
+    pub fn add_lamp(&mut self, mesh: &Mesh) -> Result<()> {
+        let first = self.scene.triangles.len();
+        let materials = self.add_materials(&mesh.materials);
+        self.add_mesh(mesh, &materials)?;
+        self.give_sides(first, Some(Sides::AsGiven));
+        Ok(())
+    }
+
     fn weld(&mut self, position: DVec3) -> u32 {
         // Adding zero turns −0 into 0: the same position with other bits.
         let position = position + DVec3::ZERO;

@@ -35,9 +35,24 @@ pub(super) fn finish(mut scene: Scene, import: &ImportOptions) -> Result<Scene> 
             .check()
             .map_err(|what| refuse(format!("material \"{}\": {what}", material.name)))?;
     }
+    let lights = &scene.lights;
+    let points = lights
+        .points
+        .iter()
+        .map(|l| (l.check(), format!("point light \"{}\"", l.name)));
+    let suns = lights
+        .suns
+        .iter()
+        .map(|l| (l.check(), format!("sun \"{}\"", l.name)));
+    let sky = lights.sky.iter().map(|sky| (sky.check(), "sky".into()));
+    for (checked, light) in points.chain(suns).chain(sky) {
+        checked.map_err(|what| refuse(format!("{light}: {what}")))?;
+    }
     if !has_light(&scene) {
         return Err(refuse(
-            "there is no light: no material in use has Ke above 0 and no point light shines".into(),
+            "there is no light: no material in use has Ke above 0, and no point light, sun or sky \
+             shines"
+                .into(),
         ));
     }
 
@@ -70,10 +85,10 @@ pub(super) fn finish(mut scene: Scene, import: &ImportOptions) -> Result<Scene> 
 
 fn has_light(scene: &Scene) -> bool {
     let emits: Vec<bool> = scene.materials.iter().map(|m| m.emits()).collect();
+    let shines = |rgb: &[f32; 3]| rgb.iter().any(|&c| c > 0.0);
+    let lights = &scene.lights;
     scene.triangles.iter().any(|t| emits[t.material as usize])
-        || scene
-            .lights
-            .points
-            .iter()
-            .any(|light| light.intensity.iter().any(|&c| c > 0.0))
+        || lights.points.iter().any(|light| shines(&light.intensity))
+        || lights.suns.iter().any(|sun| shines(&sun.irradiance))
+        || lights.sky.as_ref().is_some_and(|sky| !sky.is_black())
 }

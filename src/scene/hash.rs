@@ -2,21 +2,19 @@
 
 use sha2::{Digest, Sha256};
 
-use super::{Material, Scene};
+use glam::DVec3;
+
+use super::sky::{Dome, Form, Sky};
+use super::{Beam, Material, Scene, Sun};
 
 impl Scene {
     /// SHA-256 in hexadecimal over everything that a bake depends on: vertices, triangles,
-    /// materials with their texels, point lights. Names, paths and cameras do not count.
+    /// materials with their texels, lights. Names, paths and cameras do not count.
     pub fn hash(&self) -> String {
         let mut hash = Sha256::new();
         // Each list begins with its length, so that no two scenes give the same bytes.
         length(&mut hash, self.vertices.len());
-        for vertex in &self.vertices {
-            vertex
-                .to_array()
-                .iter()
-                .for_each(|c| hash.update(c.to_le_bytes()));
-        }
+        self.vertices.iter().for_each(|&v| vector(&mut hash, v));
         length(&mut hash, self.triangles.len());
         for triangle in &self.triangles {
             triangle
@@ -30,13 +28,13 @@ impl Scene {
         self.materials.iter().for_each(|m| material(&mut hash, m));
         length(&mut hash, self.lights.points.len());
         for light in &self.lights.points {
-            light
-                .position
-                .to_array()
-                .iter()
-                .for_each(|c| hash.update(c.to_le_bytes()));
+            vector(&mut hash, light.position);
             floats(&mut hash, &light.intensity);
+            light.beam.iter().for_each(|b| beam(&mut hash, b));
         }
+        // What a scene has none of adds nothing, so that bakes of earlier versions stay valid.
+        self.lights.suns.iter().for_each(|s| sun(&mut hash, s));
+        self.lights.sky.iter().for_each(|s| sky(&mut hash, s));
         hash.finalize()
             .iter()
             .map(|byte| format!("{byte:02x}"))
@@ -72,6 +70,57 @@ fn relief(hash: &mut Sha256, material: &Material) {
         hash.update(map.width.to_le_bytes());
         map.normals.iter().for_each(|n| floats(hash, n));
     }
+}
+
+fn beam(hash: &mut Sha256, beam: &Beam) {
+    hash.update(b"beam");
+    vector(hash, beam.axis);
+    vector(hash, beam.zero);
+    hash.update(beam.web.rows.to_le_bytes());
+    hash.update(beam.web.columns.to_le_bytes());
+    floats(hash, &beam.web.shares);
+}
+
+fn sun(hash: &mut Sha256, sun: &Sun) {
+    hash.update(b"sun");
+    vector(hash, sun.towards);
+    floats(hash, &sun.irradiance);
+    hash.update(sun.angle.to_le_bytes());
+}
+
+fn sky(hash: &mut Sha256, sky: &Sky) {
+    hash.update(b"sky");
+    vector(hash, sky.up);
+    vector(hash, sky.north);
+    floats(hash, &sky.scale);
+    match &sky.dome {
+        Dome::Uniform => hash.update(b"uniform"),
+        Dome::TraditionalOvercast => hash.update(b"traditional"),
+        Dome::Gradation(gradation) => {
+            hash.update(match gradation.form() {
+                Form::Cie => b"cie  ",
+                Form::Perez => b"perez",
+            });
+            let coefficients = gradation.coefficients();
+            coefficients
+                .iter()
+                .for_each(|c| hash.update(c.to_le_bytes()));
+            vector(hash, gradation.sun());
+        }
+        Dome::Picture(picture) => {
+            hash.update(b"picture");
+            hash.update(picture.width.to_le_bytes());
+            hash.update(picture.height.to_le_bytes());
+            picture.texels.iter().for_each(|texel| floats(hash, texel));
+        }
+    }
+}
+
+fn vector(hash: &mut Sha256, vector: DVec3) {
+    vector
+        .to_array()
+        .iter()
+        .for_each(|c| hash.update(c.to_le_bytes()));
 }
 
 fn floats(hash: &mut Sha256, values: &[f32]) {

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::sky::Sky;
+use super::web::Web;
 
 /// The lights of a scene besides its emitting surfaces.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -35,18 +36,6 @@ pub struct Beam {
     /// Unit, at right angles to the axis: where φ is 0. φ grows towards `axis × zero`.
     pub zero: DVec3,
     pub web: Arc<Web>,
-}
-
-/// Shares of an intensity by direction, interpolated linearly in both angles.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Web {
-    /// Rows, evenly from θ = 0 to θ = π; at least 2.
-    pub rows: u32,
-    /// Columns, evenly from φ = 0 to φ = 2π, of which the last is the first again; 1 where the
-    /// shares do not depend on φ.
-    pub columns: u32,
-    /// `[row][column]`, not negative.
-    pub shares: Vec<f32>,
 }
 
 /// Parallel light from a disc at an infinite distance.
@@ -88,9 +77,96 @@ impl PointLight {
     pub fn share(&self, direction: DVec3) -> f64 {
         self.beam.as_ref().map_or(1.0, |beam| beam.share(direction))
     }
+
+    /// Power over intensity, sr: 4π without a beam.
+    pub fn solid_angle(&self) -> f64 {
+        (self.beam.as_ref()).map_or(4.0 * PI, |beam| beam.web.solid_angle())
+    }
+
+    /// The error is one clause.
+    pub(super) fn check(&self) -> Result<(), String> {
+        if !self.position.is_finite() {
+            return Err("position must be finite".into());
+        }
+        if !self.intensity.iter().all(|&c| c.is_finite() && c >= 0.0) {
+            return Err("intensity must be finite and not negative".into());
+        }
+        self.beam.as_ref().map_or(Ok(()), Beam::check)
+    }
+}
+
+impl Sun {
+    /// The error is one clause.
+    pub(super) fn check(&self) -> Result<(), String> {
+        if !is_unit(self.towards) {
+            return Err("the direction towards it must be finite and not zero".into());
+        }
+        if !self.irradiance.iter().all(|&c| c.is_finite() && c >= 0.0) {
+            return Err("irradiance must be finite and not negative".into());
+        }
+        if !(0.0..=90.0).contains(&self.angle) {
+            return Err(format!("angle {} must be in 0..=90 degrees", self.angle));
+        }
+        Ok(())
+    }
+}
+
+/// Whether a vector has the length 1, but for rounding.
+pub(super) fn is_unit(v: DVec3) -> bool {
+    (v.length_squared() - 1.0).abs() < 1e-9
+}
+
+/// A vector of length 1; one that has it but for rounding stays as it is, so that a scene that was
+/// written reads back with the same bits. None of zero, or of what is not finite.
+#[cfg(feature = "formats")]
+pub(super) fn unit(v: DVec3) -> Option<DVec3> {
+    match (v.length_squared() - 1.0).abs() < 1e-12 {
+        true => Some(v),
+        // Scaled first, so that no square overflows.
+        false => (v / v.abs().max_element()).try_normalize(),
+    }
+}
+
+/// A unit vector at right angles to `axis`, which is one: the part of `wanted` that is, or of the
+/// first of x and z.
+#[cfg(feature = "formats")]
+pub(super) fn across(axis: DVec3, wanted: Option<DVec3>) -> DVec3 {
+    let candidates = [wanted.unwrap_or(DVec3::X), DVec3::X, DVec3::Z];
+    let flat = |v: DVec3| match v.dot(axis).abs() < 1e-12 {
+        true => unit(v),
+        false => {
+            let v = unit(v)?;
+            let part = v - v.dot(axis) * axis;
+            (part.length() > 1e-6).then(|| part.normalize())
+        }
+    };
+    (candidates.into_iter().find_map(flat)).unwrap_or_else(|| axis.any_orthonormal_vector())
 }
 
 impl Beam {
+    fn check(&self) -> Result<(), String> {
+        if !is_unit(self.axis) || !is_unit(self.zero) || self.axis.dot(self.zero).abs() > 1e-9 {
+            return Err("the axes of its beam must be unit vectors at right angles".into());
+        }
+        self.web.check()
+    }
+
+    /// As it stands after a linear map of the scene; a map that mirrors mirrors the web too. None
+    /// where the map takes the axis to zero.
+    #[cfg(feature = "formats")]
+    pub(super) fn turned(&self, by: glam::DMat3) -> Option<Self> {
+        let axis = unit(by * self.axis)?;
+        let mirrors = by.determinant() < 0.0;
+        Some(Self {
+            axis,
+            zero: across(axis, Some(by * self.zero)),
+            web: match mirrors && self.web.columns > 1 {
+                true => Arc::new(self.web.mirrored()),
+                false => self.web.clone(),
+            },
+        })
+    }
+
     /// Share of the intensity in a direction, which need not be of unit length.
     pub fn share(&self, direction: DVec3) -> f64 {
         let along = direction.dot(self.axis);
@@ -101,29 +177,4 @@ impl Beam {
         self.web
             .share(theta, if phi < 0.0 { phi + TAU } else { phi })
     }
-}
-
-impl Web {
-    /// The share at θ in 0..=π and φ in 0..=2π.
-    pub fn share(&self, theta: f64, phi: f64) -> f64 {
-        let (row, below) = place(theta / PI, self.rows);
-        let (column, left) = place(phi / TAU, self.columns);
-        let at = |row: u32, column: u32| {
-            let row = row.min(self.rows - 1) as usize;
-            let column = column.min(self.columns - 1) as usize;
-            f64::from(self.shares[row * self.columns as usize + column])
-        };
-        let of_row = |row: u32| at(row, column) + left * (at(row, column + 1) - at(row, column));
-        of_row(row) + below * (of_row(row + 1) - of_row(row))
-    }
-}
-
-/// The node before a place in 0..=1 among `count` of even distance, and how far it is to the next.
-fn place(at: f64, count: u32) -> (u32, f64) {
-    if count == 1 {
-        return (0, 0.0);
-    }
-    let at = at.clamp(0.0, 1.0) * f64::from(count - 1);
-    let before = at.floor().min(f64::from(count - 2));
-    (before as u32, at - before)
 }

@@ -137,7 +137,7 @@ fn encode_normals(map: &NormalMap) -> Result<(&'static str, Vec<u8>)> {
     encode(&map.path, image.map(DynamicImage::from), ImageFormat::Png)
 }
 
-fn encode(
+pub(super) fn encode(
     path: &Path,
     image: Option<DynamicImage>,
     format: ImageFormat,

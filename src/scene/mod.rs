@@ -22,6 +22,12 @@ pub(crate) mod even_light;
 mod gltf_file;
 mod hash;
 mod heights_from_normals;
+pub mod ies;
+#[cfg(feature = "formats")]
+mod lamps;
+#[cfg(feature = "formats")]
+mod light_tables;
+pub mod light_units;
 mod lights;
 mod load;
 #[cfg(feature = "formats")]
@@ -47,8 +53,11 @@ mod text_file;
 mod texture;
 mod tile;
 mod uv;
+mod web;
 #[cfg(feature = "formats")]
 mod write;
+#[cfg(feature = "formats")]
+mod write_lights;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -56,12 +65,13 @@ use std::sync::Arc;
 use glam::DVec3;
 
 pub use displace::{displace, relief_normals};
-pub use lights::{Beam, Lights, PointLight, Sun, Web};
+pub use lights::{Beam, Lights, PointLight, Sun};
 pub use load::{ImportOptions, LoadOptions, load};
 pub use maps::{HeightMap, NormalMap};
 pub use material::Material;
 pub use refine::{OnInput, RefinedFrom, Refinement};
 pub use texture::Texture;
+pub use web::Web;
 #[cfg(feature = "formats")]
 pub use write::write_scene;
 

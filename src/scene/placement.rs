@@ -3,6 +3,7 @@
 use glam::{DAffine3, DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
+use super::lights::unit;
 use super::mesh_file::MeshFile;
 
 /// One factor, or one for each axis; a negative one mirrors.
@@ -61,6 +62,14 @@ impl Placement {
         }
         for light in &mut file.lights.points {
             light.position = self.0.transform_point3(light.position);
+            if let Some(beam) = &mut light.beam {
+                *beam =
+                    (beam.turned(self.0.matrix3)).ok_or("a light's axis is turned to nothing")?;
+            }
+        }
+        for sun in &mut file.lights.suns {
+            let towards = unit(self.0.matrix3 * sun.towards);
+            sun.towards = towards.ok_or("a sun's direction is turned to nothing")?;
         }
         for camera in &mut file.cameras {
             camera.position = self.0.transform_point3(camera.position);

@@ -1,4 +1,4 @@
-//! `scene.toml`: meshes with their placement, changes to materials, point lights, cameras.
+//! `scene.toml`: meshes with their placement, changes to materials, lights, cameras.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -8,11 +8,13 @@ use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 use super::assemble::{Assembly, Mesh};
+use super::lamps::{DiskLampTable, SphereLampTable};
+use super::light_tables::{self, PointLightTable, SkyTable, SunTable};
 use super::material::{Asked, DEFAULT_KD, MadeUp, TextureCache};
 use super::placement::{Placement, Scale};
 use super::sides::Sides;
 use super::text_file::{read_text, stem};
-use super::{Camera, ImportOptions, Material, PointLight, Scene, check, mesh_file};
+use super::{Camera, ImportOptions, Material, Scene, check, mesh_file};
 use crate::error::{Error, Result};
 
 #[derive(Debug, Deserialize, Serialize)]
@@ -28,6 +30,14 @@ pub(super) struct SceneFile {
     pub material: BTreeMap<String, Spanned<MaterialTable>>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub point_light: Vec<Spanned<PointLightTable>>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sun: Vec<Spanned<SunTable>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sky: Option<Spanned<SkyTable>>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sphere_lamp: Vec<Spanned<SphereLampTable>>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub disk_lamp: Vec<Spanned<DiskLampTable>>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub camera: Vec<Spanned<CameraTable>>,
 }
@@ -63,14 +73,6 @@ pub(super) struct MaterialTable {
     /// Scene units for a value of 1.
     height_scale: Option<f32>,
     normal_map: Option<String>,
-}
-
-#[derive(Debug, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct PointLightTable {
-    pub name: Option<String>,
-    pub position: [f64; 3],
-    pub intensity: [f32; 3],
 }
 
 #[derive(Debug, Deserialize, Serialize)]
@@ -123,17 +125,8 @@ pub(super) fn load(path: &Path, import: &ImportOptions) -> Result<Scene> {
         return Err(lines.error(table.span().start, what));
     }
 
+    light_tables::add(&file, &lines, &mut assembly)?;
     let scene = &mut assembly.scene;
-    for (index, table) in file.point_light.iter().enumerate() {
-        let light = point_light(table.get_ref(), index);
-        let problem = check_light(&light)
-            .or_else(|| taken(&light.name, scene.lights.points.iter().map(|l| &l.name)));
-        if let Some(what) = problem {
-            let what = format!("point light \"{}\": {what}", light.name);
-            return Err(lines.error(table.span().start, what));
-        }
-        scene.lights.points.push(light);
-    }
     for (index, table) in file.camera.iter().enumerate() {
         let camera = camera(table.get_ref(), index);
         let problem = camera
@@ -154,13 +147,13 @@ pub(super) fn load(path: &Path, import: &ImportOptions) -> Result<Scene> {
 }
 
 /// The line of a byte of the file.
-struct Lines<'a> {
-    path: &'a Path,
+pub(super) struct Lines<'a> {
+    pub path: &'a Path,
     text: &'a str,
 }
 
 impl Lines<'_> {
-    fn error(&self, at: usize, what: String) -> Error {
+    pub fn error(&self, at: usize, what: String) -> Error {
         let before = &self.text.as_bytes()[..at.min(self.text.len())];
         let line = 1 + before.iter().filter(|&&byte| byte == b'\n').count();
         Error::line(self.path, line, what)
@@ -278,28 +271,6 @@ fn change_material(
     material.check().map_err(refuse)
 }
 
-fn point_light(table: &PointLightTable, index: usize) -> PointLight {
-    PointLight {
-        name: table
-            .name
-            .clone()
-            .unwrap_or_else(|| format!("light {}", index + 1)),
-        position: DVec3::from(table.position),
-        intensity: table.intensity,
-        beam: None,
-    }
-}
-
-fn check_light(light: &PointLight) -> Option<String> {
-    if !light.position.is_finite() {
-        Some("position must be finite".into())
-    } else if !light.intensity.iter().all(|&c| c.is_finite() && c >= 0.0) {
-        Some("intensity must be finite and not negative".into())
-    } else {
-        None
-    }
-}
-
 fn camera(table: &CameraTable, index: usize) -> Camera {
     Camera {
         name: table
@@ -313,7 +284,8 @@ fn camera(table: &CameraTable, index: usize) -> Camera {
     }
 }
 
-fn taken<'a>(name: &str, mut names: impl Iterator<Item = &'a String>) -> Option<String> {
+/// What is wrong with a name that is in use, one clause.
+pub(super) fn taken<'a>(name: &str, mut names: impl Iterator<Item = &'a String>) -> Option<String> {
     names
         .any(|known| known == name)
         .then(|| "an earlier one has this name".into())

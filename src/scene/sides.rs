@@ -4,6 +4,8 @@
 //! is. Random paths from the lights, off either side of what they meet, find the pieces that show
 //! light only their backs: a room whose normals point outward is one.
 
+mod starts;
+
 use std::collections::{HashMap, HashSet};
 use std::time::Duration;
 
@@ -15,9 +17,9 @@ use obvhs::ray::{Ray, RayHit};
 use obvhs::{Boundable, BvhBuildParams};
 use serde::{Deserialize, Serialize};
 
-use super::even_light::luminance;
 use super::{Scene, Triangle};
 use crate::math::random;
+use starts::Starts;
 
 /// Which side of a mesh is the front.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
@@ -106,7 +108,7 @@ pub(super) fn of_sheets(scene: &Scene, choices: &[Choice]) -> Vec<usize> {
 /// triangles of two sides whose pieces show light both, without those that emit: a lamp is a front.
 pub(super) fn turn_dark(scene: &mut Scene, choices: &[Choice]) -> Vec<usize> {
     let is_given = choices.iter().all(|&choice| choice == Choice::None);
-    let Some(lights) = Lights::of(scene).filter(|_| !is_given) else {
+    let Some(starts) = Starts::of(scene).filter(|_| !is_given) else {
         return Vec::new();
     };
     let pieces = pieces(&scene.triangles);
@@ -116,7 +118,7 @@ pub(super) fn turn_dark(scene: &mut Scene, choices: &[Choice]) -> Vec<usize> {
     let rays = Rays::new(scene);
     let mut state = 0;
     for _ in 0..PATHS {
-        let (mut from, mut direction) = lights.ray(&rays, &mut state);
+        let (mut from, mut direction) = starts.ray(&rays, &mut state);
         for _ in 0..BOUNCES {
             let Some((t, place, normal)) = rays.first_met(from, direction) else {
                 break;
@@ -211,67 +213,6 @@ fn pieces(triangles: &[Triangle]) -> Vec<u32> {
             *numbers.entry(root(&mut parent, t)).or_insert(next)
         })
         .collect()
-}
-
-/// Where paths begin.
-struct Lights {
-    /// Triangle or point light, and the sum of the powers up to it.
-    list: Vec<(Light, f64)>,
-}
-
-#[derive(Clone, Copy)]
-enum Light {
-    /// Corners, in the frame of [`Rays`].
-    Triangle([DVec3; 3]),
-    Point(DVec3),
-}
-
-impl Lights {
-    fn of(scene: &Scene) -> Option<Self> {
-        let (origin, unit) = frame(scene);
-        let within = |p: DVec3| (p - origin) / unit;
-        let (mut list, mut sum) = (Vec::new(), 0.0);
-        let mut add = |light, power: f64| {
-            if power > 0.0 {
-                sum += power;
-                list.push((light, sum));
-            }
-        };
-        for triangle in &scene.triangles {
-            let corners = scene.corners(triangle).map(within);
-            let [a, b, c] = corners;
-            let area = 0.5 * (b - a).cross(c - a).length();
-            let emitted = luminance(scene.materials[triangle.material as usize].ke);
-            add(Light::Triangle(corners), area * emitted);
-        }
-        for light in &scene.lights.points {
-            // Power over π, as that of the triangles.
-            let power = 4.0 * luminance(light.intensity) / (unit * unit);
-            add(Light::Point(within(light.position)), power);
-        }
-        (!list.is_empty()).then_some(Self { list })
-    }
-
-    /// A place on the lights by power, and a direction.
-    fn ray(&self, rays: &Rays, state: &mut u64) -> (DVec3, DVec3) {
-        let total = self.list.last().map_or(0.0, |last| last.1);
-        let at = random::unit(state) * total;
-        let index = self.list.partition_point(|(_, sum)| *sum <= at);
-        match self.list[index.min(self.list.len() - 1)].0 {
-            Light::Triangle([a, b, c]) => {
-                let (s, t) = (random::unit(state), random::unit(state));
-                let (s, t) = if s + t > 1.0 {
-                    (1.0 - s, 1.0 - t)
-                } else {
-                    (s, t)
-                };
-                let normal = (b - a).cross(c - a).normalize_or_zero();
-                let from = a + s * (b - a) + t * (c - a) + ABOVE * normal;
-                (from, diffuse(normal, state))
-            }
-            Light::Point(from) => (rays.inside(from), uniform(state)),
-        }
-    }
 }
 
 /// A direction of the unit sphere.

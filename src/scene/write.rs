@@ -9,8 +9,9 @@ use toml::Spanned;
 
 use super::Scene;
 use super::map_files::{self, MapFiles};
-use super::scene_file::{CameraTable, MeshTable, PointLightTable, SceneFile};
+use super::scene_file::{CameraTable, MeshTable, SceneFile};
 use super::sides::Sides;
+use super::write_lights::{self, LightTables};
 use crate::atomic_file::write_atomically;
 use crate::error::{Error, Result};
 
@@ -18,8 +19,8 @@ const MESH: &str = "scene.obj";
 const MATERIALS: &str = "scene.mtl";
 const SCENE: &str = "scene.toml";
 
-/// Writes `scene.obj`, `scene.mtl`, the textures and relief maps and `scene.toml` into `dir`, and
-/// returns the path of the last.
+/// Writes `scene.obj`, `scene.mtl`, the textures and relief maps, the beams and pictures of lights
+/// and `scene.toml` into `dir`, and returns the path of the last.
 ///
 /// Loading that gives the same triangles in the same order, the same f64 positions, materials,
 /// lights and cameras. A normal map made by code may change by 10⁻⁵.
@@ -31,11 +32,12 @@ pub fn write_scene(scene: &Scene, dir: &Path) -> Result<PathBuf> {
     check_names(scene)?;
     fs::create_dir_all(dir).map_err(|source| Error::write(dir, source))?;
     let maps = map_files::write(scene, dir)?;
+    let lights = write_lights::write(&scene.lights, dir)?;
     write_atomically(&dir.join(MATERIALS), |out| materials(scene, &maps, out))?;
     write_atomically(&dir.join(MESH), |out| mesh(scene, out))?;
     // Last, so that a scene file is never beside another scene's mesh.
     let path = dir.join(SCENE);
-    let text = toml::to_string(&tables(scene))
+    let text = toml::to_string(&tables(scene, lights))
         .map_err(|error| Error::file(&path, format!("cannot be put in words: {error}")))?;
     write_atomically(&path, |out| out.write_all(text.as_bytes()))?;
     Ok(path)
@@ -110,7 +112,7 @@ fn mesh(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
     Ok(())
 }
 
-fn tables(scene: &Scene) -> SceneFile {
+fn tables(scene: &Scene, lights: LightTables) -> SceneFile {
     SceneFile {
         name: Some(scene.name.clone()),
         mesh: vec![bare(MeshTable {
@@ -118,18 +120,11 @@ fn tables(scene: &Scene) -> SceneFile {
             sides: Some(Sides::AsGiven),
             ..MeshTable::default()
         })],
-        point_light: scene
-            .lights
-            .points
-            .iter()
-            .map(|light| {
-                bare(PointLightTable {
-                    name: Some(light.name.clone()),
-                    position: light.position.to_array(),
-                    intensity: light.intensity,
-                })
-            })
-            .collect(),
+        point_light: lights.points,
+        sun: lights.suns,
+        sky: lights.sky,
+        sphere_lamp: Vec::new(),
+        disk_lamp: Vec::new(),
         camera: scene
             .cameras
             .iter()
@@ -149,6 +144,6 @@ fn tables(scene: &Scene) -> SceneFile {
 }
 
 /// A table without a place in a text.
-fn bare<T>(table: T) -> Spanned<T> {
+pub(super) fn bare<T>(table: T) -> Spanned<T> {
     Spanned::new(0..0, table)
 }

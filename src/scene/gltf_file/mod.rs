@@ -6,19 +6,19 @@ mod materials;
 mod primitives;
 
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::{DAffine3, DMat4, DVec3};
 use gltf::khr_lights_punctual::Kind;
 
 use super::assemble::free_name;
+use super::light_units::LUMENS_OF_A_WATT;
+use super::lights::{across, unit};
 use super::mesh_file::MeshFile;
-use super::{Camera, PointLight};
+use super::{Beam, Camera, PointLight, Sun, Web};
 use crate::error::{Error, Result};
 use document::File;
 use materials::Materials;
-
-/// Lumens of a watt of green light, by which glTF's candelas are divided.
-const LUMENS_OF_A_WATT: f32 = 683.0;
 
 /// Reads the default scene of a file with its lights and cameras; all nodes if there is none.
 ///
@@ -90,7 +90,7 @@ impl Reader<'_> {
             }
         }
         if let Some(light) = node.light() {
-            self.light(&light, node.name(), placed);
+            self.light(&light, node.name(), placed)?;
         }
         if let Some(camera) = node.camera() {
             self.camera(&camera, node.name(), placed);
@@ -106,38 +106,53 @@ impl Reader<'_> {
         light: &gltf::khr_lights_punctual::Light,
         node: Option<&str>,
         at: DAffine3,
-    ) {
-        let count = self.found.lights.points.len() + 1;
+    ) -> Result<()> {
+        let lights = &mut self.found.lights;
+        let count = lights.points.len() + lights.suns.len() + 1;
         let name = node.or(light.name());
         let name = name.map_or_else(|| format!("light {count}"), str::to_owned);
-        let warnings = &mut self.found.mesh.said.warnings;
-        match light.kind() {
-            Kind::Point => {
-                let strength = light.intensity() / LUMENS_OF_A_WATT;
-                self.found.lights.points.push(PointLight {
-                    name: free_name(name, self.found.lights.points.iter().map(|l| &l.name)),
-                    position: at.translation,
-                    intensity: light.color().map(|c| c * strength),
-                    beam: None,
+        // Candelas and lux; lights shine along −z.
+        let strength = light.intensity() / LUMENS_OF_A_WATT as f32;
+        let intensity = light.color().map(|c| c * strength);
+        let back = unit(at.matrix3 * DVec3::Z).unwrap_or(DVec3::Z);
+        let spot = match light.kind() {
+            Kind::Directional => {
+                lights.suns.push(Sun {
+                    name: free_name(name, lights.suns.iter().map(|l| &l.name)),
+                    towards: back,
+                    irradiance: intensity,
+                    angle: 0.0,
                 });
-                if light.range().is_some() {
-                    warnings.push(format!(
-                        "{}: a point light has a range, which is not used",
-                        self.path.display()
-                    ));
-                }
+                return Ok(());
             }
-            kind => {
-                let kind = match kind {
-                    Kind::Directional => "directional",
-                    _ => "spot",
-                };
-                warnings.push(format!(
-                    "{}: {kind} light \"{name}\" is not used",
-                    self.path.display()
-                ));
-            }
+            Kind::Point => None,
+            Kind::Spot {
+                inner_cone_angle: inner,
+                outer_cone_angle: outer,
+            } => Some((f64::from(inner), f64::from(outer))),
+        };
+        let is_cone = |(inner, outer): &(f64, f64)| 0.0 <= *inner && inner <= outer && *outer < 3.2;
+        if spot.is_some_and(|spot| !is_cone(&spot)) {
+            let what = format!("light \"{}\": its cone has no angles", name.escape_debug());
+            return Err(Error::file(self.path, what));
         }
+        lights.points.push(PointLight {
+            name: free_name(name, lights.points.iter().map(|l| &l.name)),
+            position: at.translation,
+            intensity,
+            beam: spot.map(|(inner, outer)| Beam {
+                axis: -back,
+                zero: across(back, None),
+                web: Arc::new(Web::spot(inner, outer)),
+            }),
+        });
+        if light.range().is_some() {
+            self.found.mesh.said.warnings.push(format!(
+                "{}: a point light has a range, which is not used",
+                self.path.display()
+            ));
+        }
+        Ok(())
     }
 
     fn camera(&mut self, camera: &gltf::Camera, node: Option<&str>, at: DAffine3) {
