@@ -178,3 +178,48 @@ impl Beam {
             .share(theta, if phi < 0.0 { phi + TAU } else { phi })
     }
 }
+
+#[cfg(all(test, feature = "formats"))]
+mod tests {
+    use glam::DMat3;
+
+    use super::*;
+
+    #[test]
+    fn a_beam_turns_with_its_mesh_and_is_mirrored_by_mirrors() {
+        // Another share in each direction.
+        let (rows, columns) = (19, 13);
+        let share = |i: u32| match i % columns {
+            column if column == columns - 1 => i - column,
+            _ => i,
+        };
+        let shares = (0..rows * columns).map(|i| share(i) as f32).collect();
+        let beam = Beam {
+            axis: DVec3::new(0.6, 0.8, 0.0),
+            zero: DVec3::Z,
+            web: Arc::new(Web {
+                rows,
+                columns,
+                shares,
+            }),
+        };
+        let turn = DMat3::from_rotation_y(0.7) * DMat3::from_rotation_x(0.3);
+        for by in [
+            turn,
+            turn * 3.0,
+            DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0)) * turn,
+            -turn,
+        ] {
+            let turned = beam.turned(by).unwrap();
+            for d in [
+                DVec3::new(0.3, 0.5, 0.9),
+                DVec3::new(-0.3, 0.1, -0.9),
+                DVec3::new(0.7, -0.5, 0.2),
+            ] {
+                let (before, after) = (beam.share(d), turned.share(by * d));
+                // Rounding of f64.
+                assert!((before - after).abs() < 1e-9 * before, "{before} {after}");
+            }
+        }
+    }
+}

@@ -5,7 +5,7 @@ use std::fs;
 
 use glam::DVec3;
 use image::{ImageBuffer, Rgb};
-use mesolux::scene::{PointLight, Sun};
+use mesolux::scene::{LoadOptions, PointLight, Sun, load};
 use tempfile::TempDir;
 
 use super::{good, luminance, near, read_in, wide};
@@ -245,15 +245,85 @@ fn lamps_of_surface_have_their_power() {
     assert_eq!(scene.dropped_degenerate + scene.dropped_duplicates, 0);
 }
 
+/// A triangle that faces up, with a spot and a sun that shine along −z of the file.
+const GLTF: &str = r#"{
+    "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1, 2]}],
+    "extensionsUsed": ["KHR_lights_punctual"],
+    "extensions": {"KHR_lights_punctual": {"lights": [
+        {"type": "spot", "intensity": 683.0, "spot": {}}, {"type": "directional"}
+    ]}},
+    "nodes": [
+        {"mesh": 0}, {"extensions": {"KHR_lights_punctual": {"light": 0}}, "translation": [0, 1, 0]},
+        {"extensions": {"KHR_lights_punctual": {"light": 1}}}
+    ],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+    "buffers": [{"byteLength": 36, "uri": "a.bin"}],
+    "bufferViews": [{"buffer": 0, "byteLength": 36}],
+    "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+        "min": [0, 0, 0], "max": [1, 0, 1]}]
+}"#;
+
 #[test]
-fn placements_do_not_move_the_lights_of_the_scene_file() {
+fn placements_turn_the_lights_of_a_file_and_not_those_of_the_scene() {
     let dir = TempDir::new().unwrap();
-    fs::write(
-        dir.path().join("x.ies"),
-        super::ies::file(1, &[0.0, 90.0], &[0.0], |_, _| 1.0),
-    )
-    .unwrap();
-    let table = "translate = [1, 2, 3]\n[[point_light]]\nposition = [0, 2, 0]\nies = 'x.ies'\n";
-    let scene = read_in(dir.path(), table).unwrap();
-    assert_eq!(scene.lights.points[0].position, DVec3::new(0.0, 2.0, 0.0));
+    let corners = [[0.0_f32, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]];
+    let bytes: Vec<u8> = (corners.as_flattened().iter())
+        .flat_map(|c| c.to_le_bytes())
+        .collect();
+    fs::write(dir.path().join("a.bin"), bytes).unwrap();
+    fs::write(dir.path().join("a.gltf"), GLTF).unwrap();
+    let of = |placement: &str| {
+        let table = format!(
+            "[[mesh]]\nfile = 'a.gltf'\nsides = 'as given'\n{placement}\n\
+             [[point_light]]\nname = 'own'\nposition = [0, 2, 0]\nspot = {{ outer = 30 }}\ncandela = 1\n"
+        );
+        read_in(dir.path(), &table).unwrap().lights
+    };
+    // By 90° about y, z becomes x; a mirror of x changes nothing of z.
+    for (placement, back) in [
+        ("", DVec3::Z),
+        ("rotate = [0, 90, 0]\nscale = 2", DVec3::X),
+        ("scale = [-1, 1, 1]", DVec3::Z),
+        ("scale = [1, 1, -3]", -DVec3::Z),
+    ] {
+        let lights = of(placement);
+        let [spot, own] = lights.points.as_slice() else {
+            panic!("two lights")
+        };
+        let axis = spot.beam.as_ref().unwrap().axis;
+        assert!(axis.distance(-back) < 1e-9, "{placement}: {axis}");
+        let towards = lights.suns[0].towards;
+        assert!(towards.distance(back) < 1e-9, "{placement}: {towards}");
+        assert_eq!(own.position, DVec3::new(0.0, 2.0, 0.0));
+        assert_eq!(own.beam.as_ref().unwrap().axis, -DVec3::Y);
+    }
+}
+
+#[test]
+fn sides_are_found_by_suns_skies_and_beams() {
+    let dir = TempDir::new().unwrap();
+    let floor = "v -4 0 -4\nv -4 0 4\nv 4 0 4\nv 4 0 -4\nf 4 3 2 1\n";
+    fs::write(dir.path().join("under.obj"), floor).unwrap();
+    for (light, is_lit_from_above) in [
+        ("[[sun]]\nelevation = 40\nazimuth = 10\nlux = 1000", true),
+        ("[[sun]]\nelevation = -40\nazimuth = 10\nlux = 1000", false),
+        ("[sky]\nmodel = 'cie overcast'\nlux = 1000", true),
+        (
+            "[[point_light]]\nposition = [0, 2, 0]\ncandela = 1\nspot = { outer = 20 }",
+            true,
+        ),
+        // It shines up, away from the square.
+        (
+            "[[point_light]]\nposition = [0, 2, 0]\ncandela = 1\nspot = { outer = 20 }\n\
+             axis = [0, 1, 0]",
+            false,
+        ),
+    ] {
+        let path = dir.path().join("b.toml");
+        fs::write(&path, format!("[[mesh]]\nfile = 'under.obj'\n{light}\n")).unwrap();
+        let scene = load(path.to_str().unwrap(), &LoadOptions::default()).unwrap();
+        let [a, b, c] = scene.corners(&scene.triangles[0]);
+        let faces_up = (b - a).cross(c - a).y > 0.0;
+        assert_eq!(faces_up, is_lit_from_above, "{light}: {:?}", scene.notes);
+    }
 }
