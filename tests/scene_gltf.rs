@@ -465,3 +465,19 @@ fn wrong_files_are_refused_in_one_line() {
     let error = read(&write(&dir, &file)).unwrap_err().to_string();
     assert!(error.contains("image 0"), "{error}");
 }
+
+#[test]
+fn nodes_name_meshes() {
+    let scene = read_changed(|file| {
+        file["meshes"][0]["name"] = json!("square");
+        file["nodes"] = json!([
+            {"mesh": 0, "children": [1, 2]},
+            {"mesh": 0, "name": "wall", "translation": [0, 0, 1]},
+            {"mesh": 0, "translation": [0, 0, 2]}
+        ]);
+    })
+    .unwrap();
+    let names: Vec<_> = scene.meshes.iter().map(|mesh| &mesh.name).collect();
+    assert_eq!(names, ["square", "wall", "square.2"]);
+    assert!(scene.meshes.iter().all(|mesh| mesh.count == 2));
+}

@@ -416,6 +416,7 @@ pub fn origin(scene: &str, builtin: &Builtin, hash: String) -> Origin {
         } else {
             absolute(scene.as_ref()).to_string_lossy().into_owned()
         },
+        relative: None,
         patches: builtin.patches,
         statue: builtin.statue.as_deref().map(absolute),
         import: builtin.import(),

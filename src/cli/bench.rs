@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
+use super::bake_scene::BakeScene;
 use super::{Builtin, DeviceOptions};
 use mesolux::bake::solution::Bake;
 use mesolux::bench::places::Sample;
@@ -95,6 +96,8 @@ struct IrradianceOptions {
     /// Bakes of one scene
     #[arg(value_name = "BAKE.safetensors", required = true)]
     bakes: Vec<PathBuf>,
+    #[command(flatten)]
+    bake_scene: BakeScene,
     /// Folder for irradiance.csv, irradiance.json, and the reference, which is kept for the next run
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
@@ -242,7 +245,7 @@ fn run_irradiance(options: &IrradianceOptions) -> Result<()> {
         let (scene, truth) = match same {
             Some((_, scene, truth)) => (scene, truth),
             None => {
-                let scene = Builtin::scene_of(path, &bake)?;
+                let scene = options.bake_scene.of(path, &bake)?;
                 let Some(truth) = irradiance::truth(&scene, &wanted, folder, &go_on)? else {
                     return Ok(());
                 };

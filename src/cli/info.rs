@@ -1,94 +1,106 @@
 //! `mesolux info`.
 
+use std::path::Path;
+
 use clap::Args;
 use serde::Serialize;
+use serde_json::Value;
 
+use super::{Builtin, devices, inside};
+use mesolux::bake::solution::{About, Origin};
 use mesolux::error::{Error, Result};
-use mesolux::vk::{Candidate, Instance};
+use mesolux::scene::contents::{Contents, ElementCounts};
 
-/// List Vulkan devices, their limits, and what each can run
+/// Show what is inside a scene or a bake, or which Vulkan devices there are
+///
+/// Of a scene: vertices, triangles, elements, meshes, materials, lights, cameras, bounds, warnings.
+/// Of a bake also settings, bounds of error and what the solver did. Without either: the Vulkan
+/// devices, their limits, and what each can run.
 #[derive(Args)]
 pub struct Options {
+    /// A scene (see `bake`) or a bake (.safetensors)
+    #[arg(value_name = "SCENE|BAKE")]
+    input: Option<String>,
     /// Print JSON on stdout
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    builtin: Builtin,
 }
 
+/// What is inside a scene or a bake.
 #[derive(Serialize)]
-struct Row<'a> {
-    index: usize,
-    name: &'a str,
-    kind: &'a str,
-    driver: &'a str,
-    vulkan: String,
-    /// Empty when the device can run Mesolux.
-    missing: &'a [&'static str],
-    estimators: Vec<&'static str>,
-    heap_bytes: u64,
-    max_storage_buffer_bytes: u64,
-    max_image_side: u32,
-    subgroup_size: u32,
+pub struct Inside {
+    /// As on the command line.
+    pub input: String,
+    pub contents: Option<Contents>,
+    pub elements: Option<ElementCounts>,
+    pub bake: Option<Baked>,
 }
 
-impl<'a> Row<'a> {
-    fn new(c: &'a Candidate) -> Self {
-        let mut estimators = Vec::new();
-        if c.missing.is_empty() {
-            estimators.push("receiver");
-            if c.int64_atomics {
-                estimators.push("pixel");
-            }
-        }
-        Self {
-            index: c.index,
-            name: &c.name,
-            kind: c.kind,
-            driver: &c.driver,
-            vulkan: format!("{}.{}.{}", c.api.0, c.api.1, c.api.2),
-            missing: &c.missing,
-            estimators,
-            heap_bytes: c.heap_bytes,
-            max_storage_buffer_bytes: c.max_storage_buffer_range,
-            max_image_side: c.max_image_side,
-            subgroup_size: c.subgroup_size,
-        }
-    }
+/// What only a bake has.
+#[derive(Serialize)]
+pub struct Baked {
+    pub program: String,
+    pub origin: Origin,
+    pub elements: usize,
+    pub settings: Value,
+    pub report: Value,
 }
 
 pub fn run(options: &Options) -> Result<()> {
-    let candidates = Instance::new(false)?.candidates()?;
-    let rows: Vec<_> = candidates.iter().map(Row::new).collect();
-    if options.json {
-        let text = serde_json::to_string(&rows).map_err(|e| Error::Usage(e.to_string()))?;
-        println!("{text}");
-        return Ok(());
-    }
-    if rows.is_empty() {
-        return Err(Error::Device(
-            "no Vulkan device; on Debian install mesa-vulkan-drivers for a software one".into(),
-        ));
-    }
-    for row in rows {
-        println!(
-            "{}: {} ({}, {}, Vulkan {})",
-            row.index,
-            row.name,
-            row.kind,
-            row.driver.trim(),
-            row.vulkan
-        );
-        println!(
-            "   memory {} MiB, storage buffers to {} MiB, images to {}², subgroups of {}",
-            row.heap_bytes >> 20,
-            row.max_storage_buffer_bytes >> 20,
-            row.max_image_side,
-            row.subgroup_size
-        );
-        if row.missing.is_empty() {
-            println!("   runs bake ({}) and render", row.estimators.join(", "));
-        } else {
-            println!("   cannot run Mesolux: lacks {}", row.missing.join(", "));
+    let Some(input) = &options.input else {
+        return devices::run(options.json);
+    };
+    let path = Path::new(input);
+    let is_bake = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("safetensors"));
+    let inside = match is_bake {
+        true => of_bake(input, About::load(path)?),
+        false => of_scene(input, &options.builtin)?,
+    };
+    match options.json {
+        true => {
+            let text = serde_json::to_string(&inside).map_err(|e| Error::Usage(e.to_string()))?;
+            println!("{text}");
         }
+        false => inside::print(&inside),
     }
     Ok(())
+}
+
+fn of_bake(input: &str, about: About) -> Inside {
+    let (contents, elements) = about.contents.unzip();
+    Inside {
+        input: input.to_owned(),
+        contents,
+        elements,
+        bake: Some(Baked {
+            program: about.program,
+            origin: about.origin,
+            elements: about.elements,
+            settings: about.settings,
+            report: about.report,
+        }),
+    }
+}
+
+fn of_scene(input: &str, builtin: &Builtin) -> Result<Inside> {
+    let scene = builtin.refined(input, builtin.read(input)?);
+    let contents = Contents::of(&scene);
+    let on_input = scene.on_input();
+    let of = on_input.iter().zip(&scene.triangles);
+    let elements = contents
+        .count(of.map(|(on, triangle)| (on.triangle, triangle.material)))
+        .map_err(|what| Error::Scene {
+            scene: input.to_owned(),
+            what,
+        })?;
+    Ok(Inside {
+        input: input.to_owned(),
+        contents: Some(contents),
+        elements: Some(elements),
+        bake: None,
+    })
 }

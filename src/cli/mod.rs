@@ -1,11 +1,14 @@
 //! Commands and what they share.
 
 mod bake;
+mod bake_scene;
 mod bench;
 mod bench_pictures;
 mod camera;
 mod compare;
+mod devices;
 mod info;
+mod inside;
 mod pareto;
 mod progress;
 mod reference;
@@ -18,13 +21,12 @@ mod show;
 mod view;
 
 use std::io::IsTerminal;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
-use mesolux::bake::solution::Bake;
 use mesolux::error::{Error, Result};
-use mesolux::scene::{ImportOptions, LoadOptions, OnInput, Refinement, Scene};
+use mesolux::scene::{ImportOptions, LoadOptions, Refinement, Scene};
 use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::prelude::*;
 
@@ -118,38 +120,6 @@ struct Builtin {
 }
 
 impl Builtin {
-    /// The scene of a bake that was read from a file.
-    fn scene_of(path: &Path, bake: &Bake) -> Result<Scene> {
-        let builtin = Self {
-            patches: bake.origin.patches,
-            statue: bake.origin.statue.clone(),
-            element_size: None,
-            max_elements: 0,
-            no_refine: true,
-            no_heights_from_normals: !bake.origin.import.heights_from_normals,
-            z_up: bake.origin.import.z_up,
-            sides_as_given: bake.origin.import.sides_as_given,
-        };
-        let scene = builtin.load(&bake.origin.scene)?;
-        let count = scene.triangles.len();
-        let is_of_it = |on: &OnInput| (on.triangle as usize) < count;
-        if scene.hash() != bake.origin.hash || !bake.on_input.iter().all(is_of_it) {
-            return Err(Error::file(
-                path,
-                format!(
-                    "its scene {} has changed since; bake it again",
-                    bake.origin.scene
-                ),
-            ));
-        }
-        let is_whole = |(t, on): (u32, &OnInput)| *on == OnInput::whole(t);
-        let same = bake.on_input.len() == count && (0..).zip(&bake.on_input).all(is_whole);
-        match same {
-            true => Ok(scene),
-            false => Ok(scene.cut_as(&bake.on_input)),
-        }
-    }
-
     fn import(&self) -> ImportOptions {
         ImportOptions {
             heights_from_normals: !self.no_heights_from_normals,
@@ -158,22 +128,9 @@ impl Builtin {
         }
     }
 
+    /// The scene as it is read, with what there is to say of it, and cut.
     fn load(&self, name: &str) -> Result<Scene> {
-        if let Some(size) = self.element_size
-            && !(size.is_finite() && size > 0.0)
-        {
-            return Err(Error::Usage(format!(
-                "--element-size {size}: must be above 0"
-            )));
-        }
-        let scene = mesolux::scene::load(
-            name,
-            &LoadOptions {
-                patches: self.patches,
-                statue: self.statue.clone(),
-                import: self.import(),
-            },
-        )?;
+        let scene = self.read(name)?;
         for note in &scene.notes {
             tracing::info!("{note}");
         }
@@ -186,9 +143,31 @@ impl Builtin {
                 scene.dropped_degenerate
             );
         }
+        Ok(self.refined(name, scene))
+    }
+
+    fn read(&self, name: &str) -> Result<Scene> {
+        if let Some(size) = self.element_size
+            && !(size.is_finite() && size > 0.0)
+        {
+            return Err(Error::Usage(format!(
+                "--element-size {size}: must be above 0"
+            )));
+        }
+        mesolux::scene::load(
+            name,
+            &LoadOptions {
+                patches: self.patches,
+                statue: self.statue.clone(),
+                import: self.import(),
+            },
+        )
+    }
+
+    fn refined(&self, name: &str, scene: Scene) -> Scene {
         let named = mesolux::scene::builtin::NAMES.contains(&name);
         if self.no_refine || named && self.element_size.is_none() {
-            return Ok(scene);
+            return scene;
         }
         let before = scene.triangles.len();
         let scene = scene.refined(&Refinement {
@@ -206,7 +185,7 @@ impl Builtin {
         {
             tracing::warn!("{note}");
         }
-        Ok(scene)
+        scene
     }
 }
 

@@ -7,6 +7,7 @@ use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, Id};
 
 use super::bake::{SolveOptions, bake_visibly, origin, writable};
+use super::bake_scene::BakeScene;
 use super::camera::CameraOptions;
 use super::progress::interrupted;
 use super::reference::{self, ReferenceOptions};
@@ -37,6 +38,8 @@ pub struct Options {
     /// Pixels across and down
     #[arg(long, value_name = "WxH", default_value = "800x800", value_parser = size)]
     size: (u32, u32),
+    #[command(flatten)]
+    bake_scene: BakeScene,
     #[command(flatten)]
     camera: CameraOptions,
     /// Multiplies the light by 2^EV; found from the picture if not given
@@ -102,6 +105,10 @@ pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
     let is_bake = path
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("safetensors"));
+    match is_bake {
+        true => refuse_baking(given, &options.input)?,
+        false => options.bake_scene.refuse(&options.input)?,
+    }
     if options.reference.reference {
         if is_bake {
             return Err(Error::Usage(format!(
@@ -111,14 +118,11 @@ pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
         }
         return run_reference(options);
     }
-    if is_bake {
-        refuse_baking(given, &options.input)?;
-    }
     let settings = options.solve.settings()?;
     let folder = settings.relief.cache.as_deref();
     let (scene, bake) = if is_bake {
         let bake = Bake::load(path)?;
-        (Builtin::scene_of(path, &bake)?, Some(bake))
+        (options.bake_scene.of(path, &bake)?, Some(bake))
     } else {
         settings.check()?;
         (options.builtin.load(&options.input)?, None)

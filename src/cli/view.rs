@@ -6,6 +6,7 @@ use std::time::Instant;
 use clap::Args;
 
 use super::bake::{SolveOptions, beside, writable};
+use super::bake_scene::BakeScene;
 use super::camera::CameraOptions;
 use super::render::size;
 use super::{Builtin, DeviceOptions};
@@ -29,6 +30,8 @@ pub struct Options {
     /// Pixels across and down
     #[arg(long, value_name = "WxH", default_value = "1024x640", value_parser = size)]
     size: (u32, u32),
+    #[command(flatten)]
+    bake_scene: BakeScene,
     #[command(flatten)]
     camera: CameraOptions,
     /// Draw so many frames, then close
@@ -96,7 +99,7 @@ pub fn run(options: &Options, start: Instant) -> Result<()> {
         .is_some_and(|e| e.eq_ignore_ascii_case("safetensors"));
     let (scene, bake, kept) = if is_bake {
         let bake = Bake::load(path)?;
-        let scene = Builtin::scene_of(path, &bake)?;
+        let scene = options.bake_scene.of(path, &bake)?;
         let beside = beside(path);
         let kept = match beside.is_file() {
             true => Some(Visibility::load(&beside)?),
@@ -104,6 +107,7 @@ pub fn run(options: &Options, start: Instant) -> Result<()> {
         };
         (scene, Some(bake), kept)
     } else {
+        options.bake_scene.refuse(&options.input)?;
         (options.builtin.load(&options.input)?, None, None)
     };
     let camera = options.camera.of(&scene)?;

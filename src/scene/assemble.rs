@@ -8,6 +8,7 @@ use glam::DVec3;
 
 use super::material::MadeUp;
 use super::mesh_file::MeshFile;
+use super::meshes::{self, Names, Part};
 use super::said::Said;
 use super::sides::{self, Choice, Sides};
 use super::uv::{OnSurface, box_projection};
@@ -24,10 +25,21 @@ pub(super) struct Mesh {
     pub made_up: Vec<MadeUp>,
     /// Where the maps of each material lie, `[material]`; of those made up, as the mesh says.
     pub on_surface: Vec<OnSurface>,
+    /// Ascending, from the first triangle on; equal names are one mesh.
+    pub parts: Vec<Part>,
     pub said: Said,
 }
 
 impl Mesh {
+    /// The same as one mesh of a name.
+    pub fn named(mut self, name: &str) -> Self {
+        self.parts = vec![Part {
+            name: name.to_owned(),
+            first: 0,
+        }];
+        self
+    }
+
     /// Turns a mesh whose z axis points up, so that y does.
     pub fn turn_z_up(&mut self) {
         for p in &mut self.positions {
@@ -71,6 +83,8 @@ pub(super) struct Assembly {
     /// Corners of each triangle in their order, the least first.
     known: HashSet<[u32; 3]>,
     projected: usize,
+    /// Of meshes.
+    names: Names,
     /// What is left to be found of the sides of each triangle, `[triangle]`.
     choices: Vec<Choice>,
 }
@@ -86,6 +100,7 @@ impl Assembly {
             welded: HashMap::new(),
             known: HashSet::new(),
             projected: 0,
+            names: Names::default(),
             choices: Vec::new(),
         }
     }
@@ -124,7 +139,21 @@ impl Assembly {
     /// # Errors
     /// A position that is not finite.
     pub fn add_mesh(&mut self, mesh: &Mesh, materials: &[u32]) -> Result<()> {
-        for triangle in &mesh.triangles {
+        let mut known: HashMap<&str, String> = HashMap::new();
+        let mut names = Vec::with_capacity(mesh.parts.len());
+        for part in &mesh.parts {
+            let new = || self.names.free(&part.name);
+            names.push(known.entry(&part.name).or_insert_with(new).clone());
+        }
+        let mut part = 0;
+        for (index, triangle) in mesh.triangles.iter().enumerate() {
+            while mesh
+                .parts
+                .get(part + 1)
+                .is_some_and(|next| next.first <= index)
+            {
+                part += 1;
+            }
             let corners = triangle.corners.map(|v| mesh.positions[v as usize]);
             if let Some(bad) = corners.iter().find(|p| !p.is_finite()) {
                 return Err(Error::Scene {
@@ -152,6 +181,8 @@ impl Assembly {
                 uv,
                 material: materials[triangle.material as usize],
             });
+            let name = names.get(part).unwrap_or(&self.scene.name);
+            meshes::add(&mut self.scene.meshes, name);
         }
         Ok(())
     }
@@ -216,10 +247,7 @@ impl Assembly {
             Some(Sides::Inward) => sides::face(&mut self.scene, first, false),
             Some(Sides::Both) => {
                 for t in first..self.scene.triangles.len() {
-                    let back = sides::turned(&self.scene.triangles[t]);
-                    if self.known.insert(least_first(back.vertices)) {
-                        self.scene.triangles.push(back);
-                    }
+                    self.add_back(t);
                 }
             }
         }
@@ -243,6 +271,18 @@ impl Assembly {
         Ok(())
     }
 
+    /// Adds the back of a triangle, to its mesh.
+    fn add_back(&mut self, t: usize) {
+        let scene = &mut self.scene;
+        let back = sides::turned(&scene.triangles[t]);
+        if self.known.insert(least_first(back.vertices)) {
+            scene.triangles.push(back);
+            let name = meshes::of(&scene.meshes, t as u32)
+                .map_or_else(|| scene.name.clone(), |of| scene.meshes[of].name.clone());
+            meshes::add(&mut scene.meshes, &name);
+        }
+    }
+
     fn weld(&mut self, position: DVec3) -> u32 {
         // Adding zero turns −0 into 0: the same position with other bits.
         let position = position + DVec3::ZERO;
@@ -263,10 +303,7 @@ impl Assembly {
             false => sides::turn_dark(&mut self.scene, &self.choices),
         };
         for t in backs {
-            let back = sides::turned(&self.scene.triangles[t]);
-            if self.known.insert(least_first(back.vertices)) {
-                self.scene.triangles.push(back);
-            }
+            self.add_back(t);
         }
         self.into_scene()
     }

@@ -215,6 +215,7 @@ impl Refined {
             materials: scene.materials.iter().map(without_relief).collect(),
             triangles: Vec::with_capacity(self.pieces.len()),
             vertices,
+            meshes: Vec::new(),
             ..scene.clone()
         };
         for piece in &self.pieces {

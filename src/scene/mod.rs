@@ -16,6 +16,7 @@ pub mod builtin;
 mod camera;
 pub mod camera_path;
 mod check;
+pub mod contents;
 mod displace;
 pub(crate) mod even_light;
 #[cfg(feature = "formats")]
@@ -35,6 +36,7 @@ mod map_files;
 mod maps;
 mod material;
 mod mesh_file;
+mod meshes;
 mod mtl;
 mod mtl_maps;
 mod obj;
@@ -69,6 +71,7 @@ pub use lights::{Beam, Lights, PointLight, Sun};
 pub use load::{ImportOptions, LoadOptions, load};
 pub use maps::{HeightMap, NormalMap};
 pub use material::Material;
+pub use meshes::MeshRange;
 pub use refine::{OnInput, RefinedFrom, Refinement};
 pub use texture::Texture;
 pub use web::Web;
@@ -86,6 +89,8 @@ pub struct Scene {
     pub vertices: Vec<DVec3>,
     /// In the order of the input.
     pub triangles: Vec<Triangle>,
+    /// The meshes that the triangles of the input came from, in their order and without gaps.
+    pub meshes: Vec<MeshRange>,
     pub materials: Vec<Material>,
     pub lights: Lights,
     pub cameras: Vec<Camera>,

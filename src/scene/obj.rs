@@ -7,8 +7,9 @@ use glam::DVec3;
 
 use super::assemble::{Mesh, MeshTriangle};
 use super::material::{DEFAULT_KD, MadeUp, TextureCache};
+use super::meshes::Part;
 use super::obj_lint::{self, Checked, brief};
-use super::text_file::read_text;
+use super::text_file::{read_text, stem};
 use super::uv::UvTransform;
 use super::{Material, mtl};
 use crate::error::{Error, Result};
@@ -38,8 +39,27 @@ pub(super) fn read(path: &Path, textures: &mut TextureCache) -> Result<Mesh> {
     }
     materials(path, &checked, textures, &mut mesh)?;
     faces(path, &checked, &mut mesh)?;
+    mesh.parts = parts(path, checked);
     warn_of_clamped_maps(path, &mut mesh);
     Ok(mesh)
+}
+
+/// Objects, or groups where there are none; the file has the name of what lies outside of them.
+fn parts(path: &Path, checked: Checked) -> Vec<Part> {
+    let mut parts = match checked.objects.is_empty() {
+        true => checked.groups,
+        false => checked.objects,
+    };
+    if parts.first().is_none_or(|part| part.first > 0) {
+        let name = String::new();
+        parts.insert(0, Part { name, first: 0 });
+    }
+    for part in &mut parts {
+        if part.name.is_empty() {
+            part.name = stem(path);
+        }
+    }
+    parts
 }
 
 fn materials(

@@ -6,6 +6,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use super::meshes::Part;
 use crate::error::{Error, Result};
 
 /// The text for tobj, and what tobj would not report.
@@ -19,6 +20,9 @@ pub(super) struct Checked {
     pub used: Vec<(usize, String)>,
     /// For each triangle of the fans, in order, whether its face has texture coordinates.
     pub has_uv: Vec<bool>,
+    /// Objects, and groups, by their first triangle.
+    pub objects: Vec<Part>,
+    pub groups: Vec<Part>,
     /// Number of lines that are ignored, and the first of them.
     pub unknown: usize,
     pub first_unknown: Option<(usize, String)>,
@@ -33,9 +37,7 @@ struct Counts {
 }
 
 /// Statements of the format that say nothing about diffuse triangles.
-const PASSED_OVER: [&str; 34] = [
-    "o",
-    "g",
+const PASSED_OVER: [&str; 32] = [
     "s",
     "l",
     "p",
@@ -141,6 +143,17 @@ impl Checked {
             }
             "f" | "fo" => self.face(&words(rest)),
             "usemtl" => self.use_material(line, rest.trim()),
+            "o" | "g" => {
+                let part = Part {
+                    name: rest.trim().to_owned(),
+                    first: self.has_uv.len(),
+                };
+                match keyword {
+                    "o" => self.objects.push(part),
+                    _ => self.groups.push(part),
+                }
+                Ok(())
+            }
             "mtllib" => self.library(line, rest.trim()),
             _ => {
                 let known = keyword.is_empty()

@@ -88,7 +88,14 @@ fn mesh(scene: &Scene, out: &mut dyn Write) -> io::Result<()> {
     }
     let mut uvs: HashMap<[u32; 2], usize> = HashMap::new();
     let mut material = None;
-    for triangle in &scene.triangles {
+    // Those of a refined scene are ranges of its input.
+    let is_input = scene.refined_from.is_none();
+    let ranges = scene.meshes.iter().filter(|_| is_input);
+    let mut meshes = ranges.peekable();
+    for (index, triangle) in (0..).zip(&scene.triangles) {
+        if let Some(mesh) = meshes.next_if(|mesh| mesh.first == index) {
+            writeln!(out, "o {}", mesh.name.replace(char::is_control, " "))?;
+        }
         let mut uv_indices = [0; 3];
         for (uv, index) in triangle.uv.iter().zip(&mut uv_indices) {
             let next = uvs.len() + 1;

@@ -217,11 +217,9 @@ fn saved_bakes_give_the_same_pictures() {
     let folder = tempfile::tempdir().expect("a folder for the test");
     let path = folder.path().join("bake.safetensors");
     let origin = Origin {
-        import: Default::default(),
         scene: "test".into(),
-        patches: None,
-        statue: None,
         hash: scene.hash(),
+        ..Origin::default()
     };
     solution.save(&path, &origin, &"none").expect("a file");
     let bake = Bake::load(&path).expect("what was saved");

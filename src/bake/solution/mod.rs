@@ -1,17 +1,21 @@
 //! The result of a bake, in scene units and in the order of the input.
 
-mod file;
+mod origin;
+mod read;
+mod write;
 
 use glam::{DVec3, Vec3};
-use serde::{Deserialize, Serialize};
 
 use crate::bake::discretisation::discretisation;
 use crate::mesh::corners::{Joined, corner_irradiance};
 use crate::mesh::elements::Elements;
 use crate::meso::Relief;
-use crate::scene::{ImportOptions, OnInput, Scene};
+use crate::scene::contents::Contents;
+use crate::scene::{OnInput, Scene};
 use crate::solver::{Light, ReliefLight, Report};
-pub use file::{Bake, VERSION};
+pub use origin::Origin;
+pub use read::{About, Bake};
+pub use write::VERSION;
 
 /// A solution, `[triangle]` in the order of the input.
 pub struct Solution {
@@ -34,6 +38,8 @@ pub struct Solution {
     pub radiosity: Vec<Vec3>,
     /// Light by direction of the elements with a relief; none where no element has one.
     pub relief: Option<DirectionalLight>,
+    /// What is in the scene; none of a solution under way.
+    pub contents: Option<Contents>,
     pub report: Report,
 }
 
@@ -100,19 +106,6 @@ impl DirectionalLight {
     }
 }
 
-/// Where a bake's scene came from: enough to read it again.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Origin {
-    /// As on the command line: a built-in name, or a path made absolute.
-    pub scene: String,
-    pub patches: Option<usize>,
-    pub statue: Option<std::path::PathBuf>,
-    #[serde(default)]
-    pub import: ImportOptions,
-    /// [`Scene::hash`].
-    pub hash: String,
-}
-
 impl Solution {
     pub fn new(scene: &Scene, elements: &Elements, light: &Light, report: Report) -> Self {
         let unit = elements.unit;
@@ -132,15 +125,18 @@ impl Solution {
                 .as_ref()
                 .zip(light.relief.as_ref())
                 .map(|(relief, light)| DirectionalLight::new(elements, relief, light)),
+            contents: None,
             report,
         }
     }
 
-    /// With the light at the corners, and an estimate of its error in the report.
+    /// With the light at the corners, an estimate of its error in the report, and what is in the
+    /// scene.
     pub fn with_corners(mut self, scene: &Scene) -> Self {
         let irradiance = corner_light(scene, &self.irradiance);
         let estimate = discretisation(scene, &self.irradiance, &irradiance);
         self.report.discretisation = Some(estimate);
+        self.contents = Some(Contents::of(scene));
         self.corners = Some(CornerLight {
             irradiance,
             irradiance_direct: corner_light(scene, &self.irradiance_direct),

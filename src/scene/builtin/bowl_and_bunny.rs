@@ -74,7 +74,7 @@ pub(super) fn build(options: &LoadOptions) -> Result<Scene> {
             wool,
             diffuse("glaze", [0.16, 0.30, 0.58]),
         ],
-        solids: vec![figure, bowl],
+        solids: vec![figure.named("bunny"), bowl.named("bowl")],
         lights: Lights::from(PointLight {
             name: "bulb".into(),
             position: DVec3::new(0.36, 0.62, 0.16),

@@ -48,6 +48,7 @@ pub(super) fn build(options: &LoadOptions) -> Result<Scene> {
             triangle.uv = Some(box_projection(corners));
         }
     }
+    let mut notes = std::mem::take(&mut mesh.said.notes);
     let statue = stage::count(&mesh);
     let least = statue + grid::least_triangles();
     // Only a statue given by the user may need more than the default number of patches.
@@ -67,9 +68,9 @@ pub(super) fn build(options: &LoadOptions) -> Result<Scene> {
         &stage::room(&ROOM, patches - statue, material_of),
         &materials,
     )?;
-    assembly.add_mesh(&mesh, &materials)?;
+    assembly.add_mesh(&mesh.named("statue"), &materials)?;
     let scene = &mut assembly.scene;
-    scene.notes.append(&mut mesh.said.notes);
+    scene.notes.append(&mut notes);
     scene.cameras.push(camera());
     assert_eq!(
         scene.triangles.len(),

@@ -48,7 +48,7 @@ pub(super) fn build(options: &LoadOptions) -> Result<Scene> {
         room,
         material_of: cornell::material_of,
         materials,
-        solids: vec![horse],
+        solids: vec![horse.named("horse")],
         lights: Lights::default(),
         camera: cornell::camera(),
     };

@@ -56,7 +56,7 @@ pub(super) fn build(options: &LoadOptions) -> Result<Scene> {
     let mut dish = solid::revolve(&dish_profile(), even_share(patches, DISH_SHARE));
     stage::stand(&mut dish, DISH_FOOT);
     stage::cover(&mut dish, DISH, 1.0);
-    let mut solids = vec![dish];
+    let mut solids = vec![dish.named("dish")];
 
     let oranges = fruit::ORANGES.len();
     let pairs = even_share(patches, SHARE) / 2;
@@ -65,8 +65,9 @@ pub(super) fn build(options: &LoadOptions) -> Result<Scene> {
         let mut orange = fruit::orange(count);
         lay(&mut orange, DVec3::from(*at));
         stage::cover(&mut orange, ORANGE, REPEATS);
-        solids.push(orange);
+        solids.push(orange.named("orange"));
     }
+    let names = fruit::materials().map(|material| material.name);
     for fruit in fruit::others() {
         let count = |share| even_share(patches, share).max(LEAST_TRIANGLES);
         let mut mesh = (fruit.build)(count(fruit.share));
@@ -77,9 +78,9 @@ pub(super) fn build(options: &LoadOptions) -> Result<Scene> {
             let foot = stage::top(&mesh, fruit::STEM_RADIUS) + DVec3::Y * GAP;
             stage::stand(&mut stem, foot);
             stage::cover(&mut stem, ORANGE + 1 + fruit::STEM, 1.0);
-            solids.push(stem);
+            solids.push(stem.named("stem"));
         }
-        solids.push(mesh);
+        solids.push(mesh.named(&names[fruit.material as usize - 1]));
     }
 
     let peel = Material {

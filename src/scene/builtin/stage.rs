@@ -121,7 +121,7 @@ pub(super) fn room(room: &Room, count: usize, material_of: fn(Part) -> u32) -> M
             material: material_of(part),
         });
     }
-    mesh
+    mesh.named("room")
 }
 
 /// Gives every triangle a material, and texture coordinates with the given repeats per metre.

@@ -15,6 +15,7 @@ use super::assemble::free_name;
 use super::light_units::LUMENS_OF_A_WATT;
 use super::lights::{across, unit};
 use super::mesh_file::MeshFile;
+use super::meshes::{Names, Part};
 use super::{Beam, Camera, PointLight, Sun, Web};
 use crate::error::{Error, Result};
 use document::File;
@@ -32,6 +33,7 @@ pub(super) fn read(path: &Path) -> Result<MeshFile> {
         materials: Materials::read(&file)?,
         file: &file,
         found: MeshFile::default(),
+        names: Names::default(),
         skipped: Skipped::default(),
     };
     let scene = (file.document.default_scene()).or_else(|| file.document.scenes().next());
@@ -52,6 +54,8 @@ struct Reader<'a> {
     file: &'a File,
     materials: Materials,
     found: MeshFile,
+    /// Of the nodes that have meshes.
+    names: Names,
     skipped: Skipped,
 }
 
@@ -85,6 +89,12 @@ impl Reader<'_> {
         }
         if let Some(mesh) = node.mesh() {
             self.skipped.skins += usize::from(node.skin().is_some());
+            let unnamed = format!("node {}", node.index());
+            let name = node.name().or(mesh.name()).unwrap_or(&unnamed);
+            self.found.mesh.parts.push(Part {
+                name: self.names.free(name),
+                first: self.found.mesh.triangles.len(),
+            });
             for primitive in mesh.primitives() {
                 self.primitive(&primitive, placed)?;
             }

@@ -62,6 +62,7 @@ impl Cutting {
         let mut scene = self.scene;
         scene.refined_from = Some(RefinedFrom {
             hash: input.hash(),
+            vertices: input.vertices.len(),
             on_input: self.on_input,
         });
         scene

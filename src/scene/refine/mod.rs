@@ -65,6 +65,8 @@ impl OnInput {
 pub struct RefinedFrom {
     /// [`Scene::hash`] of the input.
     pub hash: String,
+    /// How many vertices the input has; they are the first of the refined scene.
+    pub vertices: usize,
     /// `[triangle]`
     pub on_input: Vec<OnInput>,
 }
@@ -189,6 +191,7 @@ impl Scene {
             .collect();
         cut.refined_from = Some(RefinedFrom {
             hash: self.hash(),
+            vertices: self.vertices.len(),
             on_input: on_input.to_vec(),
         });
         cut

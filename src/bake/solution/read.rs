@@ -1,0 +1,267 @@
+//! The file of a solution, read.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use glam::Vec3;
+use safetensors::{Dtype, SafeTensors};
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+
+use super::write::{VERSION, checksum};
+use super::{DirectionalLight, Origin};
+use crate::error::{Error, Result};
+use crate::scene::OnInput;
+use crate::scene::contents::{Contents, ElementCounts};
+
+/// The part of a bake file that drawing needs.
+pub struct Bake {
+    pub origin: Origin,
+    /// W·m⁻², RGB, `[triangle]` in the order of the input.
+    pub irradiance: Vec<Vec3>,
+    pub irradiance_direct: Vec<Vec3>,
+    /// At the corners, `[triangle][corner]`; none of a bake that was stopped before it had them.
+    pub corner_irradiance: Option<Vec<[Vec3; 3]>>,
+    pub relief: Option<DirectionalLight>,
+    /// Where each triangle lies in the scene as it was read.
+    pub on_input: Vec<OnInput>,
+}
+
+impl Bake {
+    /// Reads a bake.
+    ///
+    /// # Errors
+    /// A file that is not a bake, is of another version, or whose tensors differ from what was
+    /// written.
+    pub fn load(path: &Path) -> Result<Self> {
+        let bytes = read(path)?;
+        let file = File::new(path, &bytes)?;
+        let irradiance = file.vectors("irradiance", &[])?;
+        let bake = Self {
+            origin: file.origin()?,
+            irradiance_direct: file.vectors("irradiance_direct", &[])?,
+            corner_irradiance: file.corners("corner_irradiance", irradiance.len())?,
+            relief: file.relief(irradiance.len())?,
+            on_input: file.on_input(irradiance.len())?,
+            irradiance,
+        };
+        match bake.irradiance.len() == bake.irradiance_direct.len() {
+            true => Ok(bake),
+            false => Err(Error::file(
+                path,
+                "irradiance and irradiance_direct differ in length",
+            )),
+        }
+    }
+}
+
+/// What a bake file says of its scene and of how it was made.
+pub struct About {
+    pub origin: Origin,
+    /// The program that made it, with its version.
+    pub program: String,
+    pub elements: usize,
+    /// None of a bake of an earlier program.
+    pub contents: Option<(Contents, ElementCounts)>,
+    /// As JSON objects.
+    pub settings: Value,
+    pub report: Value,
+}
+
+impl About {
+    /// Reads what a bake says of itself, and counts its elements.
+    ///
+    /// # Errors
+    /// As [`Bake::load`]; metadata that is not there, is no JSON, or does not fit the tensors.
+    pub fn load(path: &Path) -> Result<Self> {
+        let bytes = read(path)?;
+        let file = File::new(path, &bytes)?;
+        let material = file.words("material")?;
+        let triangle = file.words("input_triangle")?;
+        if material.len() != triangle.len() {
+            return Err(file.bad("material", "not of as many elements as input_triangle"));
+        }
+        let elements = material.len();
+        let contents = match file.metadata.contains_key("contents") {
+            false => None,
+            true => {
+                let contents: Contents = file.json("contents")?;
+                let of = triangle.into_iter().zip(material);
+                let counts = (contents.count(of)).map_err(|what| file.bad("contents", &what))?;
+                Some((contents, counts))
+            }
+        };
+        Ok(Self {
+            origin: file.origin()?,
+            program: file.text("program")?.to_owned(),
+            elements,
+            contents,
+            settings: file.json("settings")?,
+            report: file.json("report")?,
+        })
+    }
+}
+
+fn read(path: &Path) -> Result<Vec<u8>> {
+    std::fs::read(path).map_err(|e| Error::read(path, e))
+}
+
+/// A bake file whose version and tensors are right.
+struct File<'a> {
+    tensors: SafeTensors<'a>,
+    metadata: HashMap<String, String>,
+    path: &'a Path,
+}
+
+impl<'a> File<'a> {
+    fn new(path: &'a Path, bytes: &'a [u8]) -> Result<Self> {
+        let bad = |what: String| Error::file(path, what);
+        let (_, header) = SafeTensors::read_metadata(bytes)
+            .map_err(|e| bad(format!("not a safetensors file: {e}")))?;
+        let metadata = header.metadata().clone().unwrap_or_default();
+        match metadata.get("version").map(String::as_str) {
+            Some(VERSION) => {}
+            Some(other) => {
+                return Err(bad(format!(
+                    "a bake of version {}; this program reads version {VERSION}",
+                    other.escape_debug()
+                )));
+            }
+            None => return Err(bad("not a bake: it has no version".into())),
+        }
+        let tensors = SafeTensors::deserialize(bytes).map_err(|e| bad(e.to_string()))?;
+        // Bakes of earlier programs have none.
+        if let Some(expected) = metadata.get("sha256") {
+            let tensors = tensors.iter().map(|(name, tensor)| (name, tensor.data()));
+            if checksum(tensors) != *expected {
+                return Err(bad(
+                    "damaged: its tensors are not those that were written".into()
+                ));
+            }
+        }
+        Ok(Self {
+            tensors,
+            metadata: metadata.into_iter().collect(),
+            path,
+        })
+    }
+
+    fn origin(&self) -> Result<Origin> {
+        self.json("scene")
+    }
+
+    fn text(&self, key: &str) -> Result<&str> {
+        let found = self.metadata.get(key).map(String::as_str);
+        found.ok_or_else(|| self.bad(key, "the metadata lacks it: bake again"))
+    }
+
+    fn json<T: DeserializeOwned>(&self, key: &str) -> Result<T> {
+        let wrong = |e: serde_json::Error| self.bad(key, &format!("damaged metadata: {e}"));
+        serde_json::from_str(self.text(key)?).map_err(wrong)
+    }
+
+    fn words(&self, name: &str) -> Result<Vec<u32>> {
+        let words = self.tensor(name, Dtype::U32, &[])?;
+        Ok(words.into_iter().map(u32::from_le_bytes).collect())
+    }
+
+    fn bad(&self, name: &str, what: &str) -> Error {
+        Error::file(self.path, format!("{name}: {what}"))
+    }
+
+    /// Words of a tensor of the shape `[N, inner…]`.
+    fn tensor(&self, name: &str, dtype: Dtype, inner: &[usize]) -> Result<Vec<[u8; 4]>> {
+        let tensor = self
+            .tensors
+            .tensor(name)
+            .map_err(|e| self.bad(name, &e.to_string()))?;
+        let shape = tensor.shape();
+        if tensor.dtype() != dtype || shape.len() != 1 + inner.len() || shape[1..] != *inner {
+            return Err(self.bad(name, &format!("not {dtype:?} [N, {inner:?}]")));
+        }
+        let words = tensor.data().chunks_exact(4);
+        Ok(words.map(|b| [b[0], b[1], b[2], b[3]]).collect())
+    }
+
+    /// Vectors, `[N][inner]`.
+    fn vectors(&self, name: &str, inner: &[usize]) -> Result<Vec<Vec3>> {
+        let words = self.tensor(name, Dtype::F32, &[inner, &[3]].concat())?;
+        let values: Vec<f32> = words.into_iter().map(f32::from_le_bytes).collect();
+        if values.iter().any(|v| !v.is_finite()) {
+            return Err(self.bad(name, "not all numbers are finite"));
+        }
+        Ok(values.chunks_exact(3).map(Vec3::from_slice).collect())
+    }
+
+    /// Light at the corners of so many triangles, where the file has it.
+    fn corners(&self, name: &str, triangles: usize) -> Result<Option<Vec<[Vec3; 3]>>> {
+        if !self.tensors.names().contains(&name) {
+            return Ok(None);
+        }
+        let values = self.vectors(name, &[3])?;
+        match values.len() == 3 * triangles {
+            true => Ok(Some(values.as_chunks().0.to_vec())),
+            false => Err(self.bad(name, "not of as many triangles as irradiance")),
+        }
+    }
+
+    /// Where each of so many triangles lies in the input.
+    fn on_input(&self, triangles: usize) -> Result<Vec<OnInput>> {
+        let words = self.words("input_triangle")?;
+        let corners = self.tensor("input_corners", Dtype::F32, &[3, 2])?;
+        let corners: Vec<f64> = (corners.into_iter())
+            .map(|word| f64::from(f32::from_le_bytes(word)))
+            .collect();
+        if words.len() != triangles || corners.len() != 6 * triangles {
+            return Err(self.bad("input_corners", "not of as many triangles as irradiance"));
+        }
+        if !corners.iter().all(|weight| (0.0..=1.0).contains(weight)) {
+            return Err(self.bad("input_corners", "a corner lies outside its triangle"));
+        }
+        let on_input = words.into_iter().zip(corners.chunks_exact(6));
+        Ok(on_input
+            .map(|(triangle, c)| OnInput {
+                triangle,
+                corners: [[c[0], c[1]], [c[2], c[3]], [c[4], c[5]]],
+            })
+            .collect())
+    }
+
+    /// Light by direction of some of the scene's `triangles` triangles.
+    fn relief(&self, triangles: usize) -> Result<Option<DirectionalLight>> {
+        if !self.tensors.names().contains(&"meso_elements") {
+            return Ok(None);
+        }
+        let elements = self.words("meso_elements")?;
+        if elements.windows(2).any(|pair| pair[0] >= pair[1])
+            || elements.last().is_some_and(|&e| e as usize >= triangles)
+        {
+            return Err(self.bad("meso_elements", "not ascending triangles of the scene"));
+        }
+        let directions = self.vectors("directions", &[])?;
+        let k = directions.len();
+        let blocks = |values: Vec<Vec3>| -> Vec<[Vec3; 3]> {
+            values.chunks_exact(3).map(|b| [b[0], b[1], b[2]]).collect()
+        };
+        let light = DirectionalLight {
+            directions: directions.iter().map(|d| d.as_dvec3()).collect(),
+            frames: blocks(self.vectors("meso_frames", &[3])?),
+            incident_moment: blocks(self.vectors("incident_moment", &[k, 3])?),
+            incident_moment_direct: blocks(self.vectors("incident_moment_direct", &[k, 3])?),
+            exitant: self.vectors("exitant", &[k])?,
+            elements,
+        };
+        let (m, slots) = (light.elements.len(), light.elements.len() * k);
+        let fits = light.frames.len() == m
+            && light.incident_moment.len() == slots
+            && light.incident_moment_direct.len() == slots
+            && light.exitant.len() == slots;
+        match fits {
+            true => Ok(Some(light)),
+            false => Err(self.bad(
+                "meso_elements",
+                "the tensors of the relief differ in length",
+            )),
+        }
+    }
+}
