@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use crate::math::groups::{edges, shared};
 use crate::mesh::corners::PLANE_COS;
 use crate::scene::Scene;
 use crate::solver::{Discretisation, SurfaceError};
@@ -26,7 +27,7 @@ pub fn discretisation(scene: &Scene, irradiance: &[Vec3], corners: &[[Vec3; 3]])
     let mut squares: Vec<f64> = (irradiance.par_iter().zip(corners))
         .map(|(&light, [a, b, c])| square(light - (a + b + c) / 3.0))
         .collect();
-    for [e, other] in edges(scene) {
+    for [e, other] in pairs(scene) {
         let [one, two] = [e, other].map(|e| crosses[e].normalize_or_zero());
         if one.dot(two) >= PLANE_COS {
             let jump = OF_JUMP * jump(scene, corners, [e, other]);
@@ -91,17 +92,11 @@ impl std::fmt::Display for Discretisation {
 }
 
 /// The two triangles of each edge that joins two.
-fn edges(scene: &Scene) -> Vec<[usize; 2]> {
-    let mut sides: Vec<([u32; 2], usize)> = (scene.triangles.par_iter().enumerate())
-        .flat_map_iter(|(e, triangle)| {
-            let [a, b, c] = triangle.vertices;
-            [[a, b], [b, c], [c, a]].map(|[a, b]| ([a.min(b), a.max(b)], e))
-        })
-        .collect();
-    sides.par_sort_unstable();
-    (sides.chunk_by(|a, b| a.0 == b.0))
-        .filter_map(|sides| match sides {
-            [(_, a), (_, b)] => Some([*a, *b]),
+fn pairs(scene: &Scene) -> Vec<[usize; 2]> {
+    let edges = edges(scene.triangles.iter().map(|t| t.vertices));
+    (shared(&edges))
+        .filter_map(|run| match run {
+            [a, b] => Some([a, b].map(|edge| edge.triangle as usize)),
             _ => None,
         })
         .collect()

@@ -2,6 +2,8 @@
 
 pub mod directions;
 pub mod form_factor;
+pub mod groups;
 pub mod hemicube;
 pub mod kept;
 pub mod random;
+pub mod sampling;

@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 
 use glam::DVec3;
 
+use crate::math::groups::{Edge, edges, shared};
 use crate::mesh::elements::Elements;
 
 /// Elements that touch over an edge, and the connected parts that they form.
@@ -23,35 +24,22 @@ pub struct Connections {
     pub enclosed: bool,
 }
 
-/// Low vertex, high vertex, element, and edge of the element.
-type Edge = (u32, u32, u32, u8);
-
 impl Connections {
     pub fn new(elements: &Elements) -> Self {
         let count = elements.len();
-        // Equal edges are adjacent once sorted.
-        let mut edges: Vec<Edge> = Vec::with_capacity(3 * count);
-        for (e, corners) in elements.corners.iter().enumerate() {
-            for i in 0..3 {
-                let (a, b) = (corners[i], corners[(i + 1) % 3]);
-                edges.push((a.min(b), a.max(b), e as u32, i as u8));
-            }
-        }
-        edges.sort_unstable();
         let mut neighbours = vec![[None; 3]; count];
-        for group in edges.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
-            let start = |z: &Edge| elements.corners[z.2 as usize][z.3 as usize];
-            let normal = |z: &Edge| elements.normal[z.2 as usize];
+        for group in shared(&edges(elements.corners.iter().copied())) {
+            let normal = |z: &Edge| elements.normal[z.triangle as usize];
             let mut join = |x: &Edge, y: &Edge| {
-                neighbours[x.2 as usize][x.3 as usize] = Some(y.2);
-                neighbours[y.2 as usize][y.3 as usize] = Some(x.2);
+                neighbours[x.triangle as usize][usize::from(x.side)] = Some(y.triangle);
+                neighbours[y.triangle as usize][usize::from(y.side)] = Some(x.triangle);
             };
             match group {
-                [x, y] if start(x) != start(y) => join(x, y),
+                [x, y] if x.ascends != y.ascends => join(x, y),
                 // Two surfaces that touch, such as the sides of a sheet: each continues.
                 [_, _, _, _] => {
                     let (on, back): (Vec<&Edge>, Vec<&Edge>) =
-                        group.iter().partition(|z| start(z) == start(&group[0]));
+                        group.iter().partition(|z| z.ascends == group[0].ascends);
                     let continues = |x: &Edge, y: &Edge| normal(x).dot(normal(y)) > 0.0;
                     if let ([a, b], [c, d]) = (&on[..], &back[..]) {
                         for [c, d] in [[c, d], [d, c]] {

@@ -14,11 +14,9 @@
 //! ```
 
 mod film;
-mod geometry;
 mod instant;
 mod lights;
 mod paths;
-mod sampling;
 
 use std::time::{Duration, Instant};
 
@@ -31,8 +29,9 @@ pub(crate) use film::NORMAL_95;
 pub use instant::VirtualLights;
 
 use crate::error::{Error, Result};
+use crate::math::sampling;
 use crate::picture::{Light, Projection, View};
-use crate::scene::Scene;
+use crate::scene::{Scene, geometry};
 use film::Batch;
 use geometry::Geometry;
 use lights::Lights;

@@ -19,6 +19,7 @@ mod check;
 pub mod contents;
 mod displace;
 pub(crate) mod even_light;
+pub mod geometry;
 #[cfg(feature = "formats")]
 mod gltf_file;
 mod hash;

@@ -4,22 +4,16 @@
 //! is. Random paths from the lights, off either side of what they meet, find the pieces that show
 //! light only their backs: a room whose normals point outward is one.
 
-mod starts;
-
-use std::collections::{HashMap, HashSet};
-use std::time::Duration;
+use std::collections::HashSet;
 
 use glam::DVec3;
-use obvhs::aabb::Aabb;
-use obvhs::cwbvh::CwBvh;
-use obvhs::cwbvh::builder::build_cwbvh;
-use obvhs::ray::{Ray, RayHit};
-use obvhs::{Boundable, BvhBuildParams};
 use serde::{Deserialize, Serialize};
 
+use super::even_light::luminance;
+use super::geometry::{ABOVE, Geometry};
 use super::{Scene, Triangle};
-use crate::math::random;
-use starts::Starts;
+use crate::math::groups::{Edge, Groups, edges, shared};
+use crate::math::sampling::{self, Random, cosine_direction, on_triangle, sphere_direction};
 
 /// Which side of a mesh is the front.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
@@ -48,7 +42,7 @@ pub(super) enum Choice {
 }
 
 /// Paths from the lights, and surfaces that each meets at most.
-const PATHS: usize = 8192;
+const PATHS: u64 = 8192;
 const BOUNCES: usize = 6;
 
 /// Meetings with the back of a piece, at least, that show which side is lit.
@@ -87,17 +81,21 @@ pub(super) fn of_sheets(scene: &Scene, choices: &[Choice]) -> Vec<usize> {
         return Vec::new();
     }
     let pieces = pieces(&scene.triangles);
-    // How often each edge of a piece is run along, to and fro.
-    let mut edges: HashMap<([u32; 2], u32), [u32; 2]> = HashMap::new();
-    for (triangle, &piece) in scene.triangles.iter().zip(&pieces) {
-        let [a, b, c] = triangle.vertices;
-        for [p, q] in [[a, b], [b, c], [c, a]] {
-            let of = edges.entry(([p.min(q), p.max(q)], piece)).or_default();
-            of[usize::from(p < q)] += 1;
+    let edges = edges_of(&scene.triangles);
+    // Of a closed piece each edge is run along to and fro.
+    let mut open: HashSet<u32> = HashSet::new();
+    for run in shared(&edges) {
+        let way = |edge: &Edge| if edge.ascends { 1 } else { -1 };
+        let mut ways: Vec<(u32, i64)> = (run.iter())
+            .map(|edge| (pieces[edge.triangle as usize], way(edge)))
+            .collect();
+        ways.sort_unstable();
+        for of in ways.chunk_by(|a, b| a.0 == b.0) {
+            if of.iter().map(|(_, way)| way).sum::<i64>() != 0 {
+                open.insert(of[0].0);
+            }
         }
     }
-    let ends = edges.iter().filter(|(_, of)| of[0] != of[1]);
-    let open: HashSet<u32> = ends.map(|((_, piece), _)| *piece).collect();
     (0..choices.len())
         .filter(|&t| choices[t] == Choice::Two && open.contains(&pieces[t]))
         .filter(|&t| !scene.materials[scene.triangles[t].material as usize].emits())
@@ -108,26 +106,31 @@ pub(super) fn of_sheets(scene: &Scene, choices: &[Choice]) -> Vec<usize> {
 /// triangles of two sides whose pieces show light both, without those that emit: a lamp is a front.
 pub(super) fn turn_dark(scene: &mut Scene, choices: &[Choice]) -> Vec<usize> {
     let is_given = choices.iter().all(|&choice| choice == Choice::None);
-    let Some(starts) = Starts::of(scene).filter(|_| !is_given) else {
+    if is_given {
+        return Vec::new();
+    }
+    // What cannot be met by rays is refused when the scene is checked.
+    let Ok(geometry) = Geometry::for_few_rays(scene) else {
         return Vec::new();
     };
+    let lights = Lights::of(scene, &geometry);
     let pieces = pieces(&scene.triangles);
     let count = pieces.iter().max().map_or(0, |&last| last as usize + 1);
     // Meetings of each piece, [front, back].
     let mut met = vec![[0_u32; 2]; count];
-    let rays = Rays::new(scene);
-    let mut state = 0;
-    for _ in 0..PATHS {
-        let (mut from, mut direction) = starts.ray(&rays, &mut state);
+    for path in 0..PATHS {
+        let mut random = Random::new(0, 0, path);
+        let Some((mut from, mut direction)) = lights.ray(&mut random) else {
+            break;
+        };
         for _ in 0..BOUNCES {
-            let Some((t, place, normal)) = rays.first_met(from, direction) else {
+            let Some(hit) = geometry.hit(from, direction) else {
                 break;
             };
-            let is_back = direction.dot(normal) > 0.0;
-            met[pieces[t] as usize][usize::from(is_back)] += 1;
-            let side = if is_back { -normal } else { normal };
-            direction = diffuse(side, &mut state);
-            from = place + ABOVE * side;
+            met[pieces[hit.triangle] as usize][usize::from(!hit.front)] += 1;
+            let side = if hit.front { hit.normal } else { -hit.normal };
+            direction = cosine_direction(side, random.square());
+            from = hit.place + ABOVE * side;
         }
     }
     let emits = |t: &Triangle| scene.materials[t.material as usize].emits();
@@ -181,135 +184,70 @@ pub(super) fn turned(triangle: &Triangle) -> Triangle {
 /// A number for each triangle, the same for those that are joined by edges along which their fronts
 /// are on one side.
 fn pieces(triangles: &[Triangle]) -> Vec<u32> {
-    // Ends of each edge, the triangle, and whether it runs from the first end to the other.
-    let mut edges: Vec<([u32; 2], u32, bool)> = Vec::with_capacity(3 * triangles.len());
-    for (t, triangle) in (0..).zip(triangles) {
-        let [a, b, c] = triangle.vertices;
-        for [p, q] in [[a, b], [b, c], [c, a]] {
-            edges.push(([p.min(q), p.max(q)], t, p < q));
-        }
-    }
-    edges.sort_unstable();
-    let mut parent: Vec<u32> = (0..triangles.len() as u32).collect();
-    fn root(parent: &mut [u32], mut t: u32) -> u32 {
-        while parent[t as usize] != t {
-            parent[t as usize] = parent[parent[t as usize] as usize];
-            t = parent[t as usize];
-        }
-        t
-    }
-    for of in edges.chunk_by(|a, b| a.0 == b.0) {
-        if let [(_, t, along), (_, o, other)] = *of
-            && along != other
+    let mut groups = Groups::new(triangles.len());
+    for run in shared(&edges_of(triangles)) {
+        if let [one, other] = run
+            && one.ascends != other.ascends
         {
-            let (t, o) = (root(&mut parent, t), root(&mut parent, o));
-            parent[t.max(o) as usize] = t.min(o);
+            groups.join(one.triangle, other.triangle);
         }
     }
-    let mut numbers: HashMap<u32, u32> = HashMap::new();
-    (0..triangles.len() as u32)
-        .map(|t| {
-            let next = numbers.len() as u32;
-            *numbers.entry(root(&mut parent, t)).or_insert(next)
-        })
-        .collect()
+    groups.numbers(0..triangles.len() as u32)
 }
 
-/// A direction of the unit sphere.
-fn uniform(state: &mut u64) -> DVec3 {
-    let z = 2.0 * random::unit(state) - 1.0;
-    let angle = std::f64::consts::TAU * random::unit(state);
-    let around = (1.0 - z * z).max(0.0).sqrt();
-    DVec3::new(around * angle.cos(), around * angle.sin(), z)
+fn edges_of(triangles: &[Triangle]) -> Vec<Edge> {
+    edges(triangles.iter().map(|t| t.vertices))
 }
 
-/// A direction above a plane by the cosine.
-fn diffuse(normal: DVec3, state: &mut u64) -> DVec3 {
-    (normal + uniform(state)).normalize_or(normal)
+/// Where paths begin.
+struct Lights {
+    list: Vec<Light>,
+    /// By power.
+    choice: sampling::Choice,
 }
 
-/// Half the scene in the frame of [`Rays`]. obvhs skips a box that a ray leaves within its own 10⁻⁴:
-/// at this scale every box reaches further beyond its triangle.
-const SCALE: f64 = 1024.0;
-
-/// Height of a path's start above a surface.
-const ABOVE: f64 = 1e-6 * SCALE;
-
-/// Boxes reach so far beyond what they hold, which is more than the rounding of f32.
-const MARGIN: f32 = 1.0 / 128.0;
-
-/// The middle of a scene, and the unit of [`Rays`] in scene units.
-fn frame(scene: &Scene) -> (DVec3, f64) {
-    let (origin, unit) = scene.local_frame();
-    (origin, unit / SCALE)
+/// In internal units.
+#[derive(Clone, Copy)]
+enum Light {
+    Triangle([DVec3; 3]),
+    Point(DVec3),
 }
 
-/// The triangles of a scene about its middle, coordinates in −[`SCALE`]..[`SCALE`].
-struct Rays {
-    corners: Vec<[DVec3; 3]>,
-    bvh: CwBvh,
-}
-
-struct Bounds<'a>(&'a [DVec3; 3]);
-
-impl Boundable for Bounds<'_> {
-    fn aabb(&self) -> Aabb {
-        let mut bounds = Aabb::from_points(&self.0.map(|v| v.as_vec3a()));
-        bounds.min -= MARGIN;
-        bounds.max += MARGIN;
-        bounds
-    }
-}
-
-impl Rays {
-    fn new(scene: &Scene) -> Self {
-        let (origin, unit) = frame(scene);
-        let corners: Vec<[DVec3; 3]> = (scene.triangles.iter())
-            .map(|t| scene.corners(t).map(|p| (p - origin) / unit))
-            .collect();
-        let bounds: Vec<Bounds> = corners.iter().map(Bounds).collect();
-        let bvh = build_cwbvh(
-            &bounds,
-            BvhBuildParams::fastest_build(),
-            &mut Duration::default(),
-        );
-        Self { corners, bvh }
-    }
-
-    /// A point light far outside the scene is moved closer, to where f32 is still precise enough.
-    fn inside(&self, place: DVec3) -> DVec3 {
-        place.clamp(DVec3::splat(-100.0 * SCALE), DVec3::splat(100.0 * SCALE))
-    }
-
-    /// The triangle that a ray meets first, the place, and the triangle's normal.
-    fn first_met(&self, from: DVec3, direction: DVec3) -> Option<(usize, DVec3, DVec3)> {
-        let ray = Ray::new_inf(from.as_vec3a(), direction.as_vec3a());
-        let mut nearest = f64::INFINITY;
-        let mut found = None;
-        self.bvh.ray_traverse(ray, &mut RayHit::none(), |_, place| {
-            let t = self.bvh.primitive_indices[place] as usize;
-            let Some(distance) = crossing(self.corners[t], from, direction) else {
-                return f32::INFINITY;
-            };
-            if distance < nearest {
-                (nearest, found) = (distance, Some(t));
+impl Lights {
+    fn of(scene: &Scene, geometry: &Geometry) -> Self {
+        let (mut list, mut powers) = (Vec::new(), Vec::new());
+        let mut add = |light, power: f64| {
+            if power > 0.0 {
+                list.push(light);
+                powers.push(power);
             }
-            distance as f32
-        });
-        let t = found?;
-        let [a, b, c] = self.corners[t];
-        let normal = (b - a).cross(c - a).normalize_or_zero();
-        Some((t, from + nearest * direction, normal))
+        };
+        for (t, triangle) in scene.triangles.iter().enumerate() {
+            let corners = geometry.corners(t);
+            let [a, b, c] = corners;
+            let area = 0.5 * (b - a).cross(c - a).length();
+            let emitted = luminance(scene.materials[triangle.material as usize].ke);
+            add(Light::Triangle(corners), area * emitted);
+        }
+        for light in &scene.lights.points {
+            // Power over π, as that of the triangles.
+            let power = 4.0 * luminance(light.intensity) / geometry.unit.powi(2);
+            add(Light::Point(geometry.inside(light.position)), power);
+        }
+        let choice = sampling::Choice::new(powers.into_iter());
+        Self { list, choice }
     }
-}
 
-/// How far along a ray it goes through a triangle (Möller and Trumbore 1997).
-fn crossing([a, b, c]: [DVec3; 3], from: DVec3, direction: DVec3) -> Option<f64> {
-    let (ab, ac, way) = (b - a, c - a, from - a);
-    let over = direction.cross(ac);
-    let whole = ab.dot(over);
-    let across = way.cross(ab);
-    let (u, v) = (way.dot(over) / whole, direction.dot(across) / whole);
-    let distance = ac.dot(across) / whole;
-    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance > 0.0).then_some(distance)
+    /// A place on the lights by power, and a direction.
+    fn ray(&self, random: &mut Random) -> Option<(DVec3, DVec3)> {
+        let (index, _) = self.choice.choose(random.unit())?;
+        Some(match self.list[index] {
+            Light::Triangle([a, b, c]) => {
+                let normal = (b - a).cross(c - a).normalize_or_zero();
+                let from = on_triangle([a, b, c], random.square()) + ABOVE * normal;
+                (from, cosine_direction(normal, random.square()))
+            }
+            Light::Point(from) => (from, sphere_direction(random.square())),
+        })
+    }
 }

@@ -1,6 +1,5 @@
 //! What lies close in front of a triangle.
 
-use std::collections::HashMap;
 use std::time::Duration;
 
 use glam::DVec3;
@@ -10,6 +9,7 @@ use obvhs::bvh2::builder::build_bvh2;
 use obvhs::{Boundable, BvhBuildParams};
 
 use super::{LEAST, LEAST_APART, Scene};
+use crate::math::groups::Groups;
 
 /// Surfaces about a place.
 pub(super) struct Surroundings {
@@ -142,29 +142,13 @@ impl Surroundings {
 
 /// A number for each triangle, the same for those that are joined by vertices.
 fn shells(scene: &Scene) -> Vec<u32> {
-    let mut parent: Vec<u32> = (0..scene.vertices.len() as u32).collect();
-    fn root(parent: &mut [u32], mut v: u32) -> u32 {
-        while parent[v as usize] != v {
-            parent[v as usize] = parent[parent[v as usize] as usize];
-            v = parent[v as usize];
-        }
-        v
-    }
+    let mut groups = Groups::new(scene.vertices.len());
     for t in &scene.triangles {
-        let [a, b, c] = t.vertices.map(|v| root(&mut parent, v));
-        parent[b as usize] = a;
-        let c = root(&mut parent, c);
-        parent[c as usize] = a;
+        let [a, b, c] = t.vertices;
+        groups.join(a, b);
+        groups.join(a, c);
     }
-    let mut numbers: HashMap<u32, u32> = HashMap::new();
-    (scene.triangles.iter())
-        .map(|t| {
-            let next = numbers.len() as u32;
-            *numbers
-                .entry(root(&mut parent, t.vertices[0]))
-                .or_insert(next)
-        })
-        .collect()
+    groups.numbers(scene.triangles.iter().map(|t| t.vertices[0]))
 }
 
 /// The place on a triangle nearest to p (Ericson 2005, 5.1.5).

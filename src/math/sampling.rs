@@ -1,4 +1,4 @@
-//! Random numbers, directions and places.
+//! Random numbers by sample, directions and places.
 
 use std::f64::consts::TAU;
 

@@ -11,7 +11,7 @@ use obvhs::{Boundable, BvhBuildParams};
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
-use crate::scene::Scene;
+use crate::scene::{Scene, Triangle};
 
 /// Distance of a ray's start above its surface, internal units: far above the rounding of f64, also
 /// 10⁶ units from the origin, and far below any shape. A back this close behind a front counts as
@@ -78,6 +78,18 @@ impl Geometry {
     /// # Errors
     /// A scene without triangles, or with corners that are missing or not finite.
     pub fn new(scene: &Scene) -> Result<Self> {
+        Self::built(scene, BvhBuildParams::medium_build())
+    }
+
+    /// The same for few rays: made sooner, and slower to ask.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn for_few_rays(scene: &Scene) -> Result<Self> {
+        Self::built(scene, BvhBuildParams::fastest_build())
+    }
+
+    fn built(scene: &Scene, params: BvhBuildParams) -> Result<Self> {
         let refuse = |what: &str| {
             Err(Error::Scene {
                 scene: scene.name.clone(),
@@ -87,7 +99,7 @@ impl Geometry {
         if scene.triangles.is_empty() {
             return refuse("there is no triangle in it");
         }
-        let held = |t: &crate::scene::Triangle| {
+        let held = |t: &Triangle| {
             (t.material as usize) < scene.materials.len()
                 && t.vertices
                     .iter()
@@ -107,11 +119,7 @@ impl Geometry {
             return refuse("a corner is not finite");
         }
         let bounds: Vec<_> = corners.iter().map(Bounds).collect();
-        let bvh = build_cwbvh(
-            &bounds,
-            BvhBuildParams::medium_build(),
-            &mut Duration::default(),
-        );
+        let bvh = build_cwbvh(&bounds, params, &mut Duration::default());
         Ok(Self {
             origin,
             unit,
@@ -255,8 +263,8 @@ fn distance_to_cube(from: DVec3, direction: DVec3) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::path_tracer::sampling::{Random, cosine_direction};
-    use crate::scene::{Material, Triangle};
+    use crate::math::sampling::{Random, cosine_direction};
+    use crate::scene::Material;
 
     /// Groups of triangles of every size about one place, half of them perpendicular to an axis,
     /// and rays from their surfaces: the same as by trying every triangle.
