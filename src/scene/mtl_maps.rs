@@ -223,8 +223,11 @@ fn on_surface(file: &Path, material: &str, used: &[&Map], said: &mut Said) -> On
         said.warnings.push(warn(map, &what));
     }
     let clamped = used.iter().find(|map| map.options.clamp);
+    let without = "has -s and -o, without effect on faces that have no texture coordinates";
+    let is_moved = transform != UvTransform::default();
     OnSurface {
         transform,
+        moved: is_moved.then(|| warn(leading, without)),
         clamped: clamped.map(|map| (map.keyword.clone(), map.line)),
     }
 }

@@ -40,6 +40,7 @@ pub(super) fn read(path: &Path, textures: &mut TextureCache) -> Result<Mesh> {
     materials(path, &checked, textures, &mut mesh)?;
     faces(path, &checked, &mut mesh)?;
     mesh.parts = parts(path, checked);
+    warn_of_moved_maps(&mut mesh);
     warn_of_clamped_maps(path, &mut mesh);
     Ok(mesh)
 }
@@ -188,6 +189,18 @@ fn faces(path: &Path, checked: &Checked, mesh: &mut Mesh) -> Result<()> {
         "tobj and the check see the same faces"
     );
     Ok(())
+}
+
+/// Faces without texture coordinates are projected in one way, whatever `-s` and `-o` say.
+fn warn_of_moved_maps(mesh: &mut Mesh) {
+    for (index, on) in mesh.on_surface.iter().enumerate() {
+        let is_bare = |t: &MeshTriangle| t.material as usize == index && t.uv.is_none();
+        if let Some(warning) = &on.moved
+            && mesh.triangles.iter().any(is_bare)
+        {
+            mesh.said.warnings.push(warning.clone());
+        }
+    }
 }
 
 /// Maps repeat, also those that `-clamp` would keep from it: a warning where that shows.

@@ -29,6 +29,8 @@ impl UvTransform {
 pub(super) struct OnSurface {
     /// From the texture coordinates of the mesh to those of the maps.
     pub transform: UvTransform,
+    /// What is wrong where the mesh has no texture coordinates, which `-s` and `-o` could change.
+    pub moved: Option<String>,
     /// The statement of a map that `-clamp` keeps from repeating, and its line.
     pub clamped: Option<(String, usize)>,
 }

@@ -224,6 +224,31 @@ fn maps_lie_where_their_options_say() {
     assert!(heights("disp -imfchan g a.png")[4..] == [20.0 / 255.0; 4]);
 }
 
+/// Faces without texture coordinates are projected as without `-s` and `-o`: a warning with the line.
+#[test]
+fn places_of_maps_need_texture_coordinates() {
+    let dir = folder(&[("a.png", &ramp())]);
+    let bare = |lines| {
+        square(&dir, lines).unwrap();
+        let obj = dir.path().join("a.obj");
+        let text = std::fs::read_to_string(&obj).unwrap();
+        let face = "f 1/1 2/2 3/3 4/4";
+        std::fs::write(&obj, text.replace(face, "f 1 2 3 4")).unwrap();
+        load(obj.to_str().unwrap(), &LoadOptions::default()).unwrap()
+    };
+    let plain = bare("map_Kd a.png");
+    assert!(plain.warnings.is_empty(), "{:?}", plain.warnings);
+    let scene = bare("map_Kd -s 2 2 1 a.png");
+    assert_eq!(scene.triangles, plain.triangles);
+    let [warning] = &scene.warnings[..] else {
+        panic!("{:?}", scene.warnings);
+    };
+    assert!(
+        warning.contains("a.mtl:4: material \"m\": map_Kd has -s and -o, without effect"),
+        "{warning}"
+    );
+}
+
 #[test]
 fn what_would_change_the_light_and_is_not_used_is_a_warning() {
     let lamp = rgb_float(2, 1, |x, _| [4.0 * x as f32, 1.0, 0.5]);
