@@ -21,6 +21,7 @@ use super::{HeightMap, NormalMap, Scene};
 /// Gives materials that have normals and no heights the heights of the normals, with a note for each
 /// that a triangle uses.
 pub(super) fn add_to(scene: &mut Scene) {
+    let mut known: Vec<Known> = Vec::new();
     for index in 0..scene.materials.len() {
         let material = &scene.materials[index];
         let (None, Some(normals)) = (&material.map_height, material.map_normal.clone()) else {
@@ -33,7 +34,18 @@ pub(super) fn add_to(scene: &mut Scene) {
             map,
             scale,
             unexplained,
-        } = integrate(&normals, tile);
+        } = match known.iter().find_map(|known| known.on(&normals, tile)) {
+            Some(integrated) => integrated,
+            None => {
+                let integrated = integrate(&normals, tile);
+                known.push(Known {
+                    normals: normals.clone(),
+                    tile,
+                    integrated: integrated.clone(),
+                });
+                integrated
+            }
+        };
         if scale <= FLAT * tile.max_element() {
             let (name, path) = (&material.name, normals.path.display());
             (scene.notes).push(format!("material \"{name}\": normal map {path} is flat"));
@@ -49,15 +61,40 @@ pub(super) fn add_to(scene: &mut Scene) {
             100.0 * unexplained
         ));
         let material = &mut scene.materials[index];
-        material.map_height = Some(Arc::new(map));
+        material.map_height = Some(map);
         material.height_scale = scale as f32;
     }
 }
 
+/// Heights of a map with tiles of one size.
+struct Known {
+    normals: Arc<NormalMap>,
+    tile: DVec2,
+    integrated: Integrated,
+}
+
+/// Sides of tiles whose ratios differ by less than this share are of one shape.
+const SAME_SHAPE: f64 = 1e-6;
+
+impl Known {
+    /// The heights of a map with tiles of this size, if it is the same map and tiles have the same
+    /// shape: then only the scale differs.
+    fn on(&self, normals: &Arc<NormalMap>, tile: DVec2) -> Option<Integrated> {
+        let larger = tile / self.tile;
+        let is_shape = (larger.x / larger.y - 1.0).abs() < SAME_SHAPE;
+        let is_map = || Arc::ptr_eq(&self.normals, normals) || self.normals == *normals;
+        (is_shape && is_map()).then(|| Integrated {
+            scale: self.integrated.scale * larger.x,
+            ..self.integrated.clone()
+        })
+    }
+}
+
 /// Heights that were integrated.
+#[derive(Clone)]
 struct Integrated {
     /// Values in 0..=1.
-    map: HeightMap,
+    map: Arc<HeightMap>,
     /// Scene units between the values 0 and 1.
     scale: f64,
     /// Of the slopes' root mean square, the part that no height explains.
@@ -108,12 +145,12 @@ fn integrate(normals: &NormalMap, tile: DVec2) -> Integrated {
         false => 0.0,
     };
     Integrated {
-        map: HeightMap {
+        map: Arc::new(HeightMap {
             path: normals.path.clone(),
             width: normals.width,
             height: normals.height,
             values: values().map(share).collect(),
-        },
+        }),
         scale,
         unexplained,
     }

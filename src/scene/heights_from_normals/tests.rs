@@ -201,3 +201,29 @@ fn a_flat_map_has_no_heights() {
     // The code of 0 in 8 bit is none: all normals lean by as much.
     assert!(flat.scale < 1e-12, "{}", flat.scale);
 }
+
+/// Tiles of one shape have the same heights, in proportion to their size.
+#[test]
+fn a_map_is_integrated_once_for_each_shape_of_its_tiles() {
+    let slopes = differences(&sampled(bumps), Derivative::Central);
+    let normals = Arc::new(coded(&slopes, 0.05));
+    let known = Known {
+        normals: normals.clone(),
+        tile: TILE,
+        integrated: integrate(&normals, TILE),
+    };
+    let larger = known.on(&normals, 3.0 * TILE).expect("the same shape");
+    assert!(Arc::ptr_eq(&larger.map, &known.integrated.map));
+    let anew = integrate(&normals, 3.0 * TILE);
+    assert!((larger.scale / anew.scale - 1.0).abs() < 1e-12);
+    assert!((larger.unexplained - anew.unexplained).abs() < 1e-12);
+    let copy = Arc::new(normals.as_ref().clone());
+    assert!(known.on(&copy, TILE).is_some());
+    let other = Arc::new(coded(&slopes, 0.06));
+    assert!(known.on(&other, TILE).is_none());
+    assert!(
+        known
+            .on(&normals, DVec2::new(TILE.x, 2.0 * TILE.y))
+            .is_none()
+    );
+}
