@@ -14,8 +14,10 @@ use crate::error::{Error, Result};
 /// An image that cannot be read or decoded.
 pub(super) fn read(file: &File, image: &gltf::Image) -> Result<(PathBuf, DynamicImage)> {
     let base = file.path.parent();
+    let mut said = format!("image {}", image.index());
     let name = match image.source() {
         gltf::image::Source::Uri { uri, .. } if !uri.starts_with("data:") => {
+            said += &format!(" ({})", uri.escape_debug());
             base.map_or_else(PathBuf::new, PathBuf::from).join(uri)
         }
         _ => {
@@ -24,7 +26,7 @@ pub(super) fn read(file: &File, image: &gltf::Image) -> Result<(PathBuf, Dynamic
             name.into()
         }
     };
-    let refuse = |what: String| Error::file(&file.path, format!("image {}: {what}", image.index()));
+    let refuse = |what: String| Error::file(&file.path, format!("{said}: {what}"));
     let data = Data::from_source(image.source(), base, &file.buffers)
         .map_err(|error| refuse(format!("cannot be read: {error}")))?;
     let decoded = decoded(data).ok_or_else(|| refuse("has no texels".into()))?;
