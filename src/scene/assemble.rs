@@ -277,8 +277,8 @@ impl Assembly {
         let back = sides::turned(&scene.triangles[t]);
         if self.known.insert(least_first(back.vertices)) {
             scene.triangles.push(back);
-            let name = meshes::of(&scene.meshes, t as u32)
-                .map_or_else(|| scene.name.clone(), |of| scene.meshes[of].name.clone());
+            let name = meshes::name(&scene.meshes, t as u32).unwrap_or(&scene.name);
+            let name = name.to_owned();
             meshes::add(&mut scene.meshes, &name);
         }
     }

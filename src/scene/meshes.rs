@@ -36,8 +36,13 @@ pub(super) fn add(ranges: &mut Vec<MeshRange>, name: &str) {
     }
 }
 
+/// The name of the mesh that a triangle belongs to.
+pub(super) fn name(ranges: &[MeshRange], triangle: u32) -> Option<&str> {
+    of(ranges, triangle).map(|index| ranges[index].name.as_str())
+}
+
 /// The range that a triangle lies in.
-pub(super) fn of(ranges: &[MeshRange], triangle: u32) -> Option<usize> {
+fn of(ranges: &[MeshRange], triangle: u32) -> Option<usize> {
     let after = ranges.partition_point(|range| range.first <= triangle);
     let index = after.checked_sub(1)?;
     (triangle - ranges[index].first < ranges[index].count).then_some(index)

@@ -4,16 +4,18 @@
 //! is. Random paths from the lights, off either side of what they meet, find the pieces that show
 //! light only their backs: a room whose normals point outward is one.
 
+mod starts;
+
 use std::collections::HashSet;
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::even_light::luminance;
 use super::geometry::{ABOVE, Geometry};
 use super::{Scene, Triangle};
 use crate::math::groups::{Edge, Groups, edges, shared};
-use crate::math::sampling::{self, Random, cosine_direction, on_triangle, sphere_direction};
+use crate::math::sampling::{Random, cosine_direction};
+use starts::Starts;
 
 /// Which side of a mesh is the front.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
@@ -113,14 +115,14 @@ pub(super) fn turn_dark(scene: &mut Scene, choices: &[Choice]) -> Vec<usize> {
     let Ok(geometry) = Geometry::for_few_rays(scene) else {
         return Vec::new();
     };
-    let lights = Lights::of(scene, &geometry);
+    let starts = Starts::of(scene, &geometry);
     let pieces = pieces(&scene.triangles);
     let count = pieces.iter().max().map_or(0, |&last| last as usize + 1);
     // Meetings of each piece, [front, back].
     let mut met = vec![[0_u32; 2]; count];
     for path in 0..PATHS {
         let mut random = Random::new(0, 0, path);
-        let Some((mut from, mut direction)) = lights.ray(&mut random) else {
+        let Some((mut from, mut direction)) = starts.ray(&mut random) else {
             break;
         };
         for _ in 0..BOUNCES {
@@ -197,57 +199,4 @@ fn pieces(triangles: &[Triangle]) -> Vec<u32> {
 
 fn edges_of(triangles: &[Triangle]) -> Vec<Edge> {
     edges(triangles.iter().map(|t| t.vertices))
-}
-
-/// Where paths begin.
-struct Lights {
-    list: Vec<Light>,
-    /// By power.
-    choice: sampling::Choice,
-}
-
-/// In internal units.
-#[derive(Clone, Copy)]
-enum Light {
-    Triangle([DVec3; 3]),
-    Point(DVec3),
-}
-
-impl Lights {
-    fn of(scene: &Scene, geometry: &Geometry) -> Self {
-        let (mut list, mut powers) = (Vec::new(), Vec::new());
-        let mut add = |light, power: f64| {
-            if power > 0.0 {
-                list.push(light);
-                powers.push(power);
-            }
-        };
-        for (t, triangle) in scene.triangles.iter().enumerate() {
-            let corners = geometry.corners(t);
-            let [a, b, c] = corners;
-            let area = 0.5 * (b - a).cross(c - a).length();
-            let emitted = luminance(scene.materials[triangle.material as usize].ke);
-            add(Light::Triangle(corners), area * emitted);
-        }
-        for light in &scene.lights.points {
-            // Power over π, as that of the triangles.
-            let power = 4.0 * luminance(light.intensity) / geometry.unit.powi(2);
-            add(Light::Point(geometry.inside(light.position)), power);
-        }
-        let choice = sampling::Choice::new(powers.into_iter());
-        Self { list, choice }
-    }
-
-    /// A place on the lights by power, and a direction.
-    fn ray(&self, random: &mut Random) -> Option<(DVec3, DVec3)> {
-        let (index, _) = self.choice.choose(random.unit())?;
-        Some(match self.list[index] {
-            Light::Triangle([a, b, c]) => {
-                let normal = (b - a).cross(c - a).normalize_or_zero();
-                let from = on_triangle([a, b, c], random.square()) + ABOVE * normal;
-                (from, cosine_direction(normal, random.square()))
-            }
-            Light::Point(from) => (from, sphere_direction(random.square())),
-        })
-    }
 }
