@@ -132,6 +132,8 @@ fn info_shows_what_is_inside() {
     }
     let text = done(&["info", "scenes/room.obj", "--no-refine"], &home);
     assert!(text.contains("4 triangles\n"), "{text}");
+    let line = refused(&["info", "o.safetensors", "--no-refine"], &home);
+    assert!(line.contains("--no-refine has no effect"), "{line}");
     let line = refused(&["info", "none.safetensors"], &home);
     assert!(line.contains("none.safetensors"), "{line}");
     let line = refused(&["info", "none.obj"], &home);

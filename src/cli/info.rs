@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use clap::Args;
+use clap::{ArgMatches, Args};
 use serde::Serialize;
 use serde_json::Value;
 
+use super::render::refuse_baking;
 use super::{Builtin, devices, inside};
 use mesolux::bake::solution::{About, Origin};
 use mesolux::error::{Error, Result};
@@ -48,7 +49,7 @@ pub struct Baked {
     pub report: Value,
 }
 
-pub fn run(options: &Options) -> Result<()> {
+pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
     let Some(input) = &options.input else {
         return devices::run(options.json);
     };
@@ -57,7 +58,10 @@ pub fn run(options: &Options) -> Result<()> {
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("safetensors"));
     let inside = match is_bake {
-        true => of_bake(input, About::load(path)?),
+        true => {
+            refuse_baking(given, input)?;
+            of_bake(input, About::load(path)?)
+        }
         false => of_scene(input, &options.builtin)?,
     };
     match options.json {

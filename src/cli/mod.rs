@@ -295,7 +295,7 @@ pub fn main() -> ExitCode {
         )),
         Command::Compare(options) => compare::run(options),
         Command::Scene(options) => scene::run(options),
-        Command::Info(options) => info::run(options),
+        Command::Info(options) => info::run(options, given),
         Command::Bench(options) => bench::run(options),
         Command::Completions(options) => shell::completions(options),
         Command::Man(options) => shell::man(options),

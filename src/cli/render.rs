@@ -73,7 +73,7 @@ const USED_WITH_A_BAKE: [&str; 2] = ["cache", "no_cache"];
 
 /// # Errors
 /// An option on the command line that says how a scene is read or baked, beside a bake.
-fn refuse_baking(given: &ArgMatches, bake: &str) -> Result<()> {
+pub fn refuse_baking(given: &ArgMatches, bake: &str) -> Result<()> {
     for group in ["SolveOptions", "Builtin"] {
         let Ok(Some(options)) = given.try_get_many::<Id>(group) else {
             continue;

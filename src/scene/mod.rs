@@ -19,7 +19,7 @@ mod check;
 pub mod contents;
 mod displace;
 pub(crate) mod even_light;
-pub mod geometry;
+pub(crate) mod geometry;
 #[cfg(feature = "formats")]
 mod gltf_file;
 mod hash;
