@@ -12,7 +12,7 @@ use super::meshes::{self, Names, Part};
 use super::said::Said;
 use super::sides::{self, Choice, Sides};
 use super::uv::{OnSurface, box_projection};
-use super::{ImportOptions, Material, Scene, Triangle};
+use super::{ImportOptions, Material, Scene, Triangle, masks};
 use crate::error::{Error, Result};
 
 /// A mesh before it is added to a scene.
@@ -296,8 +296,13 @@ impl Assembly {
             })
     }
 
-    /// The scene, with the sides found that were not given, unless `import` leaves them.
-    pub fn into_imported(mut self, import: &ImportOptions) -> Scene {
+    /// The scene, its masks cut out and the sides found that were not given, unless `import` leaves
+    /// them.
+    ///
+    /// # Errors
+    /// See [`Scene::cut_masks`].
+    pub fn into_imported(mut self, import: &ImportOptions) -> Result<Scene> {
+        self.cut_masks()?;
         let backs = match import.sides_as_given {
             true => sides::of_sheets(&self.scene, &self.choices),
             false => sides::turn_dark(&mut self.scene, &self.choices),
@@ -305,7 +310,19 @@ impl Assembly {
         for t in backs {
             self.add_back(t);
         }
-        self.into_scene()
+        Ok(self.into_scene())
+    }
+
+    fn cut_masks(&mut self) -> Result<()> {
+        let Some(cut) = masks::cut(&mut self.scene)? else {
+            return Ok(());
+        };
+        self.choices = cut.from.iter().map(|&t| self.choices[t as usize]).collect();
+        self.known = (cut.triangles.iter())
+            .map(|t| least_first(t.vertices))
+            .collect();
+        (self.scene.vertices, self.scene.triangles) = (cut.vertices, cut.triangles);
+        Ok(())
     }
 
     pub fn into_scene(mut self) -> Scene {

@@ -85,5 +85,5 @@ fn load_mesh(path: &Path, import: &ImportOptions) -> Result<Scene> {
     let read = mesh_file::read(path, import.z_up, &mut TextureCache::default())?;
     let mut assembly = Assembly::new(stem(path), Some(path));
     assembly.add(read, None)?;
-    check::finish(assembly.into_imported(import), import)
+    check::finish(assembly.into_imported(import)?, import)
 }

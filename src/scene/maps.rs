@@ -186,7 +186,7 @@ impl Channel {
         })
     }
 
-    fn of(self, [r, g, b]: [f32; 3]) -> f32 {
+    pub fn of(self, [r, g, b]: [f32; 3]) -> f32 {
         match self {
             Self::Red => r,
             Self::Green => g,

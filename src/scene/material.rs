@@ -5,6 +5,7 @@ use std::hash::Hash;
 use std::path::Path;
 
 use super::maps::{Channel, holds_normals};
+use super::texture::decode;
 use super::*;
 use crate::error::{Error, Result};
 
@@ -24,6 +25,8 @@ pub struct Material {
     pub map_normal: Option<Arc<NormalMap>>,
     /// Emitted radiance Le, W·m⁻²·sr⁻¹, RGB.
     pub ke: [f32; 3],
+    /// What of its surfaces is there; none of a scene that was read, whose triangles are cut.
+    pub alpha_mask: Option<AlphaMask>,
 }
 
 impl Default for Material {
@@ -37,6 +40,7 @@ impl Default for Material {
             height_scale: 1.0,
             map_normal: None,
             ke: [0.0; 3],
+            alpha_mask: None,
         }
     }
 }
@@ -56,6 +60,11 @@ impl Material {
                 "emitted radiance Ke {} must be finite and not negative",
                 rgb(self.ke)
             ));
+        }
+        if let Some(mask) = &self.alpha_mask
+            && !(0.0..=1.0).contains(&mask.cutoff)
+        {
+            return Err(format!("alpha cutoff {} must be in 0..=1", mask.cutoff));
         }
         if !self.height_scale.is_finite() {
             return Err(format!("height scale {} must be finite", self.height_scale));
@@ -127,6 +136,7 @@ pub(super) struct TextureCache {
     textures: HashMap<PathBuf, Arc<Texture>>,
     heights: HashMap<(PathBuf, Option<Channel>), Arc<HeightMap>>,
     normals: HashMap<PathBuf, Arc<NormalMap>>,
+    alphas: HashMap<(PathBuf, Option<Channel>, bool), Arc<AlphaMap>>,
     /// Notes from reading them, for the caller to pass on.
     pub notes: Vec<String>,
 }
@@ -174,6 +184,27 @@ impl TextureCache {
             name,
             Path::to_owned,
             NormalMap::load,
+        )
+    }
+
+    /// Alpha; of one channel where it is given, of the alpha channel alone with `alpha_alone`.
+    pub fn alpha(
+        &mut self,
+        asked: Asked,
+        name: &str,
+        channel: Option<Channel>,
+        alpha_alone: bool,
+    ) -> Result<Arc<AlphaMap>> {
+        let key = |path: &Path| (path.to_owned(), channel, alpha_alone);
+        cached(
+            &mut self.alphas,
+            asked,
+            name,
+            key,
+            |path| match alpha_alone {
+                true => Ok(AlphaMap::alpha_of(path, decode(path)?)),
+                false => AlphaMap::load(path, channel),
+            },
         )
     }
 

@@ -7,7 +7,7 @@
 //! ```text
 //! .obj ─► obj_lint ─► obj + mtl ─┐
 //! .gltf, .glb ─► gltf_file ──────┤
-//! scene.toml ─► scene_file ──────┼─► assemble ─► check ─► Scene ─► write
+//! scene.toml ─► scene_file ──────┼─► assemble ─► masks ─► check ─► Scene ─► write
 //! built-in name ─► builtin ──────┘
 //! ```
 
@@ -35,6 +35,7 @@ mod load;
 #[cfg(feature = "formats")]
 mod map_files;
 mod maps;
+mod masks;
 mod material;
 mod mesh_file;
 mod meshes;
@@ -71,6 +72,7 @@ pub use displace::{displace, relief_normals};
 pub use lights::{Beam, Lights, PointLight, Sun};
 pub use load::{ImportOptions, LoadOptions, load};
 pub use maps::{HeightMap, NormalMap};
+pub use masks::{AlphaMap, AlphaMask};
 pub use material::Material;
 pub use meshes::MeshRange;
 pub use refine::{OnInput, RefinedFrom, Refinement};

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::maps::Channel;
+use super::masks::{AlphaMask, DEFAULT_CUTOFF};
 use super::material::{Asked, Bump, TextureCache};
 use super::obj_lint::{brief, finite};
 use super::said::Said;
@@ -18,6 +19,7 @@ enum Kind {
     /// Heights or normals.
     Bump,
     Normal,
+    Alpha,
 }
 
 fn kind(keyword: &str) -> Option<Kind> {
@@ -26,6 +28,7 @@ fn kind(keyword: &str) -> Option<Kind> {
         "map_Ke" => Some(Kind::Emission),
         "map_Disp" | "map_disp" | "disp" => Some(Kind::Displacement),
         "map_Bump" | "map_bump" | "bump" => Some(Kind::Bump),
+        "map_d" => Some(Kind::Alpha),
         "norm" | "map_Norm" | "map_norm" => Some(Kind::Normal),
         _ => None,
     }
@@ -43,6 +46,7 @@ pub(super) struct Maps {
     displacement: Option<Map>,
     bump: Option<Map>,
     normal: Option<Map>,
+    alpha: Option<Map>,
 }
 
 #[derive(Debug)]
@@ -87,6 +91,7 @@ impl Maps {
             Kind::Displacement => self.displacement = map,
             Kind::Bump => self.bump = map,
             Kind::Normal => self.normal = map,
+            Kind::Alpha => self.alpha = map,
         }
         Ok(())
     }
@@ -114,7 +119,18 @@ impl Maps {
         if let Some(map) = &self.reflectance {
             material.map_kd = Some(textures.texture(map.asked(file, &name), &map.file)?);
         }
-        let mut used: Vec<&Map> = self.reflectance.iter().collect();
+        if let Some(map) = &self.alpha {
+            // Blender names the texture of the base colour, whose alpha it means.
+            let of_colour = (self.reflectance.iter()).any(|other| other.file == map.file);
+            let channel = map.options.channel;
+            let alone = of_colour && channel.is_none();
+            material.alpha_mask = Some(AlphaMask {
+                map: textures.alpha(map.asked(file, &name), &map.file, channel, alone)?,
+                factor: 1.0,
+                cutoff: DEFAULT_CUTOFF,
+            });
+        }
+        let mut used: Vec<&Map> = self.alpha.iter().chain(&self.reflectance).collect();
         if let Some(map) = &self.emission {
             let texture = textures.texture(map.asked(file, &name), &map.file)?;
             let (mean, ke) = (texture.mean(), material.ke);

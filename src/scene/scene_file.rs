@@ -10,6 +10,7 @@ use toml::Spanned;
 use super::assemble::{Assembly, Mesh};
 use super::lamps::{DiskLampTable, SphereLampTable};
 use super::light_tables::{self, PointLightTable, SkyTable, SunTable};
+use super::masks::{AlphaMask, DEFAULT_CUTOFF};
 use super::material::{Asked, DEFAULT_KD, MadeUp, TextureCache};
 use super::placement::{Placement, Scale};
 use super::sides::Sides;
@@ -73,6 +74,8 @@ pub(super) struct MaterialTable {
     /// Scene units for a value of 1.
     height_scale: Option<f32>,
     normal_map: Option<String>,
+    alpha_mask: Option<String>,
+    alpha_cutoff: Option<f32>,
 }
 
 #[derive(Debug, Deserialize, Serialize)]
@@ -143,7 +146,7 @@ pub(super) fn load(path: &Path, import: &ImportOptions) -> Result<Scene> {
         heights_from_normals: import.heights_from_normals && file.heights_from_normals,
         ..import.clone()
     };
-    check::finish(assembly.into_imported(&import), &import)
+    check::finish(assembly.into_imported(&import)?, &import)
 }
 
 /// The line of a byte of the file.
@@ -266,6 +269,18 @@ fn change_material(
     }
     if let Some(file) = &changes.normal_map {
         material.map_normal = Some(textures.normals(asked("normal_map"), file)?);
+    }
+    if let Some(file) = &changes.alpha_mask {
+        material.alpha_mask = Some(AlphaMask {
+            map: textures.alpha(asked("alpha_mask"), file, None, false)?,
+            factor: 1.0,
+            cutoff: DEFAULT_CUTOFF,
+        });
+    }
+    match (changes.alpha_cutoff, &mut material.alpha_mask) {
+        (Some(cutoff), Some(mask)) => mask.cutoff = cutoff,
+        (Some(_), None) => return Err(refuse("alpha_cutoff needs an alpha_mask".into())),
+        (None, _) => {}
     }
     mesh.said.notes.append(&mut textures.notes);
     material.check().map_err(refuse)

@@ -263,10 +263,6 @@ fn what_would_change_the_light_and_is_not_used_is_a_warning() {
             "a.mtl:4: material \"m\": Tr: surfaces are opaque, not 0.75",
         ),
         (
-            "map_d leaf.png",
-            "a.mtl:4: material \"m\": map_d is not used",
-        ),
-        (
             "map_Ke lamp.exr",
             "a.mtl:4: material \"m\": map_Ke gives its mean",
         ),

@@ -10,6 +10,7 @@ use super::document::File;
 use super::images;
 use crate::error::{Error, Result};
 use crate::scene::assemble::free_name;
+use crate::scene::masks::{AlphaMap, AlphaMask, DEFAULT_CUTOFF};
 use crate::scene::material::{DEFAULT_KD, MadeUp};
 use crate::scene::said::Said;
 use crate::scene::{Material, NormalMap, Texture};
@@ -83,6 +84,7 @@ impl Place {
 struct Maps {
     colours: HashMap<usize, Arc<Texture>>,
     normals: HashMap<usize, Arc<NormalMap>>,
+    alphas: HashMap<usize, Arc<AlphaMap>>,
 }
 
 impl Materials {
@@ -169,7 +171,17 @@ impl Materials {
         }
         match from.alpha_mode() {
             AlphaMode::Opaque => {}
-            AlphaMode::Mask => said.warnings.push(about("alpha masks are not used")),
+            AlphaMode::Mask => {
+                let map = match surface.base_color_texture() {
+                    Some(map) => maps.alphas(file, &map.texture())?,
+                    None => Arc::new(AlphaMap::even(&file.path, 1.0)),
+                };
+                material.alpha_mask = Some(AlphaMask {
+                    map,
+                    factor: alpha,
+                    cutoff: from.alpha_cutoff().unwrap_or(DEFAULT_CUTOFF),
+                });
+            }
             AlphaMode::Blend if alpha < 1.0 || surface.base_color_texture().is_some() => {
                 said.warnings
                     .push(about("surfaces are opaque: alpha is not used"));
@@ -202,6 +214,17 @@ impl Maps {
         let (path, decoded) = images::read(file, &image)?;
         let map = Arc::new(Texture::from_image(&path, decoded)?);
         self.colours.insert(image.index(), map.clone());
+        Ok(map)
+    }
+
+    fn alphas(&mut self, file: &File, texture: &gltf::Texture) -> Result<Arc<AlphaMap>> {
+        let image = texture.source();
+        if let Some(map) = self.alphas.get(&image.index()) {
+            return Ok(map.clone());
+        }
+        let (path, decoded) = images::read(file, &image)?;
+        let map = Arc::new(AlphaMap::alpha_of(&path, decoded));
+        self.alphas.insert(image.index(), map.clone());
         Ok(map)
     }
 
