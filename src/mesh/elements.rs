@@ -60,8 +60,42 @@ pub struct Elements {
     pub material: Vec<u32>,
     /// Index of the element in the scene's list of triangles.
     pub input_index: Vec<u32>,
+    /// Textured emission; None where no material has a texture of it.
+    pub glow: Option<Glow>,
     /// The relief of the elements that have one; None where no element has.
     pub relief: Option<Relief>,
+}
+
+/// Emission by textures.
+#[derive(Debug, Clone)]
+pub struct Glow {
+    /// Mean of the texture over the element, `[element]`, RGB; 1 without one.
+    pub share: Vec<Vec3>,
+    /// Emitted radiosity of each material before its texture, `[material]`, W·m⁻², RGB.
+    by_material: Vec<Vec3>,
+}
+
+impl Glow {
+    fn new(scene: &Scene) -> Option<Self> {
+        let has_map = scene.materials.iter().any(|m| m.map_ke.is_some());
+        has_map.then(|| Self {
+            share: (scene.triangles.par_iter())
+                .map(|t| {
+                    let map = scene.materials[t.material as usize].map_ke.as_ref();
+                    map.map_or(Vec3::ONE, |map| map.mean_over_triangle(&t.uv).into())
+                })
+                .collect(),
+            by_material: by_material(scene),
+        })
+    }
+}
+
+/// Emitted radiosity of each material before its texture.
+fn by_material(scene: &Scene) -> Vec<Vec3> {
+    let materials = scene.materials.iter();
+    materials
+        .map(|m| Vec3::from_array(m.ke) * PI as f32)
+        .collect()
 }
 
 impl Elements {
@@ -92,6 +126,13 @@ impl Elements {
                 )
             })
             .collect();
+        let glow = Glow::new(scene);
+        let emitted = (scene.triangles.iter().enumerate())
+            .map(|(e, t)| {
+                let whole = Vec3::from_array(scene.materials[t.material as usize].ke) * PI as f32;
+                glow.as_ref().map_or(whole, |glow| whole * glow.share[e])
+            })
+            .collect();
         Self {
             origin,
             unit,
@@ -100,11 +141,8 @@ impl Elements {
             normal: shapes.iter().map(|s| s.1).collect(),
             area: shapes.iter().map(|s| s.2).collect(),
             reflectance: shapes.iter().map(|s| s.3).collect(),
-            emitted: scene
-                .triangles
-                .iter()
-                .map(|t| Vec3::from_array(scene.materials[t.material as usize].ke) * PI as f32)
-                .collect(),
+            emitted,
+            glow,
             material: scene.triangles.iter().map(|t| t.material).collect(),
             input_index: (0..scene.triangles.len() as u32).collect(),
             vertices,
@@ -116,9 +154,12 @@ impl Elements {
         self.corners.len()
     }
 
-    /// Emitted radiosity of each material, `[material]`, W·m⁻², RGB, if it were flat; 0 of one that
-    /// no element has.
+    /// Emitted radiosity of each material, `[material]`, W·m⁻², RGB, if it were flat and before its
+    /// texture; 0 of one that no element has, unless there are textures.
     pub fn emitted_by_material(&self) -> Vec<Vec3> {
+        if let Some(glow) = &self.glow {
+            return glow.by_material.clone();
+        }
         let count = self.material.iter().max().map_or(0, |&last| last + 1);
         let mut by_material = vec![Vec3::ZERO; count as usize];
         for (e, &material) in self.material.iter().enumerate() {
@@ -133,20 +174,21 @@ impl Elements {
     /// Sets the emission to that of [`Self::emitted_by_material`].
     pub fn set_emitted(&mut self, by_material: &[Vec3]) {
         for e in 0..self.len() {
-            let emitted = by_material[self.material[e] as usize];
+            let share = self.glow.as_ref().map_or(Vec3::ONE, |glow| glow.share[e]);
+            let emitted = by_material[self.material[e] as usize] * share;
             self.emitted[e] = match self.response(e) {
                 Some(response) => emitted * response.mean_emission,
                 None => emitted,
             };
         }
+        if let Some(glow) = &mut self.glow {
+            glow.by_material = by_material.to_vec();
+        }
     }
 
     /// Sets the emission to that of `scene`, which is otherwise the scene of these elements.
     pub fn set_emission(&mut self, scene: &Scene) {
-        let materials = scene.materials.iter();
-        let emitted = |ke: [f32; 3]| Vec3::from_array(ke) * PI as f32;
-        let by_material: Vec<Vec3> = materials.map(|m| emitted(m.ke)).collect();
-        self.set_emitted(&by_material);
+        self.set_emitted(&by_material(scene));
     }
 
     /// Of an element with a relief.
@@ -178,6 +220,9 @@ impl Elements {
         apply(&mut self.emitted, order);
         apply(&mut self.material, order);
         apply(&mut self.input_index, order);
+        if let Some(glow) = &mut self.glow {
+            apply(&mut glow.share, order);
+        }
         if let Some(relief) = &mut self.relief {
             relief.permute(order);
         }

@@ -52,6 +52,8 @@ pub struct Draw<'a> {
     pub first_vertex: u32,
     pub vertex_count: u32,
     pub texture: &'a DescriptorSet,
+    /// Whether its colours are added to what is there in the same place.
+    pub adds: bool,
     pub parameters: Parameters,
 }
 
@@ -60,6 +62,8 @@ pub struct Shade {
     /// Whether depths are read back beside the radiance.
     depths: bool,
     pipeline: GraphicsPipeline,
+    /// For draws that add; None unless asked for.
+    adding: Option<GraphicsPipeline>,
 }
 
 /// Colour, depth and readback for one size of tile.
@@ -78,42 +82,40 @@ const FORMAT: Format = Format::R32G32B32A32_SFLOAT;
 const TEXEL_BYTES: u64 = 16;
 
 impl Shade {
-    /// With `depths`, these are read back beside the radiance.
+    /// With `depths`, these are read back beside the radiance; only with `adds` draws can add.
     ///
     /// # Errors
     /// A device that fails.
-    pub fn new(device: &Arc<Device>, depths: bool) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, depths: bool, adds: bool) -> Result<Self> {
         let colour = Attachment::copied(FORMAT);
         let pass = RenderPass::with_depth(device, "shade", colour, depths)?;
         let attribute = |format, offset: usize| VertexAttribute {
             format,
             offset: offset as u32,
         };
-        let pipeline = GraphicsPipeline::new(
-            device,
-            &pass,
-            &GraphicsState {
-                name: "shade",
-                shaders: &SHADER,
-                vertex_stride: size_of::<Vertex>() as u32,
-                attributes: &[
-                    attribute(
-                        Format::R32G32B32_SFLOAT,
-                        std::mem::offset_of!(Vertex, position),
-                    ),
-                    attribute(
-                        Format::R32G32B32_SFLOAT,
-                        std::mem::offset_of!(Vertex, irradiance),
-                    ),
-                    attribute(Format::R32G32_SFLOAT, std::mem::offset_of!(Vertex, uv)),
-                ],
-                sums: false,
-            },
-        )?;
+        let state = GraphicsState {
+            name: "shade",
+            shaders: &SHADER,
+            vertex_stride: size_of::<Vertex>() as u32,
+            attributes: &[
+                attribute(
+                    Format::R32G32B32_SFLOAT,
+                    std::mem::offset_of!(Vertex, position),
+                ),
+                attribute(
+                    Format::R32G32B32_SFLOAT,
+                    std::mem::offset_of!(Vertex, irradiance),
+                ),
+                attribute(Format::R32G32_SFLOAT, std::mem::offset_of!(Vertex, uv)),
+            ],
+            sums: false,
+        };
+        let adding = adds.then(|| GraphicsPipeline::adding(device, &pass, &state));
         Ok(Self {
-            pass,
             depths,
-            pipeline,
+            pipeline: GraphicsPipeline::new(device, &pass, &state)?,
+            adding: adding.transpose()?,
+            pass,
         })
     }
 
@@ -167,8 +169,12 @@ impl Shade {
         cmd.bind_indices(mesh.indices);
         cmd.viewport(0, 0, width, height);
         for draw in draws {
-            cmd.bind_graphics(&self.pipeline, draw.texture, mesh.vertices);
-            cmd.push_graphics(&self.pipeline, &draw.parameters);
+            let pipeline = match (draw.adds, &self.adding) {
+                (true, Some(adding)) => adding,
+                _ => &self.pipeline,
+            };
+            cmd.bind_graphics(pipeline, draw.texture, mesh.vertices);
+            cmd.push_graphics(pipeline, &draw.parameters);
             cmd.draw_indexed(draw.first_vertex, draw.vertex_count);
         }
         then();

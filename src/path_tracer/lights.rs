@@ -8,7 +8,7 @@ use super::geometry::{ABOVE, Geometry, Hit};
 use super::sampling::{Choice, on_triangle};
 use crate::picture::tone::luminance;
 use crate::scene::sky::Sky;
-use crate::scene::{Beam, Scene};
+use crate::scene::{Beam, Material, Scene};
 
 /// Emitters by power and point lights by intensity.
 pub struct Lights {
@@ -28,7 +28,31 @@ struct Emitter {
     corners: [DVec3; 3],
     normal: DVec3,
     area: f64,
+    /// In the mean, by which emitters are chosen.
     radiance: DVec3,
+    texture: Option<Glow>,
+}
+
+/// Radiance by place.
+struct Glow {
+    material: Material,
+    uv: [DVec3; 3],
+}
+
+impl Emitter {
+    /// Radiance at the place that a sample gives.
+    fn radiance_at(&self, at: DVec2) -> DVec3 {
+        self.texture.as_ref().map_or(self.radiance, |glow| {
+            let uv = on_triangle(glow.uv, at);
+            glow.at(uv.truncate())
+        })
+    }
+}
+
+impl Glow {
+    fn at(&self, uv: DVec2) -> DVec3 {
+        Vec3::from_array(self.material.emitted_at(uv.x, uv.y)).as_dvec3()
+    }
 }
 
 struct Point {
@@ -71,7 +95,11 @@ impl Lights {
                     corners,
                     normal: cross.normalize(),
                     area: 0.5 * cross.length(),
-                    radiance: Vec3::from_array(material.ke).as_dvec3(),
+                    radiance: Vec3::from_array(material.emitted_over(&triangle.uv)).as_dvec3(),
+                    texture: material.map_ke.is_some().then(|| Glow {
+                        material: material.clone(),
+                        uv: (triangle.uv).map(|[u, v]| DVec3::new(u.into(), v.into(), 0.0)),
+                    }),
                 });
             }
         }
@@ -124,7 +152,7 @@ impl Lights {
             return Some(Start {
                 place: on_triangle(emitter.corners, at),
                 normal: Some(emitter.normal),
-                power: emitter.radiance * (PI * emitter.area / chance),
+                power: emitter.radiance_at(at) * (PI * emitter.area / chance),
             });
         }
         let (index, probability) = self
@@ -143,11 +171,21 @@ impl Lights {
         self.point_lights.iter().map(|p| (p.place, p.intensity))
     }
 
-    /// Radiance that the front of a triangle emits.
-    pub fn emitted(&self, triangle: usize) -> DVec3 {
-        match self.emitter_of[triangle] {
+    /// Whether the front of a triangle emits anywhere.
+    pub fn emits(&self, triangle: usize) -> bool {
+        self.emitter_of[triangle] != NONE
+    }
+
+    /// Radiance that the front of a triangle emits at a hit.
+    pub fn emitted(&self, hit: &Hit) -> DVec3 {
+        match self.emitter_of[hit.triangle] {
             NONE => DVec3::ZERO,
-            place => self.emitters[place as usize].radiance,
+            place => {
+                let emitter = &self.emitters[place as usize];
+                emitter.texture.as_ref().map_or(emitter.radiance, |glow| {
+                    glow.at(hit.interpolate(glow.uv.map(DVec3::truncate)))
+                })
+            }
         }
     }
 
@@ -194,7 +232,7 @@ impl Lights {
             let (here, there) = (normal.dot(direction), -emitter.normal.dot(direction));
             if here > 0.0 && there > 0.0 && geometry.sees(above, target + ABOVE * emitter.normal) {
                 let density = probability / emitter.area * to.length_squared() / there;
-                sum += emitter.radiance * (here / (density + here / PI));
+                sum += emitter.radiance_at(at) * (here / (density + here / PI));
             }
         }
         sum

@@ -160,9 +160,8 @@ impl<'a> PathTracer<'a> {
                     let seen = self
                         .geometry
                         .hit(self.geometry.inside(projection.eye), direction);
-                    metered &= seen.is_some_and(|hit| {
-                        hit.front && self.lights.emitted(hit.triangle) == DVec3::ZERO
-                    });
+                    metered &=
+                        seen.is_some_and(|hit| hit.front && !self.lights.emits(hit.triangle));
                     if let Some(hit) = seen {
                         sum += self.radiance(&hit, settings.light, &mut random);
                     }

@@ -23,7 +23,7 @@ impl PathTracer<'_> {
             return DVec3::ZERO;
         }
         let emitted = match light {
-            Light::Global | Light::Direct => self.lights.emitted(hit.triangle),
+            Light::Global | Light::Direct => self.lights.emitted(hit),
             Light::Indirect => DVec3::ZERO,
         };
         let reflectance = self.reflectance(hit);
@@ -75,7 +75,7 @@ impl PathTracer<'_> {
             if counts {
                 let cosine = normal.dot(direction);
                 let weight = self.lights.weight_when_met(&hit, direction, cosine);
-                sum += carried * self.lights.emitted(hit.triangle) * (PI * weight);
+                sum += carried * self.lights.emitted(&hit) * (PI * weight);
             }
             carried *= self.reflectance(&hit);
             if light == Light::Direct || carried == DVec3::ZERO {

@@ -93,9 +93,10 @@ fn radiance(
         .map_kd
         .as_ref()
         .map_or([1.0; 3], |map| map.sample_bilinear(uv[0], uv[1]));
+    let emitted = material.emitted_at(uv[0].into(), uv[1].into());
     DVec3::from_array(std::array::from_fn(|channel| {
         let incident = mixed(irradiance.map(|corner| f64::from(corner[channel])));
         let rho = f64::from(material.kd[channel]) * f64::from(texture[channel]);
-        rho * incident / PI + f64::from(material.ke[channel])
+        rho * incident / PI + f64::from(emitted[channel])
     }))
 }

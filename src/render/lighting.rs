@@ -175,8 +175,10 @@ impl<'a> Lighting<'a> {
                 let e = e as usize;
                 let all = self.irradiance[e];
                 let share = Vec3::select(all.cmpgt(Vec3::ZERO), shown[e] / all, Vec3::ZERO);
-                let material = &scene.materials[scene.triangles[e].material as usize];
-                let emitted = Vec3::from(material.ke) * std::f32::consts::PI;
+                let triangle = &scene.triangles[e];
+                let material = &scene.materials[triangle.material as usize];
+                let emitted =
+                    Vec3::from(material.emitted_over(&triangle.uv)) * std::f32::consts::PI;
                 sent.iter()
                     .map(move |s| (*s - emitted).max(Vec3::ZERO) * share)
             })

@@ -1,5 +1,6 @@
 //! The triangles of the shade pass: fronts by material, and backs.
 
+use std::f32::consts::PI;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec2, Vec3};
@@ -54,6 +55,8 @@ enum Kind {
     /// Fronts whose relief is too far to be resolved: the vertices hold the light that it sends.
     Far(u32),
     Back,
+    /// What fronts emit by a texture, added to what they reflect.
+    Glow(u32),
 }
 
 impl Kind {
@@ -100,11 +103,27 @@ impl Mesh {
                 Drawn { kind, triangle: e }
             })
             .collect();
+        // Nothing is added where no texture emits.
+        if lighting.part != Light::Indirect {
+            let glows = order.iter().filter_map(|drawn| match drawn.kind {
+                Kind::Front(m) => scene.materials[m as usize].map_ke.as_ref().map(|_| Drawn {
+                    kind: Kind::Glow(m),
+                    ..*drawn
+                }),
+                _ => None,
+            });
+            let glows: Vec<Drawn> = glows.collect();
+            order.extend(glows);
+        }
         order.par_sort_unstable();
         let vertices: Vec<_> = order
             .par_iter()
-            .flat_map_iter(|&Drawn { triangle: e, .. }| {
-                let light = far(e).copied().unwrap_or(smooth[e]);
+            .flat_map_iter(|&Drawn { kind, triangle: e }| {
+                let light = match kind {
+                    // L = ρ · E / π with the emission for ρ.
+                    Kind::Glow(_) => [Vec3::splat(PI); 3],
+                    _ => far(e).copied().unwrap_or(smooth[e]),
+                };
                 let triangle = &scene.triangles[e];
                 let away = rest.and_then(|rest| rest.away.get(&e));
                 let places = away.copied().unwrap_or(scene.corners(triangle));
@@ -152,12 +171,23 @@ impl Mesh {
             vertex_count: range.count,
             texture: match range.kind {
                 Kind::Front(m) => textures.of_material(m),
+                Kind::Glow(m) => textures.of_emission(m),
                 Kind::Far(_) | Kind::Back => textures.white(),
             },
+            adds: matches!(range.kind, Kind::Glow(_)),
             parameters: match range.kind {
                 Kind::Front(m) => {
-                    parameters(rows, Some(&scene.materials[m as usize]), part).lit_by(lights)
+                    let material = &scene.materials[m as usize];
+                    let mut own = parameters(rows, Some(material), part).lit_by(lights);
+                    if material.map_ke.is_some() {
+                        own.emitted = Vec3::ZERO;
+                    }
+                    own
                 }
+                Kind::Glow(m) => Parameters {
+                    reflectance: scene.materials[m as usize].ke.into(),
+                    ..parameters(rows, None, part)
+                },
                 Kind::Far(m) => Parameters {
                     reflectance: Vec3::ONE,
                     ..parameters(rows, Some(&scene.materials[m as usize]), part)
@@ -214,7 +244,7 @@ fn lit_triangles(
 /// Push constants of a material's fronts, or of backs (None).
 pub fn parameters([x, y, w]: [Vec3; 3], material: Option<&Material>, part: Light) -> Parameters {
     let (reflectance, emitted, metered) = match material {
-        Some(m) => (m.kd, m.ke, if m.emits() { 0.0 } else { 1.0 }),
+        Some(m) => (m.kd, m.mean_emission(), if m.emits() { 0.0 } else { 1.0 }),
         None => ([0.0; 3], [0.0; 3], 0.0),
     };
     let shines = if part == Light::Indirect { 0.0 } else { 1.0 };

@@ -113,7 +113,8 @@ impl<'a> Renderer<'a> {
             "one irradiance a triangle"
         );
         view.check()?;
-        let shade = Shade::new(device, depths)?;
+        let glows = scene.materials.iter().any(|m| m.map_ke.is_some());
+        let shade = Shade::new(device, depths, glows)?;
         let fixed = Fixed {
             textures: Textures::new(device, scene)?,
             relief: ReliefScene::new(device, &shade, scene, &lighting)?,
@@ -316,7 +317,9 @@ impl<'a> Renderer<'a> {
             .draws(&seen, tile, bound, lights.counts)
             .filter(|_| lighting.show != Show::Overdraw)
             .map(|mut draw| {
-                draw.parameters.metered = mark.unwrap_or(draw.parameters.metered);
+                if !draw.adds {
+                    draw.parameters.metered = mark.unwrap_or(draw.parameters.metered);
+                }
                 draw
             });
         self.fixed.shade.record(

@@ -1,4 +1,4 @@
-//! Reflectance textures on the device, with levels of detail.
+//! Textures of reflectance and emission on the device, with levels of detail.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -15,6 +15,8 @@ use crate::vk::{Buffer, BufferUse, Commands, DescriptorSet, Device, Format, Imag
 pub struct Textures {
     /// `[material]`, its place in `images`.
     of_material: Vec<usize>,
+    /// The same of its emission.
+    of_emission: Vec<usize>,
     /// The first is white, for materials without one.
     images: Vec<Image>,
     sampler: Sampler,
@@ -23,6 +25,7 @@ pub struct Textures {
 /// The same bound for drawing, each with the light on plain triangles.
 pub struct Bound {
     of_material: Vec<usize>,
+    of_emission: Vec<usize>,
     sets: Vec<DescriptorSet>,
 }
 
@@ -34,13 +37,11 @@ impl Textures {
     pub fn new(device: &Arc<Device>, scene: &Scene) -> Result<Self> {
         let mut images = vec![upload(device, "white", (1, 1), &[[1.0; 3]])?];
         let mut places: HashMap<*const Texture, usize> = HashMap::new();
-        let mut of_material = Vec::with_capacity(scene.materials.len());
-        for material in &scene.materials {
-            let Some(map) = &material.map_kd else {
-                of_material.push(0);
-                continue;
+        let mut place = |map: &Option<Arc<Texture>>| -> Result<usize> {
+            let Some(map) = map else {
+                return Ok(0);
             };
-            let place = match places.get(&Arc::as_ptr(map)) {
+            Ok(match places.get(&Arc::as_ptr(map)) {
                 Some(&place) => place,
                 None => {
                     images.push(upload(
@@ -52,11 +53,17 @@ impl Textures {
                     places.insert(Arc::as_ptr(map), images.len() - 1);
                     images.len() - 1
                 }
-            };
-            of_material.push(place);
-        }
+            })
+        };
+        let materials = scene.materials.iter();
+        let of_material = materials
+            .clone()
+            .map(|m| place(&m.map_kd))
+            .collect::<Result<_>>()?;
+        let of_emission = materials.map(|m| place(&m.map_ke)).collect::<Result<_>>()?;
         Ok(Self {
             of_material,
+            of_emission,
             images,
             sampler: Sampler::new(device, "albedo", true)?,
         })
@@ -74,6 +81,7 @@ impl Textures {
         let set = |image| shade.bind(image, &self.sampler, lights, lit);
         Ok(Bound {
             of_material: self.of_material.clone(),
+            of_emission: self.of_emission.clone(),
             sets: self.images.iter().map(set).collect::<Result<_>>()?,
         })
     }
@@ -82,6 +90,10 @@ impl Textures {
 impl Bound {
     pub fn white(&self) -> &DescriptorSet {
         &self.sets[0]
+    }
+
+    pub fn of_emission(&self, material: u32) -> &DescriptorSet {
+        &self.sets[self.of_emission[material as usize]]
     }
 
     pub fn of_material(&self, material: u32) -> &DescriptorSet {

@@ -53,6 +53,12 @@ fn material(hash: &mut Sha256, material: &Material) {
             texture.texels.iter().for_each(|texel| floats(hash, texel));
         }
     }
+    // As below: without one, the bytes are those of earlier versions.
+    if let Some(map) = &material.map_ke {
+        hash.update(b"emission");
+        hash.update(map.width.to_le_bytes());
+        map.texels.iter().for_each(|texel| floats(hash, texel));
+    }
     relief(hash, material);
 }
 

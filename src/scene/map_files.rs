@@ -36,7 +36,8 @@ pub(super) fn write(scene: &Scene, dir: &Path) -> Result<MapFiles> {
     let mut files = MapFiles::default();
     // All are read before any is written: a copy may replace an original.
     let mut contents: Vec<(String, Vec<u8>)> = Vec::new();
-    for texture in scene.materials.iter().filter_map(|m| m.map_kd.as_deref()) {
+    let of = scene.materials.iter().flat_map(|m| [&m.map_kd, &m.map_ke]);
+    for texture in of.flatten() {
         if files.textures.contains_key(&texture.path) {
             continue;
         }

@@ -25,6 +25,8 @@ pub struct Material {
     pub map_normal: Option<Arc<NormalMap>>,
     /// Emitted radiance Le, W·m⁻²·sr⁻¹, RGB.
     pub ke: [f32; 3],
+    /// Emission texture, linear RGB, a factor of `ke`.
+    pub map_ke: Option<Arc<Texture>>,
     /// What of its surfaces is there; none of a scene that was read, whose triangles are cut.
     pub alpha_mask: Option<AlphaMask>,
 }
@@ -40,6 +42,7 @@ impl Default for Material {
             height_scale: 1.0,
             map_normal: None,
             ke: [0.0; 3],
+            map_ke: None,
             alpha_mask: None,
         }
     }
@@ -60,6 +63,16 @@ impl Material {
                 "emitted radiance Ke {} must be finite and not negative",
                 rgb(self.ke)
             ));
+        }
+        if let Some(texture) = &self.map_ke {
+            let highest = texture.highest();
+            if !(0..3).all(|c| (self.ke[c] * highest[c]).is_finite()) {
+                return Err(format!(
+                    "emitted radiance Ke {} times the brightest texel of {} must be finite",
+                    rgb(self.ke),
+                    texture.path.display()
+                ));
+            }
         }
         if let Some(mask) = &self.alpha_mask
             && !(0.0..=1.0).contains(&mask.cutoff)
@@ -103,10 +116,38 @@ impl Material {
                 .is_some_and(|map| !map.is_constant())
     }
 
+    /// Emitted radiance over a triangle in the mean, W·m⁻²·sr⁻¹, RGB.
+    pub fn emitted_over(&self, uv: &[[f32; 2]; 3]) -> [f32; 3] {
+        match &self.map_ke {
+            None => self.ke,
+            Some(map) => product(self.ke, map.mean_over_triangle(uv)),
+        }
+    }
+
+    /// Emitted radiance at a place of the textures, W·m⁻²·sr⁻¹, RGB.
+    pub fn emitted_at(&self, u: f64, v: f64) -> [f32; 3] {
+        match &self.map_ke {
+            None => self.ke,
+            Some(map) => product(self.ke, map.bilinear(u, v)),
+        }
+    }
+
+    /// Emitted radiance in the mean over the texture, W·m⁻²·sr⁻¹, RGB.
+    pub fn mean_emission(&self) -> [f32; 3] {
+        match &self.map_ke {
+            None => self.ke,
+            Some(map) => product(self.ke, map.mean()),
+        }
+    }
+
     /// Whether it emits light.
     pub fn emits(&self) -> bool {
         self.ke.iter().any(|&c| c > 0.0)
     }
+}
+
+fn product(one: [f32; 3], other: [f32; 3]) -> [f32; 3] {
+    std::array::from_fn(|c| one[c] * other[c])
 }
 
 fn rgb([r, g, b]: [f32; 3]) -> String {

@@ -130,16 +130,18 @@ impl Maps {
                 cutoff: DEFAULT_CUTOFF,
             });
         }
-        let mut used: Vec<&Map> = self.alpha.iter().chain(&self.reflectance).collect();
+        let surface = self.emission.iter().chain(&self.alpha);
+        let mut used: Vec<&Map> = surface.chain(&self.reflectance).collect();
         if let Some(map) = &self.emission {
             let texture = textures.texture(map.asked(file, &name), &map.file)?;
-            let (mean, ke) = (texture.mean(), material.ke);
-            material.ke = std::array::from_fn(|c| ke[c] * mean[c]);
-            let what = match material.emits() {
-                true => "gives its mean to the whole surface",
-                false => "has no effect: it is black, or Ke is 0 (without Ke it counts as 1)",
-            };
-            said.warnings.push(map.warning(file, &name, what));
+            let highest = texture.highest();
+            if (0..3).any(|c| material.ke[c] * highest[c] > 0.0) {
+                material.map_ke = Some(texture);
+            } else {
+                material.ke = [0.0; 3];
+                let what = "has no effect: it is black, or Ke is 0 (without Ke it counts as 1)";
+                said.warnings.push(map.warning(file, &name, what));
+            }
         }
         let passed_over = |said: &mut Said, kept: &Map, other: &Map| {
             said.notes.push(format!(
@@ -218,11 +220,11 @@ fn on_surface(file: &Path, material: &str, used: &[&Map], said: &mut Said) -> On
         for option in &map.options.unused {
             (said.warnings).push(warn(map, &format!("option {option} is not used")));
         }
-        let is_reflectance = kind(&map.keyword) == Some(Kind::Reflectance);
-        if is_reflectance && map.options.channel.is_some() {
+        let is_colour = matches!(kind(&map.keyword), Some(Kind::Reflectance | Kind::Emission));
+        if is_colour && map.options.channel.is_some() {
             said.warnings.push(warn(map, "option -imfchan is not used"));
         }
-        if is_reflectance && map.options.scale.is_some() {
+        if is_colour && map.options.scale.is_some() {
             said.warnings
                 .push(warn(map, "options -bm and -mm are not used"));
         }

@@ -70,6 +70,7 @@ pub(super) struct MaterialTable {
     kd: Option<[f32; 3]>,
     ke: Option<[f32; 3]>,
     map_kd: Option<String>,
+    map_ke: Option<String>,
     height_map: Option<String>,
     /// Scene units for a value of 1.
     height_scale: Option<f32>,
@@ -257,6 +258,13 @@ fn change_material(
     };
     if let Some(file) = &changes.map_kd {
         material.map_kd = Some(textures.texture(asked("map_kd"), file)?);
+    }
+    if let Some(file) = &changes.map_ke {
+        material.map_ke = Some(textures.texture(asked("map_ke"), file)?);
+        // A texture without a factor is the emission itself.
+        if changes.ke.is_none() && !material.emits() {
+            material.ke = [1.0; 3];
+        }
     }
     if let Some(file) = &changes.height_map {
         material.map_height = Some(textures.heights(asked("height_map"), file, None)?);

@@ -69,6 +69,9 @@ fn materials(scene: &Scene, maps: &MapFiles, out: &mut dyn Write) -> io::Result<
         if let Some(texture) = &material.map_kd {
             writeln!(out, "map_Kd {}", maps.textures[&texture.path])?;
         }
+        if let Some(texture) = &material.map_ke {
+            writeln!(out, "map_Ke {}", maps.textures[&texture.path])?;
+        }
         if let Some(map) = &material.map_height {
             let name = maps.of(map);
             writeln!(out, "map_Disp -bm {} {name}", material.height_scale)?;

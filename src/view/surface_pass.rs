@@ -174,9 +174,12 @@ impl SurfacePass {
         Ok(())
     }
 
-    /// Sets the emission to that of `scene`, which is otherwise the same scene.
+    /// Sets the emission to that of `scene`, which is otherwise the same scene; of textured emission
+    /// the mean.
     pub fn set_emission(&mut self, scene: &Scene) {
-        self.emitted = scene.materials.iter().map(|m| m.ke.into()).collect();
+        self.emitted = (scene.materials.iter())
+            .map(|m| m.mean_emission().into())
+            .collect();
     }
 
     /// Sets the light, irradiance `[triangle][corner]` in the order of the input, W·m⁻².

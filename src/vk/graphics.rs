@@ -48,6 +48,8 @@ enum Blending {
     /// The later lies over the earlier by its alpha, with which its colour is premultiplied; depth
     /// is ignored.
     Over,
+    /// Added to what lies in the same place or behind; depths stay.
+    Add,
 }
 
 impl GraphicsPipeline {
@@ -71,6 +73,19 @@ impl GraphicsPipeline {
         state: &GraphicsState<'_>,
     ) -> Result<Self> {
         Self::blended(device, pass, state, Blending::Over)
+    }
+
+    /// A pipeline that adds colours to those of what is drawn in the same place, with the same
+    /// shaders and vertices.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn adding(
+        device: &Arc<Device>,
+        pass: &RenderPass,
+        state: &GraphicsState<'_>,
+    ) -> Result<Self> {
+        Self::blended(device, pass, state, Blending::Add)
     }
 
     fn blended(
@@ -112,9 +127,12 @@ impl GraphicsPipeline {
         let samples = vk::PipelineMultisampleStateCreateInfo::default()
             .rasterization_samples(vk::SampleCountFlags::TYPE_1);
         let depth = vk::PipelineDepthStencilStateCreateInfo::default()
-            .depth_test_enable(blending == Blending::Nearest)
+            .depth_test_enable(matches!(blending, Blending::Nearest | Blending::Add))
             .depth_write_enable(blending == Blending::Nearest)
-            .depth_compare_op(vk::CompareOp::GREATER);
+            .depth_compare_op(match blending {
+                Blending::Add => vk::CompareOp::GREATER_OR_EQUAL,
+                _ => vk::CompareOp::GREATER,
+            });
         let blends = [blending.attachment()];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
         let dynamic_states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
@@ -182,7 +200,7 @@ impl Blending {
     fn attachment(self) -> vk::PipelineColorBlendAttachmentState {
         let kept = match self {
             Self::Over => vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
-            Self::Nearest | Self::Sum => vk::BlendFactor::ONE,
+            Self::Nearest | Self::Sum | Self::Add => vk::BlendFactor::ONE,
         };
         vk::PipelineColorBlendAttachmentState::default()
             .blend_enable(self != Self::Nearest)

@@ -90,3 +90,20 @@ fn a_fine_texture_far_away_is_its_mean() {
     );
     no_messages();
 }
+
+/// What a texture emits is added to what the surface reflects, before and behind other surfaces.
+#[test]
+fn a_texture_of_emission_agrees_with_the_twin() {
+    let white = [1.0; 3];
+    let mut scene = textured(texture(2, 2, vec![RED, GREEN, BLUE, white]), 1.0);
+    let texels = (0..15).map(|i| [i as f32, 7.0, 15.0 - i as f32]).collect();
+    scene.materials[0].ke = [0.3, 0.2, 0.4];
+    scene.materials[0].map_ke = Some(texture(5, 3, texels));
+    scene.materials.push(material([0.5; 3]));
+    add_square(&mut scene, [0.3, 0.2, 0.5], 0.4, true, 1);
+    add_square(&mut scene, [-0.3, -0.2, -0.5], 1.1, true, 1);
+    let camera = camera(DVec3::new(0.3, 0.0, 0.0));
+    let view = view(&camera, 50, 60);
+    agree(&scene, &view, TEXTURED);
+    no_messages();
+}

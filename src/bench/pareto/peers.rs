@@ -124,7 +124,7 @@ impl Job<'_> {
         folder: &Path,
         mut add: impl FnMut(Row),
     ) -> Result<Option<String>> {
-        let textured = |m: &crate::scene::Material| m.map_kd.is_some();
+        let textured = |m: &crate::scene::Material| m.map_kd.is_some() || m.map_ke.is_some();
         if self.fine.materials.iter().any(textured) {
             return Ok(Some("its script knows no textures".into()));
         }

@@ -1,5 +1,7 @@
 //! Cuts charts into groups of elements, each of which becomes a source.
 
+use glam::DVec3;
+
 use super::Grouping;
 use super::group::{Shape, bisect};
 use super::lit::Lit;
@@ -8,6 +10,9 @@ use crate::mesh::elements::Elements;
 
 /// Of the most area of a source: what is smaller is not cut for its uneven light.
 const LEAST_UNEVEN: f64 = 1.0 / 16.0;
+
+/// Of the most power of a source: what its members may emit more or less than their mean.
+const PATCHY: f64 = 1.0 / 8.0;
 
 /// A scene's limits of area and power of one source.
 pub(super) struct Limits<'a> {
@@ -29,6 +34,20 @@ impl<'a> Limits<'a> {
     pub fn too_much(&self, area: f64, emitted: f64) -> bool {
         area > self.grouping.max_area * self.total_area
             || (emitted > 0.0 && emitted > self.grouping.max_power * self.total_power)
+    }
+
+    /// Whether members of a source emit so differently that it is to be cut; never without textures
+    /// of emission.
+    pub fn too_patchy(&self, elements: &Elements, members: &[u32], area: f64) -> bool {
+        if elements.glow.is_none() {
+            return false;
+        }
+        let emitted = |e: u32| elements.emitted[e as usize].as_dvec3();
+        let own = |e: u32| elements.area[e as usize];
+        let mean = members.iter().map(|&e| own(e) * emitted(e)).sum::<DVec3>() / area;
+        let off = |e: u32| own(e) * (emitted(e) - mean).abs().element_sum();
+        let all: f64 = members.iter().map(|&e| off(e)).sum();
+        all > PATCHY * self.grouping.max_power * self.total_power
     }
 
     /// Whether a source of this area is to be cut that is so unevenly lit, see [`Lit::unevenness`].
@@ -93,7 +112,9 @@ pub(super) fn cut(
                 lit.filter(|_| !relief)
                     .is_some_and(|lit| limits.too_uneven(area, || lit.unevenness(&members)))
             };
-            let large = many || limits.too_much(area, emitted);
+            let large = many
+                || limits.too_much(area, emitted)
+                || limits.too_patchy(elements, &members, area);
             if members.len() > 1 && (large || uneven()) {
                 let at = bisect(elements, &mut members);
                 stack.push(members.split_off(at));

@@ -162,11 +162,17 @@ impl Materials {
         }
         if let Some(map) = from.emissive_texture() {
             let texture = maps.colours(file, &map.texture())?;
-            let mean = texture.mean();
-            material.ke = std::array::from_fn(|c| material.ke[c] * mean[c]);
-            if material.emits() {
-                said.warnings
-                    .push(about("of the emission texture the mean is used"));
+            let highest = texture.highest();
+            if (0..3).any(|c| material.ke[c] * highest[c] > 0.0) {
+                material.map_ke = Some(texture);
+                let own = Place::new(map.tex_coord(), map.texture_transform());
+                if own != *place.get_or_insert(own) {
+                    said.warnings.push(about(
+                        "the emission lies elsewhere than the other maps, whose place it is given",
+                    ));
+                }
+            } else {
+                material.ke = [0.0; 3];
             }
         }
         match from.alpha_mode() {

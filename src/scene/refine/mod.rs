@@ -3,6 +3,7 @@
 //! that where the input has no T-junction, the result has none.
 
 mod cutting;
+mod glow;
 mod outlines;
 mod shadows;
 mod splitting;
@@ -15,6 +16,7 @@ use rayon::prelude::*;
 
 use super::{Scene, Triangle};
 use cutting::{Cutting, length, longest};
+use glow::Glow;
 use shadows::Shadows;
 use surroundings::Surroundings;
 
@@ -91,6 +93,12 @@ const LEAST_AT_SHADOWS: f64 = 1.0 / 64.0;
 /// have as much, the scene is half a percent off.
 const SHADOW: f64 = 0.005 * 0.005 / 10_000.0;
 
+/// Power that a triangle emits on the wrong side of its middle, over that of the scene.
+const GLOW: f64 = 1.0 / 4096.0;
+
+/// Triangles that textures of emission may add, at least.
+const MOST_FOR_GLOW: usize = 16_384;
+
 /// Triangles are cut together whose errors are no smaller than the largest over this.
 const AT_ONCE: f64 = 8.0;
 
@@ -150,7 +158,18 @@ impl Scene {
                 .flatten()
             {
                 let most = most_for_shadows;
-                cut_shadows(&mut cutting, &shadows, size, most);
+                cut_errors(
+                    &mut cutting,
+                    |cut, t| shadows.error(cut, t),
+                    SHADOW,
+                    size,
+                    most,
+                );
+            }
+            if let Some(glow) = Glow::new(self) {
+                let room = MOST_FOR_GLOW.max(cutting.scene.triangles.len() / 2);
+                let most = most.min(cutting.scene.triangles.len() + room);
+                cut_errors(&mut cutting, |cut, t| glow.error(cut, t), GLOW, size, most);
             }
             let mut cut = cutting.into_scene(self);
             if size > wanted {
@@ -198,11 +217,17 @@ impl Scene {
     }
 }
 
-/// Cuts where shadows end, the largest errors first, to so many triangles at most.
-fn cut_shadows(cutting: &mut Cutting, shadows: &Shadows, size: f64, most: usize) {
+/// Cuts where errors exceed `allowed`, the largest first, to so many triangles at most.
+fn cut_errors(
+    cutting: &mut Cutting,
+    error: impl Fn(&Cutting, usize) -> f64 + Sync,
+    allowed: f64,
+    size: f64,
+    most: usize,
+) {
     let of = |cutting: &Cutting, triangles: &[u32]| -> Vec<f64> {
         (triangles.par_iter())
-            .map(|&t| shadows.error(cutting, t as usize))
+            .map(|&t| error(cutting, t as usize))
             .collect()
     };
     let all: Vec<u32> = (0..cutting.scene.triangles.len() as u32).collect();
@@ -211,7 +236,7 @@ fn cut_shadows(cutting: &mut Cutting, shadows: &Shadows, size: f64, most: usize)
     loop {
         let largest = errors.iter().copied().fold(0.0, f64::max);
         let wanted: Vec<usize> = (0..errors.len())
-            .filter(|&t| errors[t] > SHADOW && errors[t] * AT_ONCE >= largest)
+            .filter(|&t| errors[t] > allowed && errors[t] * AT_ONCE >= largest)
             .collect();
         let mut changed = Vec::new();
         for t in wanted {
@@ -232,7 +257,7 @@ fn cut_shadows(cutting: &mut Cutting, shadows: &Shadows, size: f64, most: usize)
                 .iter()
                 .for_each(|&t| errors[t as usize] = 0.0);
         }
-        if largest <= SHADOW {
+        if largest <= allowed {
             return;
         }
         changed.sort_unstable();

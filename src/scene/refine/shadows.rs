@@ -27,7 +27,8 @@ impl<'a> Shadows<'a> {
         let material = |t: usize| &input.materials[input.triangles[t].material as usize];
         let surface = |t: usize| Surface {
             corners: input.corners(&input.triangles[t]),
-            emitted: std::f64::consts::PI * luminance(material(t).ke),
+            emitted: std::f64::consts::PI
+                * luminance(material(t).emitted_over(&input.triangles[t].uv)),
             reflectance: luminance(material(t).kd),
         };
         let surfaces: Vec<Surface> = (0..input.triangles.len()).map(surface).collect();

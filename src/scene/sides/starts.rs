@@ -47,7 +47,8 @@ impl<'a> Starts<'a> {
             let corners = geometry.corners(t);
             let [a, b, c] = corners;
             let area = 0.5 * (b - a).cross(c - a).length();
-            let emitted = luminance(scene.materials[triangle.material as usize].ke);
+            let emitted =
+                luminance(scene.materials[triangle.material as usize].emitted_over(&triangle.uv));
             add(Light::Triangle(corners), area * emitted);
         }
         for light in &scene.lights.points {
