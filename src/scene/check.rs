@@ -21,6 +21,12 @@ pub(super) fn finish(mut scene: Scene, import: &ImportOptions) -> Result<Scene> 
             dropped => format!("there is no triangle in it with an area ({dropped} without)"),
         }));
     }
+    let of_meshes: usize = scene.meshes.iter().map(|mesh| mesh.count as usize).sum();
+    assert_eq!(
+        of_meshes,
+        scene.triangles.len(),
+        "every triangle is of one mesh"
+    );
     let (low, high) = scene.bounds();
     let extent = (high - low).max_element();
     if !EXTENTS.contains(&extent) {
