@@ -165,7 +165,8 @@ impl Shade {
         draws: impl Iterator<Item = Draw<'a>>,
         then: impl FnOnce(),
     ) {
-        cmd.begin_render_pass(&self.pass, &target.framebuffer, [0; 4]);
+        let clear = [0, 0, 0, mesh.background.to_bits()];
+        cmd.begin_render_pass(&self.pass, &target.framebuffer, clear);
         cmd.bind_indices(mesh.indices);
         cmd.viewport(0, 0, width, height);
         for draw in draws {
@@ -191,6 +192,8 @@ impl Shade {
 pub struct Mesh<'a> {
     pub vertices: &'a Buffer,
     pub indices: &'a Buffer,
+    /// Alpha of samples that show nothing.
+    pub background: f32,
 }
 
 impl Target {

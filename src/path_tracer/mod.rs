@@ -162,8 +162,12 @@ impl<'a> PathTracer<'a> {
                         .hit(self.geometry.inside(projection.eye), direction);
                     metered &=
                         seen.is_some_and(|hit| hit.front && !self.lights.emits(hit.triangle));
-                    if let Some(hit) = seen {
-                        sum += self.radiance(&hit, settings.light, &mut random);
+                    match seen {
+                        Some(hit) => sum += self.radiance(&hit, settings.light, &mut random),
+                        None if settings.light != Light::Direct => {
+                            sum += self.lights.sky(direction)
+                        }
+                        None => {}
                     }
                 }
                 Batch {

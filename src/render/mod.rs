@@ -8,6 +8,7 @@
 //! light by direction ───┴─► passes::relief ─┘
 //! ```
 
+mod background;
 mod compare;
 mod flat_relief;
 mod flip;

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::background::{BEHIND, draw_sky};
 use super::gathered::Gathered;
 use super::lights::light_buffers;
 use super::mesh::Mesh;
@@ -13,8 +14,9 @@ use super::{Lighting, Overdraw, Show, View};
 use crate::error::Result;
 use crate::passes::shade::{self, Shade, Target};
 use crate::passes::shadow_rays::LightBuffers;
-use crate::picture::{NEAR, Picture, Projection, SAMPLES, Tile};
+use crate::picture::{Light, NEAR, Picture, Projection, SAMPLES, Tile};
 use crate::scene::Scene;
+use crate::scene::sky::Sky;
 use crate::vk::{Commands, Device, Timestamps};
 
 /// Pixels along a side of a tile: 2048² samples take 64 MiB of colour, as much again to read them,
@@ -40,6 +42,14 @@ struct Fixed<'a> {
     shade: Shade,
     textures: Textures,
     relief: Option<ReliefScene>,
+}
+
+impl Fixed<'_> {
+    /// The sky, if the picture shows it.
+    fn sky(&self) -> Option<&Sky> {
+        let shows = self.lighting.show == Show::Shaded && self.lighting.part != Light::Direct;
+        self.scene.lights.sky.as_ref().filter(|_| shows)
+    }
 }
 
 /// What depends on the view.
@@ -197,6 +207,7 @@ impl<'a> Renderer<'a> {
             (width.min(side) * SAMPLES, height.min(side) * SAMPLES),
         )?;
         let mut gathered = Gathered::new(self.view.size);
+        let sky = self.fixed.sky();
         let mut distances = Vec::new();
         for row in (0..height).step_by(side as usize) {
             for column in (0..width).step_by(side as usize) {
@@ -213,11 +224,11 @@ impl<'a> Renderer<'a> {
                     self.record(cmd, &target, tile, SAMPLES, None, || ());
                     Ok(())
                 })?;
-                gathered.add(
-                    tile,
-                    &target.rows(tile.height * SAMPLES),
-                    target.width as usize,
-                );
+                let (mut samples, stride) = (target.rows(tile.height * SAMPLES), target.width);
+                if let Some(sky) = sky {
+                    draw_sky(sky, &self.view.projection, tile, &mut samples, stride);
+                }
+                gathered.add(tile, &samples, stride as usize);
                 if let Some(depths) = target.depths(tile.height * SAMPLES) {
                     distances.resize(width as usize * height as usize, 0.0);
                     for place in 0..tile.width * tile.height {
@@ -329,6 +340,10 @@ impl<'a> Renderer<'a> {
             &shade::Mesh {
                 vertices: &mesh.vertices,
                 indices: &mesh.indices,
+                background: match (self.fixed.sky(), mark) {
+                    (Some(_), None) => BEHIND,
+                    _ => 0.0,
+                },
             },
             plain,
             || {
