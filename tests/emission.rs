@@ -151,45 +151,6 @@ fn a_gradient_lights_as_strips() {
     check(32, |u| u);
 }
 
-/// Power of elements that are partly dark, of that of the lamp. Measured: 5.3e-2.
-const PARTLY_DARK: f64 = 0.1;
-
-/// However coarse the mesh, elements are cut where a texture changes.
-#[test]
-fn triangles_are_cut_where_a_texture_changes() {
-    let scene = textured(|u| f32::from(u8::from(u < 0.37)));
-    let coarse = Refinement {
-        element_size: Some(1.0),
-        ..Refinement::default()
-    };
-    let cut = scene.refined(&coarse);
-    let mut plain = scene.clone();
-    let map = plain.materials[1].map_ke.take();
-    let mut uncut = plain.refined(&coarse);
-    uncut.materials[1].map_ke = map;
-    let [partly, of_uncut] = [cut, uncut].map(|scene| {
-        let elements = Elements::new(&scene);
-        let whole = STRENGTH * PI;
-        let power = |e: usize| f64::from(elements.emitted[e].x) * elements.area[e];
-        let all: f64 = (0..elements.len()).map(power).sum();
-        let exact = 0.37 * f64::from(whole) / elements.unit.powi(2);
-        let is_partly = |&e: &usize| {
-            let share = elements.emitted[e].x / whole;
-            share > 0.02 && share < 0.98
-        };
-        let partly = (0..elements.len())
-            .filter(is_partly)
-            .map(power)
-            .sum::<f64>()
-            / all;
-        let (count, off) = (elements.len(), all / exact - 1.0);
-        println!("{count} triangles, {partly:.4} of the power partly dark, off {off:.1e}");
-        assert!(off.abs() < 6e-3);
-        partly
-    });
-    assert!(partly < PARTLY_DARK && of_uncut > 3.0 * partly);
-}
-
 /// Emission follows the material's factor when it is set again.
 #[test]
 fn relit_elements_keep_their_textures() {

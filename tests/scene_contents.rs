@@ -106,3 +106,36 @@ fn contents_are_those_of_the_input() {
     assert!(of_fine.count([(4, 0)].into_iter()).is_err());
     assert!(of_fine.count([(0, 2)].into_iter()).is_err());
 }
+
+/// Triangles that are cut by a mask stay in their meshes.
+#[test]
+fn meshes_keep_what_masks_leave() {
+    let dir = tempfile::tempdir().unwrap();
+    let mask = image::GrayImage::from_fn(8, 8, |x, y| {
+        image::Luma([if (2..6).contains(&x) && (2..6).contains(&y) {
+            0
+        } else {
+            255
+        }])
+    });
+    mask.save(dir.path().join("mask.png")).unwrap();
+    let masked = MATERIALS.replace("newmtl light", "map_d mask.png\nnewmtl light");
+    fs::write(dir.path().join("mask.mtl"), masked).unwrap();
+    let scene = read(
+        dir.path(),
+        "mask.obj",
+        &ROOM.replace("room.mtl", "mask.mtl"),
+    );
+    assert!(scene.triangles.len() > 10, "{}", scene.triangles.len());
+    for mesh in &scene.meshes {
+        let own = mesh.first as usize..(mesh.first + mesh.count) as usize;
+        let materials = scene.triangles[own].iter().map(|t| t.material as usize);
+        let names: Vec<_> = materials.map(|m| &scene.materials[m].name).collect();
+        let expected = if mesh.name == "lamp" {
+            "light"
+        } else {
+            "paint"
+        };
+        assert!(names.iter().all(|name| *name == expected), "{names:?}");
+    }
+}

@@ -321,7 +321,9 @@ impl Assembly {
         self.known = (cut.triangles.iter())
             .map(|t| least_first(t.vertices))
             .collect();
-        (self.scene.vertices, self.scene.triangles) = (cut.vertices, cut.triangles);
+        let scene = &mut self.scene;
+        scene.meshes = meshes::of_cut(&scene.meshes, &cut.from);
+        (scene.vertices, scene.triangles) = (cut.vertices, cut.triangles);
         Ok(())
     }
 

@@ -200,6 +200,7 @@ fn material(material: &Material) -> MaterialContents {
     let heights = material.map_height.as_deref();
     let maps = [
         ("map_kd", material.map_kd.as_deref().map(|map| &map.path)),
+        ("map_ke", material.map_ke.as_deref().map(|map| &map.path)),
         ("height_map", heights.map(|map| &map.path)),
         (
             "normal_map",

@@ -41,6 +41,15 @@ pub(super) fn name(ranges: &[MeshRange], triangle: u32) -> Option<&str> {
     of(ranges, triangle).map(|index| ranges[index].name.as_str())
 }
 
+/// The ranges after triangles were cut: each is of the mesh of that which it was cut from.
+pub(super) fn of_cut(ranges: &[MeshRange], from: &[u32]) -> Vec<MeshRange> {
+    let mut cut = Vec::new();
+    for name in from.iter().filter_map(|&t| name(ranges, t)) {
+        add(&mut cut, name);
+    }
+    cut
+}
+
 /// The range that a triangle lies in.
 fn of(ranges: &[MeshRange], triangle: u32) -> Option<usize> {
     let after = ranges.partition_point(|range| range.first <= triangle);

@@ -1,5 +1,4 @@
-//! Lights of a scene that is written out: tables, with a file for each beam and for a sky's
-//! picture.
+//! Lights of a scene that is written out: tables, with a file for each beam and for a sky's picture.
 
 use std::path::Path;
 

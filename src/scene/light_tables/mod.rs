@@ -113,7 +113,7 @@ fn add_lamps(file: &SceneFile, lines: &Lines, assembly: &mut Assembly) -> Result
             material.name.clone_from(&name);
             material.check().map_err(refuse)?;
         }
-        assembly.add_lamp(&mesh)?;
+        assembly.add_lamp(&mesh.named(&name))?;
     }
     Ok(())
 }

@@ -24,7 +24,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::assemble::is_degenerate;
-use super::{Scene, Triangle};
+use super::{Scene, Triangle, meshes};
 use crate::error::{Error, Result};
 pub(super) use alpha::DEFAULT_CUTOFF;
 pub use alpha::{AlphaMap, AlphaMask};
@@ -58,6 +58,7 @@ impl Scene {
     /// Masks that would make more than some two million triangles.
     pub fn cut_masks(&mut self) -> Result<()> {
         if let Some(cut) = cut(self)? {
+            self.meshes = meshes::of_cut(&self.meshes, &cut.from);
             (self.vertices, self.triangles) = (cut.vertices, cut.triangles);
         }
         Ok(())
