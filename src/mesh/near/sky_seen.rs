@@ -9,16 +9,39 @@ use crate::mesh::shadow_tree::ShadowTree;
 use crate::scene::sky::Sky;
 use crate::structs::ShadowOccluder;
 
-/// Bands of height and of azimuth that are looked at first: 6° each way at the horizon.
-const BANDS: u32 = 30;
-const COLUMNS: u32 = 60;
+/// Bands of height and of azimuth that are looked at first: 3° each way at the horizon.
+const BANDS: u32 = 60;
+const COLUMNS: u32 = 120;
 
-/// Each of these is cut in four so often, and up to so often where it is partly hidden.
-const LEAST_CUTS: u32 = 1;
-const MOST_CUTS: u32 = 6;
+/// Parts that are partly hidden are cut in four until they hold no more than this share of the
+/// light, or so often: what is wrong with them is a small part of that.
+const MIXED: f64 = 0.03;
+const MOST_CUTS: usize = 12;
 
 /// Longer than any way through a scene, internal units.
 const FAR: f64 = 4.0;
+
+/// A part of the sphere: sine of the height and turns of the azimuth, low to high.
+#[derive(Clone, Copy)]
+struct Part {
+    low: DVec2,
+    high: DVec2,
+}
+
+/// What a place sees of a part.
+struct Seen {
+    light: DVec3,
+    /// Whether some of it is seen, and some hidden.
+    mixed: bool,
+}
+
+struct Look<'a> {
+    sky: &'a Sky,
+    east: DVec3,
+    occluders: &'a ShadowTree<ShadowOccluder>,
+    place: DVec3,
+    normal: DVec3,
+}
 
 /// Irradiance by the sky at a place with this normal, internal units, W·m⁻², RGB.
 pub fn sky_seen(
@@ -34,73 +57,88 @@ pub fn sky_seen(
         place,
         normal,
     };
+    let sine = |band: u32| (PI * (f64::from(band) / f64::from(BANDS) - 0.5)).sin();
+    let turn = |column: u32| f64::from(column) / f64::from(COLUMNS);
+    let part = |i: u32| Part {
+        low: DVec2::new(sine(i / COLUMNS), turn(i % COLUMNS)),
+        high: DVec2::new(sine(i / COLUMNS + 1), turn(i % COLUMNS + 1)),
+    };
+    let mut parts: Vec<Part> = (0..BANDS * COLUMNS).map(part).collect();
     let mut sum = DVec3::ZERO;
-    for band in 0..BANDS {
-        let sine = |band: u32| (PI * (f64::from(band) / f64::from(BANDS) - 0.5)).sin();
-        for column in 0..COLUMNS {
-            let turn = |column: u32| f64::from(column) / f64::from(COLUMNS);
-            let low = DVec2::new(sine(band), turn(column));
-            let high = DVec2::new(sine(band + 1), turn(column + 1));
-            sum += look.part(low, high, 0);
+    for _ in 0..MOST_CUTS {
+        let (mut mixed, mut of_mixed) = (Vec::new(), DVec3::ZERO);
+        for part in parts {
+            let seen = look.at(&part);
+            match seen.mixed {
+                true => {
+                    of_mixed += seen.light;
+                    mixed.extend(part.quarters());
+                }
+                false => sum += seen.light,
+            }
         }
+        let is_little = of_mixed.element_sum() <= MIXED * (sum + of_mixed).element_sum();
+        if is_little {
+            return sum + of_mixed;
+        }
+        parts = mixed;
     }
-    sum
+    // The last parts by their middles.
+    let left = parts.iter().map(|part| look.at(part).light);
+    sum + left.sum::<DVec3>()
 }
 
-struct Look<'a> {
-    sky: &'a Sky,
-    east: DVec3,
-    occluders: &'a ShadowTree<ShadowOccluder>,
-    place: DVec3,
-    normal: DVec3,
-}
-
-impl Look<'_> {
-    /// Light of a part of the sphere: sine of the height and turns of the azimuth, low to high.
-    fn part(&self, low: DVec2, high: DVec2, cuts: u32) -> DVec3 {
+impl Part {
+    fn quarters(&self) -> [Self; 4] {
+        let (low, high) = (self.low, self.high);
         let middle = low.midpoint(high);
-        let quarters = [
+        [
             (low, middle),
             (DVec2::new(middle.x, low.y), DVec2::new(high.x, middle.y)),
             (DVec2::new(low.x, middle.y), DVec2::new(middle.x, high.y)),
             (middle, high),
+        ]
+        .map(|(low, high)| Self { low, high })
+    }
+
+    fn solid_angle(&self) -> f64 {
+        TAU * (self.high.x - self.low.x) * (self.high.y - self.low.y)
+    }
+}
+
+impl Look<'_> {
+    /// By the middles of the part's quarters, and its corners: a straight edge across the part
+    /// leaves some of these on either side.
+    fn at(&self, part: &Part) -> Seen {
+        let Part { low, high } = *part;
+        let corners = [
+            low,
+            high,
+            DVec2::new(low.x, high.y),
+            DVec2::new(high.x, low.y),
         ];
-        let mut sum = DVec3::ZERO;
         let (mut open, mut hidden) = (false, false);
-        if cuts >= LEAST_CUTS {
-            // A straight edge across the part leaves some of its corners on either side.
-            for corner in [
-                low,
-                high,
-                DVec2::new(low.x, high.y),
-                DVec2::new(high.x, low.y),
-            ] {
-                match self.sees(self.direction(corner)) {
-                    Some(true) => open = true,
-                    Some(false) => hidden = true,
-                    None => {}
-                }
-            }
-            for (low, high) in quarters {
-                let towards = self.direction(low.midpoint(high));
-                match self.sees(towards) {
-                    Some(true) => open = true,
-                    Some(false) => {
-                        hidden = true;
-                        continue;
-                    }
-                    None => continue,
-                }
-                let solid_angle = TAU * (high.x - low.x) * (high.y - low.y);
+        let mut note = |sees: Option<bool>| {
+            open |= sees == Some(true);
+            hidden |= sees == Some(false);
+        };
+        for corner in corners {
+            note(self.sees(self.direction(corner)));
+        }
+        let mut light = DVec3::ZERO;
+        for quarter in part.quarters() {
+            let towards = self.direction(quarter.low.midpoint(quarter.high));
+            let sees = self.sees(towards);
+            note(sees);
+            if sees == Some(true) {
                 let cosine = towards.dot(self.normal);
-                sum += self.sky.radiance(towards) * (cosine * solid_angle);
+                light += self.sky.radiance(towards) * (cosine * quarter.solid_angle());
             }
         }
-        if cuts >= LEAST_CUTS && (!(open && hidden) || cuts == MOST_CUTS) {
-            return sum;
+        Seen {
+            light,
+            mixed: open && hidden,
         }
-        let parts = quarters.map(|(low, high)| self.part(low, high, cuts + 1));
-        parts.into_iter().sum()
     }
 
     /// Whether nothing hides a direction; none below the horizon.
