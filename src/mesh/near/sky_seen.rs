@@ -9,13 +9,14 @@ use crate::mesh::shadow_tree::ShadowTree;
 use crate::scene::sky::Sky;
 use crate::structs::ShadowOccluder;
 
-/// Bands of height and of azimuth that are looked at first: 3° each way at the horizon.
-const BANDS: u32 = 60;
-const COLUMNS: u32 = 120;
+/// Bands of height and of azimuth that are looked at first: 1.5° each way at the horizon. What is
+/// narrower may be missed.
+const BANDS: usize = 120;
+const COLUMNS: usize = 240;
 
 /// Parts that are partly hidden are cut in four until they hold no more than this share of the
 /// light, or so often: what is wrong with them is a small part of that.
-const MIXED: f64 = 0.03;
+const MIXED: f64 = 0.005;
 const MOST_CUTS: usize = 12;
 
 /// Longer than any way through a scene, internal units.
@@ -57,22 +58,55 @@ pub fn sky_seen(
         place,
         normal,
     };
-    let sine = |band: u32| (PI * (f64::from(band) / f64::from(BANDS) - 0.5)).sin();
-    let turn = |column: u32| f64::from(column) / f64::from(COLUMNS);
-    let part = |i: u32| Part {
-        low: DVec2::new(sine(i / COLUMNS), turn(i % COLUMNS)),
-        high: DVec2::new(sine(i / COLUMNS + 1), turn(i % COLUMNS + 1)),
+    let node = |band: usize, column: usize| {
+        let sine = (PI * (band as f64 / BANDS as f64 - 0.5)).sin();
+        DVec2::new(sine, column as f64 / COLUMNS as f64)
     };
-    let mut parts: Vec<Part> = (0..BANDS * COLUMNS).map(part).collect();
+    // Of the first parts, corners are looked at once.
+    let corners: Vec<Option<bool>> = (0..=BANDS)
+        .flat_map(|band| (0..=COLUMNS).map(move |column| (band, column)))
+        .map(|(band, column)| look.sees(look.direction(node(band, column))))
+        .collect();
+    let part = |i: usize| Part {
+        low: node(i / COLUMNS, i % COLUMNS),
+        high: node(i / COLUMNS + 1, i % COLUMNS + 1),
+    };
+    let first: Vec<Seen> = (0..BANDS * COLUMNS)
+        .map(|i| {
+            let low = i / COLUMNS * (COLUMNS + 1) + i % COLUMNS;
+            let above = low + COLUMNS + 1;
+            look.at(
+                &part(i),
+                [low, low + 1, above, above + 1].map(|i| corners[i]),
+            )
+        })
+        .collect();
+    // What an edge cuts is cut again, and so are its neighbours, where more of the edge may run.
+    let mut parts = Vec::new();
     let mut sum = DVec3::ZERO;
+    for (i, seen) in first.iter().enumerate() {
+        let (band, column) = (i / COLUMNS, i % COLUMNS);
+        let bands = band.saturating_sub(1)..(band + 2).min(BANDS);
+        let is_mixed = |band: usize| {
+            let columns = [column + COLUMNS - 1, column, column + 1];
+            columns
+                .iter()
+                .any(|c| first[band * COLUMNS + c % COLUMNS].mixed)
+        };
+        match bands.into_iter().any(is_mixed) {
+            true => parts.extend(part(i).quarters().map(|part| (part, look.corners(&part)))),
+            false => sum += seen.light,
+        }
+    }
     for _ in 0..MOST_CUTS {
         let (mut mixed, mut of_mixed) = (Vec::new(), DVec3::ZERO);
-        for part in parts {
-            let seen = look.at(&part);
+        for (part, corners) in parts {
+            let seen = look.at(&part, corners);
             match seen.mixed {
                 true => {
                     of_mixed += seen.light;
-                    mixed.extend(part.quarters());
+                    let quarters = part.quarters().into_iter();
+                    mixed.extend(quarters.map(|part| (part, look.corners(&part))));
                 }
                 false => sum += seen.light,
             }
@@ -84,7 +118,7 @@ pub fn sky_seen(
         parts = mixed;
     }
     // The last parts by their middles.
-    let left = parts.iter().map(|part| look.at(part).light);
+    let left = parts.iter().map(|(part, _)| look.at(part, [None; 4]).light);
     sum + left.sum::<DVec3>()
 }
 
@@ -107,9 +141,7 @@ impl Part {
 }
 
 impl Look<'_> {
-    /// By the middles of the part's quarters, and its corners: a straight edge across the part
-    /// leaves some of these on either side.
-    fn at(&self, part: &Part) -> Seen {
+    fn corners(&self, part: &Part) -> [Option<bool>; 4] {
         let Part { low, high } = *part;
         let corners = [
             low,
@@ -117,22 +149,27 @@ impl Look<'_> {
             DVec2::new(low.x, high.y),
             DVec2::new(high.x, low.y),
         ];
+        corners.map(|corner| self.sees(self.direction(corner)))
+    }
+
+    /// By four places within the part, no two in one row or column, and what it sees of its corners:
+    /// a straight edge across the part leaves some of these on either side.
+    fn at(&self, part: &Part, corners: [Option<bool>; 4]) -> Seen {
         let (mut open, mut hidden) = (false, false);
         let mut note = |sees: Option<bool>| {
             open |= sees == Some(true);
             hidden |= sees == Some(false);
         };
-        for corner in corners {
-            note(self.sees(self.direction(corner)));
-        }
+        corners.into_iter().for_each(&mut note);
         let mut light = DVec3::ZERO;
-        for quarter in part.quarters() {
-            let towards = self.direction(quarter.low.midpoint(quarter.high));
+        for (x, y) in [(1.0, 5.0), (3.0, 1.0), (5.0, 7.0), (7.0, 3.0)] {
+            let within = DVec2::new(x, y) / 8.0;
+            let towards = self.direction(part.low + within * (part.high - part.low));
             let sees = self.sees(towards);
             note(sees);
             if sees == Some(true) {
                 let cosine = towards.dot(self.normal);
-                light += self.sky.radiance(towards) * (cosine * quarter.solid_angle());
+                light += self.sky.radiance(towards) * (cosine * part.solid_angle() / 4.0);
             }
         }
         Seen {
