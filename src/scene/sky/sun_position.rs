@@ -89,8 +89,8 @@ fn apparent_place(days: f64) -> (f64, f64) {
 mod tests {
     use super::*;
 
-    /// Measured: 0.003° at most.
-    const LIMIT: f64 = 0.01;
+    /// NREL's example: measured 0.0003° in height and 0.0012° in azimuth.
+    const LIMIT: f64 = 0.003;
 
     #[test]
     fn the_example_of_meeus() {
@@ -126,6 +126,8 @@ mod tests {
     fn solstices_and_equinoxes() {
         // The sun is highest at 90° − latitude + declination; at the June solstice of 2024 (20 June,
         // 20:51 UTC) the declination is the obliquity, 23.4383°. Noon is searched for.
+        // Steps of a minute miss noon by 0.0001° and the year's obliquity by its nutation, 0.003°.
+        const OBLIQUITY: f64 = 0.006;
         let highest = |month: u32, day: f64, latitude: f64| {
             let minutes = (0..1440).map(|minute| Instant {
                 year: 2024,
@@ -138,10 +140,13 @@ mod tests {
                 .unwrap()
         };
         let june = highest(6, 20.5, 50.0);
-        assert!((june.height - (40.0 + 23.4383)).abs() < LIMIT, "{june:?}");
+        assert!(
+            (june.height - (40.0 + 23.4383)).abs() < OBLIQUITY,
+            "{june:?}"
+        );
         let december = highest(12, 21.0, 50.0);
         assert!(
-            (december.height - (40.0 - 23.4383)).abs() < LIMIT,
+            (december.height - (40.0 - 23.4383)).abs() < OBLIQUITY,
             "{december:?}"
         );
         // At the equinox (20 March, 03:06 UTC) it rises in the east; at the equator it stands at the
