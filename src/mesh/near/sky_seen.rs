@@ -1,12 +1,13 @@
 //! What a place sees of a sky, by rays that grow denser along the edges of what hides it.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
 
 use super::rays::blocked;
 use crate::mesh::shadow_tree::ShadowTree;
-use crate::scene::sky::Sky;
+use crate::mesh::sources::FAR;
+use crate::scene::sky::{Sky, SkyPart};
 use crate::structs::ShadowOccluder;
 
 /// Bands of height and of azimuth that are looked at first: 1.5° each way at the horizon. What is
@@ -19,16 +20,6 @@ const COLUMNS: usize = 240;
 const MIXED: f64 = 0.005;
 const MOST_CUTS: usize = 12;
 
-/// Longer than any way through a scene, internal units.
-const FAR: f64 = 4.0;
-
-/// A part of the sphere: sine of the height and turns of the azimuth, low to high.
-#[derive(Clone, Copy)]
-struct Part {
-    low: DVec2,
-    high: DVec2,
-}
-
 /// What a place sees of a part.
 struct Seen {
     light: DVec3,
@@ -38,7 +29,6 @@ struct Seen {
 
 struct Look<'a> {
     sky: &'a Sky,
-    east: DVec3,
     occluders: &'a ShadowTree<ShadowOccluder>,
     place: DVec3,
     normal: DVec3,
@@ -53,7 +43,6 @@ pub fn sky_seen(
 ) -> DVec3 {
     let look = Look {
         sky,
-        east: sky.north.cross(sky.up),
         occluders,
         place,
         normal,
@@ -65,9 +54,9 @@ pub fn sky_seen(
     // Of the first parts, corners are looked at once.
     let corners: Vec<Option<bool>> = (0..=BANDS)
         .flat_map(|band| (0..=COLUMNS).map(move |column| (band, column)))
-        .map(|(band, column)| look.sees(look.direction(node(band, column))))
+        .map(|(band, column)| look.sees(sky.towards(node(band, column))))
         .collect();
-    let part = |i: usize| Part {
+    let part = |i: usize| SkyPart {
         low: node(i / COLUMNS, i % COLUMNS),
         high: node(i / COLUMNS + 1, i % COLUMNS + 1),
     };
@@ -122,39 +111,15 @@ pub fn sky_seen(
     sum + left.sum::<DVec3>()
 }
 
-impl Part {
-    fn quarters(&self) -> [Self; 4] {
-        let (low, high) = (self.low, self.high);
-        let middle = low.midpoint(high);
-        [
-            (low, middle),
-            (DVec2::new(middle.x, low.y), DVec2::new(high.x, middle.y)),
-            (DVec2::new(low.x, middle.y), DVec2::new(middle.x, high.y)),
-            (middle, high),
-        ]
-        .map(|(low, high)| Self { low, high })
-    }
-
-    fn solid_angle(&self) -> f64 {
-        TAU * (self.high.x - self.low.x) * (self.high.y - self.low.y)
-    }
-}
-
 impl Look<'_> {
-    fn corners(&self, part: &Part) -> [Option<bool>; 4] {
-        let Part { low, high } = *part;
-        let corners = [
-            low,
-            high,
-            DVec2::new(low.x, high.y),
-            DVec2::new(high.x, low.y),
-        ];
-        corners.map(|corner| self.sees(self.direction(corner)))
+    fn corners(&self, part: &SkyPart) -> [Option<bool>; 4] {
+        let corners = part.corners();
+        corners.map(|corner| self.sees(self.sky.towards(corner)))
     }
 
     /// By four places within the part, no two in one row or column, and what it sees of its corners:
     /// a straight edge across the part leaves some of these on either side.
-    fn at(&self, part: &Part, corners: [Option<bool>; 4]) -> Seen {
+    fn at(&self, part: &SkyPart, corners: [Option<bool>; 4]) -> Seen {
         let (mut open, mut hidden) = (false, false);
         let mut note = |sees: Option<bool>| {
             open |= sees == Some(true);
@@ -163,8 +128,7 @@ impl Look<'_> {
         corners.into_iter().for_each(&mut note);
         let mut light = DVec3::ZERO;
         for (x, y) in [(1.0, 5.0), (3.0, 1.0), (5.0, 7.0), (7.0, 3.0)] {
-            let within = DVec2::new(x, y) / 8.0;
-            let towards = self.direction(part.low + within * (part.high - part.low));
+            let towards = self.sky.towards(part.at(DVec2::new(x, y) / 8.0));
             let sees = self.sees(towards);
             note(sees);
             if sees == Some(true) {
@@ -182,11 +146,5 @@ impl Look<'_> {
     fn sees(&self, towards: DVec3) -> Option<bool> {
         let above = towards.dot(self.normal) > 0.0;
         above.then(|| !blocked(self.occluders, self.place, self.place + FAR * towards))
-    }
-
-    fn direction(&self, DVec2 { x: sine, y: turn }: DVec2) -> DVec3 {
-        let cosine = (1.0 - sine * sine).max(0.0).sqrt();
-        let (sin, cos) = (TAU * turn).sin_cos();
-        sine * self.sky.up + cosine * (cos * self.sky.north + sin * self.east)
     }
 }

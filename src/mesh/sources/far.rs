@@ -17,12 +17,12 @@ use crate::mesh::elements::Elements;
 use crate::mesh::near::blocked;
 use crate::mesh::shadow_tree::ShadowTree;
 use crate::scene::even_light::luminance;
-use crate::scene::sky::Sky;
+use crate::scene::sky::{Sky, SkyPart};
 use crate::scene::{Beam, Lights, PointLight, Sun};
 use crate::structs::ShadowOccluder;
 
-/// Bands of the sky from pole to pole: parts of about 12° each way, as Tregenza's.
-const BANDS: u32 = 15;
+/// Bands from the nadir to the zenith, an even number: parts of 6° each way.
+const BANDS: u32 = 30;
 
 /// Samples of a part's light, each way.
 const GRID: usize = 16;
@@ -72,46 +72,44 @@ fn sun(sun: &Sun) -> Option<Source> {
 
 /// Parts of a sky that shine.
 fn sky(sky: &Sky) -> Vec<Source> {
-    let mut parts: Vec<(Part, Lit)> = Vec::new();
-    for band in 0..BANDS * 2 {
-        let angle = |band: u32| PI * f64::from(band) / f64::from(BANDS * 2) - PI / 2.0;
-        let (low, high) = (angle(band).sin(), angle(band + 1).sin());
-        let middle = angle(band).midpoint(angle(band + 1)).cos();
-        let columns = (f64::from(BANDS * 4) * middle).round().max(3.0) as u32;
+    let mut parts: Vec<(SkyPart, Lit)> = Vec::new();
+    let mut add = |part: SkyPart| parts.push((part, Lit::of(&part, sky)));
+    for band in 0..BANDS {
+        let angle = |band: u32| PI * (f64::from(band) / f64::from(BANDS) - 0.5);
+        let flat = angle(band).midpoint(angle(band + 1)).cos();
+        let columns = (f64::from(2 * BANDS) * flat).round().max(3.0) as u32;
         for column in 0..columns {
-            let turn = |column: u32| f64::from(column) / f64::from(columns);
-            let part = Part {
-                low: DVec2::new(low, turn(column)),
-                high: DVec2::new(high, turn(column + 1)),
-                cuts: 0,
-            };
-            parts.push((part, part.lit(sky)));
+            let turns = |column: u32| f64::from(column) / f64::from(columns);
+            add(SkyPart {
+                low: DVec2::new(angle(band).sin(), turns(column)),
+                high: DVec2::new(angle(band + 1).sin(), turns(column + 1)),
+            });
         }
     }
-    let most = MOST_LIGHT * parts.iter().map(|(_, lit)| lit.light).sum::<f64>();
-    let mut sources = Vec::new();
-    while let Some((part, lit)) = parts.pop() {
-        if lit.light > most && part.cuts < MOST_CUTS {
-            parts.extend(part.quarters().map(|part| (part, part.lit(sky))));
-        } else if lit.light > 0.0 {
+    let whole: f64 = parts.iter().map(|(_, lit)| lit.light).sum();
+    for _ in 0..MOST_CUTS {
+        let uncut = std::mem::take(&mut parts);
+        for (part, lit) in uncut {
+            match lit.light > MOST_LIGHT * whole {
+                true => parts.extend(part.quarters().map(|part| (part, Lit::of(&part, sky)))),
+                false => parts.push((part, lit)),
+            }
+        }
+    }
+    let shining = parts.iter().filter(|(_, lit)| lit.light > 0.0);
+    shining
+        .map(|(part, lit)| {
             let size = part.solid_angle() / PI;
-            let radiosity = PI * lit.radiance;
-            sources.push(source(
-                KIND_SKY,
-                lit.directions(&part, sky),
-                size,
-                radiosity,
-            ));
-        }
-    }
-    sources
+            source(KIND_SKY, lit.directions(part, sky), size, PI * lit.radiance)
+        })
+        .collect()
 }
 
 /// Places by which the power of far lights is estimated.
 const PLACES: usize = 512;
 
 /// Longer than any way through a scene, internal units.
-const FAR: f64 = 4.0;
+pub(crate) const FAR: f64 = 4.0;
 
 /// Gives far lights and beams the area by which their radiosity, or intensity, is the power that
 /// arrives at the elements: an estimate by a ray from each of some places, evenly by area.
@@ -185,14 +183,6 @@ impl Source {
     }
 }
 
-/// A part of the sphere: sine of the height and turns of the azimuth from low to high.
-#[derive(Clone, Copy)]
-struct Part {
-    low: DVec2,
-    high: DVec2,
-    cuts: u32,
-}
-
 /// Light of a part.
 struct Lit {
     /// Mean radiance.
@@ -203,63 +193,27 @@ struct Lit {
     cumulated: Vec<f64>,
 }
 
-impl Part {
-    fn solid_angle(&self) -> f64 {
-        let size = self.high - self.low;
-        TAU * size.x * size.y
-    }
-
-    fn direction(&self, at: DVec2, sky: &Sky) -> DVec3 {
-        let DVec2 { x: sine, y: turn } = self.low + at * (self.high - self.low);
-        let cosine = (1.0 - sine * sine).max(0.0).sqrt();
-        let east = sky.north.cross(sky.up);
-        let angle = TAU * turn;
-        sine * sky.up + cosine * (angle.cos() * sky.north + angle.sin() * east)
-    }
-
-    fn lit(&self, sky: &Sky) -> Lit {
+impl Lit {
+    fn of(part: &SkyPart, sky: &Sky) -> Self {
         let mut radiance = DVec3::ZERO;
         let mut cumulated = Vec::with_capacity(GRID * GRID);
         let mut sum = 0.0;
         for cell in 0..GRID * GRID {
             let at = DVec2::new((cell / GRID) as f64 + 0.5, (cell % GRID) as f64 + 0.5);
-            let found = sky.radiance(self.direction(at / GRID as f64, sky));
+            let found = sky.radiance(sky.towards(part.at(at / GRID as f64)));
             radiance += found / (GRID * GRID) as f64;
             sum += luminance(found.as_vec3().to_array());
             cumulated.push(sum);
         }
-        Lit {
+        Self {
             radiance,
-            light: sum / (GRID * GRID) as f64 * self.solid_angle(),
+            light: sum / (GRID * GRID) as f64 * part.solid_angle(),
             cumulated,
         }
     }
 
-    fn quarters(self) -> [Self; 4] {
-        let middle = self.low.midpoint(self.high);
-        let quarter = |low: DVec2, high: DVec2| Self {
-            low,
-            high,
-            cuts: self.cuts + 1,
-        };
-        [
-            quarter(self.low, middle),
-            quarter(
-                DVec2::new(middle.x, self.low.y),
-                DVec2::new(self.high.x, middle.y),
-            ),
-            quarter(
-                DVec2::new(self.low.x, middle.y),
-                DVec2::new(middle.x, self.high.y),
-            ),
-            quarter(middle, self.high),
-        ]
-    }
-}
-
-impl Lit {
     /// Directions of even shares of the luminance.
-    fn directions(&self, part: &Part, sky: &Sky) -> Vec<DVec3> {
+    fn directions(&self, part: &SkyPart, sky: &Sky) -> Vec<DVec3> {
         let whole = self.cumulated[GRID * GRID - 1];
         let row_end = |row: usize| self.cumulated[(row + 1) * GRID - 1];
         let before = |cell: usize| {
@@ -284,7 +238,7 @@ impl Lit {
             let cell = cell.unwrap_or(cells.end);
             let across = (wanted - before(cell)) / (self.cumulated[cell] - before(cell));
             let at = DVec2::new(row as f64 + down, (cell % GRID) as f64 + across);
-            part.direction(at / GRID as f64, sky)
+            sky.towards(part.at(at / GRID as f64))
         };
         (0..SOURCE_EYES as usize).map(direction).collect()
     }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::super::even_light::luminance;
 use super::super::geometry::{ABOVE, Geometry};
@@ -116,12 +116,12 @@ const AZIMUTHS: u32 = 64;
 
 impl SkyCells {
     fn new(sky: &Sky) -> Self {
-        let east = sky.north.cross(sky.up);
         let middle = |i: u32| {
             let height = 1.0 - 2.0 * (f64::from(i / AZIMUTHS) + 0.5) / f64::from(HEIGHTS);
-            let (sin, cos) = (TAU * f64::from(i % AZIMUTHS) / f64::from(AZIMUTHS)).sin_cos();
-            let flat = (1.0 - height * height).sqrt();
-            height * sky.up + flat * (cos * sky.north + sin * east)
+            sky.towards(DVec2::new(
+                height,
+                f64::from(i % AZIMUTHS) / f64::from(AZIMUTHS),
+            ))
         };
         let cells: Vec<DVec3> = (0..HEIGHTS * AZIMUTHS).map(middle).collect();
         let solid_angle = 4.0 * PI / f64::from(HEIGHTS * AZIMUTHS);

@@ -2,16 +2,18 @@
 
 mod gradation;
 mod panorama;
+mod part;
 mod perez;
 mod sun_position;
 
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::lights::is_unit;
 pub use gradation::{Form, Gradation};
 pub use panorama::Panorama;
+pub use part::SkyPart;
 pub use perez::Perez;
 pub use sun_position::{Instant, SunAngles, sun_angles};
 
@@ -65,21 +67,19 @@ impl Sky {
 
     /// Irradiance of the open ground, W·m⁻², RGB: the integral of the radiance times the cosine.
     pub fn horizontal(&self) -> [f64; 3] {
-        use std::f64::consts::{PI, TAU};
+        use std::f64::consts::PI;
         let of_dome = match &self.dome {
             Dome::Uniform => DVec3::splat(PI),
             Dome::TraditionalOvercast => DVec3::splat(7.0 * PI / 9.0),
             Dome::Picture(picture) => picture.horizontal(),
             Dome::Gradation(gradation) => {
-                let east = self.north.cross(self.up);
                 let sum = (0..HEIGHTS).map(|i| {
                     // With u = sin² Z the cosine and the solid angle make ½ du dφ.
                     let u = (f64::from(i) + 0.5) / f64::from(HEIGHTS);
-                    let (cos, sin) = ((1.0 - u).sqrt(), u.sqrt());
+                    let cos = (1.0 - u).sqrt();
                     let of_azimuth = |j: u32| {
-                        let (s, c) = (TAU * (f64::from(j) + 0.5) / f64::from(AZIMUTHS)).sin_cos();
-                        let towards = cos * self.up + sin * (c * self.north + s * east);
-                        gradation.relative(cos, towards)
+                        let turns = (f64::from(j) + 0.5) / f64::from(AZIMUTHS);
+                        gradation.relative(cos, self.towards(DVec2::new(cos, turns)))
                     };
                     (0..AZIMUTHS).map(of_azimuth).sum::<f64>()
                 });
