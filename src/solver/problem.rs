@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::{Estimator, Settings, Visibility};
 use crate::constants::LISTED_BITS;
@@ -13,13 +13,14 @@ use crate::mesh::near::NearPairs;
 use crate::mesh::occluders::Occluders;
 use crate::mesh::open_eyes::open_eyes;
 use crate::mesh::shadow_tree::ShadowTree;
-use crate::mesh::sources::{self, Source, Sources, far_power};
+use crate::mesh::sources::{self, LitBy, Source, Sources, far_power};
 use crate::passes::batch::Hemicubes;
 use crate::passes::buffers::{SceneBuffers, State};
 use crate::passes::relief_buffers::ReliefBuffers;
 use crate::passes::types::ShadowOccluder;
+use crate::scene::even_light::far_lights;
 use crate::scene::sky::Sky;
-use crate::scene::{Lights, Scene};
+use crate::scene::{Lights, PointLight, Scene};
 use crate::vk::{Commands, Device};
 
 /// The light by which elements were grouped.
@@ -27,7 +28,9 @@ use crate::vk::{Commands, Device};
 pub(super) struct GroupedBy {
     /// See [`Elements::emitted_by_material`].
     pub emitted: Vec<Vec3>,
-    pub lights: Lights,
+    pub points: Vec<PointLight>,
+    /// Of suns and the sky, see [`far_lights`].
+    pub far: Vec<(DVec3, f64)>,
 }
 
 /// A scene to be lit.
@@ -66,7 +69,8 @@ impl Problem {
             Some(kept) => kept.grouped_by(),
             None => GroupedBy {
                 emitted: elements.emitted_by_material(),
-                lights: lights.clone(),
+                points: lights.points.clone(),
+                far: far_lights(lights),
             },
         };
         let (mut sources, connections) = match kept {
@@ -191,7 +195,8 @@ impl Problem {
     pub(super) fn strong(&self) -> Vec<bool> {
         let list = &self.sources.list;
         let least = sources::least_strong(list, &self.settings.grouping);
-        let strong = |source: &sources::Source| least > 0.0 && source.emitted_power() >= least;
+        let strong =
+            |source: &Source| !source.is_far() && least > 0.0 && source.emitted_power() >= least;
         list.iter().map(strong).collect()
     }
 }
@@ -210,7 +215,11 @@ fn group(
     }
     elements.set_emitted(&by.emitted);
     let (grouping, seed) = (&settings.grouping, settings.seed);
-    let (mut sources, connections) = sources::build(elements, &by.lights, grouping, seed);
+    let lit_by = LitBy {
+        points: &by.points,
+        far: &by.far,
+    };
+    let (mut sources, connections) = sources::group_by(elements, lit_by, grouping, seed);
     for (&input, emitted) in elements.input_index.iter().zip(&mut elements.emitted) {
         *emitted = now[input as usize];
     }

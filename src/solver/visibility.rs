@@ -3,7 +3,7 @@
 use std::io::Read;
 use std::path::Path;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -19,8 +19,7 @@ use crate::mesh::sources::Source;
 use crate::meso::Transport;
 use crate::passes::kept_rows::RestoredSize;
 use crate::passes::types::{KeptRow, KeptState};
-use crate::scene::even_light::far_lights;
-use crate::scene::{Lights, PointLight, Scene, Sun};
+use crate::scene::{Lights, PointLight, Scene};
 
 /// Form factors of the sources of a scene that had been drawn, for the same scene with other
 /// emission and point lights.
@@ -218,15 +217,19 @@ impl Visibility {
             lists.runs.extend(runs);
             lists.values.extend(values);
         }
-        let GroupedBy { emitted, lights } = &problem.grouped_by;
+        let GroupedBy {
+            emitted,
+            points,
+            far,
+        } = &problem.grouped_by;
         let mut header = Header {
             key: key(scene, &problem.settings),
             emitted: emitted.iter().map(Vec3::to_array).collect(),
-            lights: (lights.points.iter())
+            lights: (points.iter())
                 .map(|l| (l.position.to_array(), l.intensity))
                 .collect(),
-            far: (far_lights(lights).into_iter())
-                .map(|(towards, irradiance)| (towards.to_array(), irradiance))
+            far: (far.iter())
+                .map(|&(towards, irradiance)| (towards.to_array(), irradiance))
                 .collect(),
             surfaces,
             chunk_words: kept.chunk_words,
@@ -312,15 +315,9 @@ impl Visibility {
             intensity,
             beam: None,
         };
-        // All of them as suns: they only say how evenly groups were lit.
-        let sun = |&(towards, irradiance): &([f64; 3], f64)| Sun {
-            name: String::new(),
-            towards: towards.into(),
-            irradiance: [irradiance as f32; 3],
-            angle: 0.0,
-        };
         let lights = self.header.lights.iter().map(light);
-        let suns = self.header.far.iter().map(sun);
+        let far = self.header.far.iter();
+        let far = far.map(|&(towards, irradiance)| (DVec3::from(towards), irradiance));
         GroupedBy {
             emitted: self
                 .header
@@ -329,11 +326,8 @@ impl Visibility {
                 .copied()
                 .map(Vec3::from)
                 .collect(),
-            lights: Lights {
-                points: lights.collect(),
-                suns: suns.collect(),
-                sky: None,
-            },
+            points: lights.collect(),
+            far: far.collect(),
         }
     }
 

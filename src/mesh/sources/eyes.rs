@@ -57,9 +57,11 @@ fn turned_frame(normal: DVec3, seed: u64, index: u64) -> (DVec3, DVec3) {
 /// independent and average out.
 const LEAST: f64 = 1.0 / 16.0;
 
-/// Power of a scene's weakest emitter that counts as strong, internal units.
+/// Power of a scene's weakest emitter that counts as strong, internal units. Suns, skies and beams
+/// are looked at by rays anyway, and do not count: beside the sun no lamp in a house is strong.
 pub(crate) fn least_strong(sources: &[Source], grouping: &Grouping) -> f64 {
-    let power: f64 = sources.iter().map(Source::emitted_power).sum();
+    let near = sources.iter().filter(|source| !source.is_far());
+    let power: f64 = near.map(Source::emitted_power).sum();
     LEAST * grouping.max_power * power
 }
 

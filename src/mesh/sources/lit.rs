@@ -3,13 +3,13 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::LitBy;
 use crate::mesh::charts::{Connections, morton_order};
 use crate::mesh::elements::Elements;
 use crate::mesh::near::blocked;
 use crate::mesh::occluders::Occluders;
 use crate::mesh::shadow_tree::ShadowTree;
-use crate::scene::Lights;
-use crate::scene::even_light::{EvenLight, LightPlace, Surface, far_lights, luminance};
+use crate::scene::even_light::{EvenLight, LightPlace, Surface, luminance};
 use crate::structs::ShadowOccluder;
 
 /// Places on the lights, and on all surfaces.
@@ -27,7 +27,7 @@ pub(super) struct Lit<'a> {
 
 impl<'a> Lit<'a> {
     /// None where nothing emits.
-    pub fn new(elements: &'a Elements, connections: &Connections, lights: &Lights) -> Option<Self> {
+    pub fn new(elements: &'a Elements, connections: &Connections, by: LitBy) -> Option<Self> {
         let surface = |e: usize| Surface {
             corners: elements.triangle(e),
             emitted: luminance(elements.emitted[e].into()),
@@ -36,12 +36,12 @@ impl<'a> Lit<'a> {
         // In an order that does not depend on that of the input.
         let order = morton_order(elements);
         let surfaces: Vec<Surface> = order.iter().map(|&e| surface(e as usize)).collect();
-        let points = lights.points.iter().map(|light| {
+        let points = by.points.iter().map(|light| {
             let position = (light.position - elements.origin) / elements.unit;
             let square = elements.unit * elements.unit;
             (position, luminance(light.intensity) / square)
         });
-        let light = EvenLight::new(&surfaces, points, &far_lights(lights), PLACES)?;
+        let light = EvenLight::new(&surfaces, points, by.far, PLACES)?;
         let occluders = Occluders::elements(elements);
         Some(Self {
             elements,

@@ -21,12 +21,13 @@ use crate::error::{Error, Result};
 use crate::mesh::charts::Connections;
 use crate::mesh::contour::Loop;
 use crate::mesh::elements::Elements;
-use crate::scene::{Lights, Web};
+use crate::scene::even_light::far_lights;
+use crate::scene::{Lights, PointLight, Web};
 use cut::{Limits, cut};
 pub(crate) use eyes::least_strong;
 use eyes::{move_eyes, turn_frames};
 use far::far;
-pub(crate) use far::far_power;
+pub(crate) use far::{FAR, far_power};
 use group::group;
 use lit::Lit;
 use single::{halves, part, point};
@@ -196,17 +197,49 @@ impl Sources {
                 elements.input_index[e]
             )));
         }
-        add_lights(&mut self.list, lights, elements);
-        turn_frames(&mut self.list, seed);
+        self.add_lights(lights, elements, seed);
         Ok(())
+    }
+
+    /// Adds the lights that have no elements, and turns the frames of all sources.
+    fn add_lights(&mut self, lights: &Lights, elements: &Elements, seed: u64) {
+        for light in lights.points.iter().filter(|light| light.beam.is_none()) {
+            self.list.extend(point(light, elements));
+        }
+        self.list.extend(far(lights, elements));
+        turn_frames(&mut self.list, seed);
     }
 }
 
-/// Orders the elements and groups them. `seed` turns each hemicube about its axis by an angle of
-/// its own, so that the pixel grids of different hemicubes do not align.
+/// The light by which groups are made even, beside what the elements emit.
+#[derive(Clone, Copy)]
+pub struct LitBy<'a> {
+    pub points: &'a [PointLight],
+    /// Of suns and the sky, see [`far_lights`].
+    pub far: &'a [(DVec3, f64)],
+}
+
+/// Orders the elements and groups them, for these lights. `seed` turns each hemicube about its axis
+/// by an angle of its own, so that the pixel grids of different hemicubes do not align.
 pub fn build(
     elements: &mut Elements,
     lights: &Lights,
+    grouping: &Grouping,
+    seed: u64,
+) -> (Sources, Connections) {
+    let lit_by = LitBy {
+        points: &lights.points,
+        far: &far_lights(lights),
+    };
+    let (mut sources, connections) = group_by(elements, lit_by, grouping, seed);
+    sources.add_lights(lights, elements, seed);
+    (sources, connections)
+}
+
+/// Orders the elements and groups them, without sources of lights.
+pub fn group_by(
+    elements: &mut Elements,
+    lit_by: LitBy,
     grouping: &Grouping,
     seed: u64,
 ) -> (Sources, Connections) {
@@ -214,7 +247,7 @@ pub fn build(
     let limits = Limits::new(elements, grouping);
     let asked = grouping.max_unevenness.is_finite();
     let lit = asked
-        .then(|| Lit::new(elements, &connections, lights))
+        .then(|| Lit::new(elements, &connections, lit_by))
         .flatten();
     let groups = cut(elements, &connections, &limits, lit.as_ref());
     elements.permute(&groups.order);
@@ -252,17 +285,8 @@ pub fn build(
         }
     }
     sources.relief = plain.unwrap_or(sources.list.len())..sources.list.len();
-    add_lights(&mut sources.list, lights, elements);
-    turn_frames(&mut sources.list, seed);
     move_eyes(&mut sources.list, elements, &limits, seed);
     (sources, connections)
-}
-
-fn add_lights(list: &mut Vec<Source>, lights: &Lights, elements: &Elements) {
-    for light in lights.points.iter().filter(|light| light.beam.is_none()) {
-        list.extend(point(light, elements));
-    }
-    list.extend(far(lights, elements));
 }
 
 pub(crate) fn triangle_area([a, b, c]: [DVec3; 3]) -> f64 {
