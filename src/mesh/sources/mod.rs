@@ -215,7 +215,7 @@ impl Sources {
 #[derive(Clone, Copy)]
 pub struct LitBy<'a> {
     pub points: &'a [PointLight],
-    /// Of suns and the sky, see [`far_lights`].
+    /// Of suns and the sky: the direction to each, and its irradiance on a plane that faces it.
     pub far: &'a [(DVec3, f64)],
 }
 
