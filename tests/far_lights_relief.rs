@@ -222,7 +222,7 @@ fn the_sun_on_relief_is_drawn_as_on_its_geometry() {
         };
         let (scene, camera) = wall(elevation, 1);
         let solution = bake(&device(), &scene, &settings(64), |_| true).expect("it is solved");
-        let fine = displace(&wall(elevation, 5).0);
+        let fine = displace(&wall(elevation, 5).0).unwrap();
         let tracer = PathTracer::new(&fine).expect("the scene is good");
         // At 10° most of the picture is shadow, whose few bounces are the reference's noise.
         let parts = [Light::Direct, Light::Global];

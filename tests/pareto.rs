@@ -94,14 +94,12 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// The reference is traced once; every method has its rows; what is not installed is one line.
-#[test]
-fn measures_a_scene() {
-    let folder = tempfile::tempdir().expect("a folder for the test");
+/// `bench pareto` of a scene at a cost that a test can bear, without Mitsuba.
+fn measure(scene: &str, folder: &Path) -> Output {
     let args = [
         "bench",
         "pareto",
-        "room.obj",
+        scene,
         "-o",
         "out",
         "--samples",
@@ -119,9 +117,27 @@ fn measures_a_scene() {
         "--python",
         "no-such-python",
     ];
+    mesolux(&args, folder)
+}
+
+/// The methods that have rows in what [`measure`] has written.
+fn methods(folder: &Path) -> Vec<String> {
+    let json = std::fs::read(folder.join("out/pareto.json")).expect("there");
+    let found: serde_json::Value = serde_json::from_slice(&json).expect("JSON");
+    let rows = found["rows"].as_array().expect("rows");
+    assert!(rows.iter().any(|r| r["best"] == true));
+    assert!(found["breakdown"]["worst"][0]["triangle"].is_u64());
+    let method = |row: &serde_json::Value| row["method"].as_str().expect("a name").to_owned();
+    rows.iter().map(method).collect()
+}
+
+/// The reference is traced once; every method has its rows; what is not installed is one line.
+#[test]
+fn measures_a_scene() {
+    let folder = tempfile::tempdir().expect("a folder for the test");
     let mut truths = Vec::new();
     for _ in 0..2 {
-        let run = mesolux(&args, folder.path());
+        let run = measure("room.obj", folder.path());
         let (said, logged) = (text(&run.stdout), text(&run.stderr));
         assert!(run.status.success(), "{logged}");
         assert_eq!(said.matches("Mitsuba 3 is left out").count(), 1, "{said}");
@@ -131,14 +147,43 @@ fn measures_a_scene() {
         }
     }
     assert_eq!(truths, [true, false], "the second run traces nothing");
-    let json = std::fs::read(folder.path().join("out/pareto.json")).expect("there");
-    let found: serde_json::Value = serde_json::from_slice(&json).expect("JSON");
-    let rows = found["rows"].as_array().expect("rows");
+    let there = methods(folder.path());
     for method in ["receiver", "pixel", "instant-radiosity", "path-tracer"] {
-        assert!(rows.iter().any(|r| r["method"] == method), "{method}");
+        assert!(there.iter().any(|name| name == method), "{method}");
     }
-    assert!(rows.iter().any(|r| r["best"] == true));
-    assert!(found["breakdown"]["worst"][0]["triangle"].is_u64());
+}
+
+/// Peers that know surfaces and points alone have no rows beside a sun, a sky or a beam, and say
+/// why.
+#[test]
+fn peers_say_which_lights_they_do_not_know() {
+    for (kind, light) in [
+        (
+            "suns",
+            "[[sun]]\ntowards = [0.0, 1.0, 0.2]\nirradiance = 1.0\n",
+        ),
+        ("skies", "[sky]\nmodel = \"uniform\"\nradiance = 1.0\n"),
+        (
+            "beams",
+            "[[point_light]]\nposition = [0.5, 0.8, 0.5]\nintensity = 1.0\naxis = [0.0, -1.0, 0.0]\n\
+             spot = { inner = 10.0, outer = 40.0 }\n",
+        ),
+    ] {
+        let folder = tempfile::tempdir().expect("a folder for the test");
+        let text_of = format!("[[mesh]]\nfile = \"room.obj\"\n{light}");
+        std::fs::write(folder.path().join("scene.toml"), text_of).expect("written");
+        let run = measure("scene.toml", folder.path());
+        let (said, logged) = (text(&run.stdout), text(&run.stderr));
+        assert!(run.status.success(), "{kind}: {logged}");
+        for peer in ["the pixel estimator", "instant radiosity", "Mitsuba 3"] {
+            let line = format!("{peer} is left out: it knows no {kind}");
+            assert_eq!(said.matches(&line).count(), 1, "{kind}: {said}");
+        }
+        let there = methods(folder.path());
+        let known = ["receiver", "path-tracer"];
+        assert!(there.iter().all(|m| known.contains(&m.as_str())), "{kind}");
+        assert!(known.iter().all(|m| there.iter().any(|t| t == m)), "{kind}");
+    }
 }
 
 #[test]

@@ -93,7 +93,7 @@ fn baked(scene: &Scene, k: u32, cache: PathBuf) -> Solution {
 fn pictures_are_those_of_the_displaced_scene_within_a_slot() {
     let folder = tempfile::tempdir().expect("a folder for the test");
     let scene = room();
-    let fine = displace(&scene);
+    let fine = displace(&scene).unwrap();
     let tracer = PathTracer::new(&fine).expect("the scene is good");
     // Of the floor alone.
     let middle = DVec3::new(1.0, 0.0, 1.0);

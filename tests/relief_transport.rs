@@ -144,7 +144,7 @@ fn walls_about_a_relief_are_lit_as_by_its_geometry() {
     }
     build.weld();
     let plain = sides[0].start..sides[5].end;
-    let fine_scene = displace(&build.scene);
+    let fine_scene = displace(&build.scene).unwrap();
     let settings = |transport| Settings {
         residual: 2e-3,
         ..settings(transport, 64)

@@ -112,7 +112,7 @@ fn a_wave_on_a_plane_has_exact_heights_at_the_vertices() {
     for (scale, beside) in [(0.3_f32, false), (-0.125, false)] {
         let heights = waves(8);
         let flat = sheet(relief(heights.clone(), scale), beside);
-        let high = displace(&flat);
+        let high = displace(&flat).unwrap();
         assert_eq!(high.triangles.len(), 2 * 128, "{scale}");
         assert_eq!(high.dropped_degenerate, 0);
         let mut moved = 0;
@@ -146,7 +146,7 @@ fn a_wave_on_a_plane_has_exact_heights_at_the_vertices() {
 fn an_edge_ends_at_one_texel() {
     for size in [1_u32, 2, 3, 5, 16] {
         let heights = map(size, |u, v| u + 2.0 * v);
-        let high = displace(&sheet(relief(heights, 1.0), false));
+        let high = displace(&sheet(relief(heights, 1.0), false)).unwrap();
         let mut longest = 0.0_f64;
         for t in &high.triangles {
             for k in 0..3 {
@@ -169,7 +169,7 @@ fn without_relief_nothing_changes_but_the_maps() {
     let zero = relief(waves(8), 0.0);
     for material in [constant, zero] {
         let flat = sheet(material, true);
-        let high = displace(&flat);
+        let high = displace(&flat).unwrap();
         assert_eq!(
             (&high.vertices, &high.triangles),
             (&flat.vertices, &flat.triangles)
@@ -183,7 +183,7 @@ fn without_relief_nothing_changes_but_the_maps() {
     }
     // Refined, but as good as flat.
     let faint = relief(waves(8), 1e-30);
-    let high = displace(&sheet(faint, true));
+    let high = displace(&sheet(faint, true)).unwrap();
     assert!(high.triangles.len() > 256);
     assert!((area(&high, 0) - 4.0).abs() < 1e-12);
     assert!((area(&high, 1) - 4.0).abs() < 1e-12);
@@ -191,7 +191,7 @@ fn without_relief_nothing_changes_but_the_maps() {
 
 #[test]
 fn the_border_to_plain_surfaces_stays_and_has_no_t_junction() {
-    let high = displace(&sheet(relief(waves(8), 0.3), true));
+    let high = displace(&sheet(relief(waves(8), 0.3), true)).unwrap();
     for t in &high.triangles {
         for p in high.corners(t) {
             if t.material == 1 || p.x == 2.0 {
@@ -227,7 +227,7 @@ fn at_a_seam_the_mean_of_the_heights_counts() {
         uv[0] += 0.25;
     }
     let heights = waves(8);
-    let high = displace(&flat);
+    let high = displace(&flat).unwrap();
     let corner = (heights.sample(0.0, 0.0) + heights.sample(0.25, 0.0)) / 2.0 - heights.mean();
     assert!((high.vertices[0].z - corner).abs() < 1e-15);
     // A shift by whole repeats is no seam: the two count once, beside a third.
@@ -238,9 +238,9 @@ fn at_a_seam_the_mean_of_the_heights_counts() {
     third.vertices.push(DVec3::new(-2.0, 2.0, 0.0));
     let uv = [[0.25, 0.0], [1.25, 1.0], [0.25, 1.0]];
     third.triangles.push(triangle([0, 3, 4], uv, 0));
-    assert!((displace(&third).vertices[0].z - corner).abs() < 1e-15);
+    assert!((displace(&third).unwrap().vertices[0].z - corner).abs() < 1e-15);
     let corner = heights.sample(0.0, 0.0) - heights.mean();
-    assert!((displace(&flat).vertices[0].z - corner).abs() < 1e-15);
+    assert!((displace(&flat).unwrap().vertices[0].z - corner).abs() < 1e-15);
 }
 
 #[test]
@@ -265,7 +265,7 @@ fn it_moves_along_the_smooth_normal() {
         .push(triangle([1, 4, 5], [next[0], next[1], next[2]], 0));
     roof.triangles
         .push(triangle([1, 5, 2], [next[0], next[2], next[3]], 0));
-    let high = displace(&roof);
+    let high = displace(&roof).unwrap();
     let map = roof.materials[0].map_height.as_deref().unwrap();
     let height = map.sample(0.0, 0.0) - map.mean();
     let ridge = high.vertices[1];
@@ -292,7 +292,7 @@ fn the_built_in_scenes_stay_closed() {
             ..LoadOptions::default()
         };
         let scene = load(name, &options).unwrap();
-        let high = displace(&scene);
+        let high = displace(&scene).unwrap();
         assert_eq!(high.dropped_degenerate, 0);
         assert!(high.materials.iter().all(|m| !m.has_relief()));
         let raised = |t: &&Triangle| scene.materials[t.material as usize].has_relief();
@@ -325,7 +325,7 @@ fn sizes() {
     for name in ["fruit-platter", "bowl-and-bunny", "cornell-relief"] {
         let scene = load(name, &LoadOptions::default()).unwrap();
         let before = std::time::Instant::now();
-        let high = displace(&scene);
+        let high = displace(&scene).unwrap();
         let raised = |t: &&Triangle| scene.materials[t.material as usize].has_relief();
         let count = |s: &Scene| s.triangles.iter().filter(raised).count();
         println!(
@@ -339,4 +339,15 @@ fn sizes() {
             high.dropped_degenerate
         );
     }
+}
+
+/// A sheet that would take more memory than most machines have is refused before it does.
+#[test]
+fn too_fine_a_relief_is_refused() {
+    let mut flat = sheet(relief(waves(8), 1.0), true);
+    for triangle in &mut flat.triangles {
+        triangle.uv = triangle.uv.map(|uv| uv.map(|x| 2048.0 * x));
+    }
+    let error = displace(&flat).unwrap_err().to_string();
+    assert!(error.contains("height maps"), "{error}");
 }

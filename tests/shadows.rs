@@ -125,7 +125,7 @@ fn compare(
         ..Lighting::from(solution)
     };
     let picture = render(&device(), scene, lighting, &view(camera)).expect("a picture");
-    let fine = displace(scene);
+    let fine = displace(scene).unwrap();
     let tracer = PathTracer::new(&fine).expect("the scene is good");
     let reference = Reference::new(&tracer, &view(camera), Light::Direct, PATHS);
     let reference = reference.expect("a picture");

@@ -34,7 +34,7 @@ pub fn truth(
     folder: Option<&Path>,
     go_on: &impl Fn() -> bool,
 ) -> Result<Option<Truth>> {
-    Truth::of(scene, &displace(scene), wanted, folder, go_on)
+    Truth::of(scene, &displace(scene)?, wanted, folder, go_on)
 }
 
 /// Error of the irradiance of elements, `[triangle]`, linear between corners as a bake's is; None

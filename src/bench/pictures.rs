@@ -138,7 +138,7 @@ pub fn run(
     for case in CASES.iter().filter(|case| wanted(case.name)) {
         let scene = room(case);
         let solution = bake::bake(device, &scene, &settings, |_| true)?;
-        let fine = displace(&scene);
+        let fine = displace(&scene)?;
         let tracer = PathTracer::new(&fine)?;
         for (camera, angle) in scene.cameras.iter().zip(ANGLES) {
             if !go_on() {

@@ -120,7 +120,7 @@ pub fn run(
         }
         keep(&low)?;
         if options.high_poly && go_on() {
-            let fine = displace(&scene);
+            let fine = displace(&scene)?;
             let how = How {
                 kind: "high-poly",
                 transport: Transport::Lambert,

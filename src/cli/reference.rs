@@ -41,17 +41,17 @@ impl ReferenceOptions {
 }
 
 /// The scene with its relief as geometry.
-pub fn tessellated(scene: Scene) -> Scene {
+pub fn tessellated(scene: Scene) -> Result<Scene> {
     if !scene.materials.iter().any(|m| m.has_relief()) {
-        return scene;
+        return Ok(scene);
     }
-    let fine = displace(&scene);
+    let fine = displace(&scene)?;
     tracing::info!(
         "relief as geometry: {} triangles instead of {}",
         fine.triangles.len(),
         scene.triangles.len()
     );
-    fine
+    Ok(fine)
 }
 
 /// Traces the picture and prints its confidence interval.

@@ -197,7 +197,7 @@ fn run_reference(options: &Options) -> Result<()> {
     let scene = options.builtin.load(&options.input)?;
     let camera = options.camera.of(&scene)?;
     let cameras = options.series.cameras(&scene, &camera)?;
-    let scene = reference::tessellated(scene);
+    let scene = reference::tessellated(scene)?;
     let trace = |camera: &Camera| {
         let view = options.view(camera);
         let parts = options.show.parts().iter();

@@ -7,9 +7,13 @@ use glam::{DVec2, DVec3};
 
 use super::assemble::is_degenerate;
 use super::{HeightMap, Material, Scene, Triangle};
+use crate::error::{Error, Result};
 
 /// Most rounds of halving: they reduce an edge of 2³² texels to one.
 const MOST_ROUNDS: u32 = 32;
+
+/// Most triangles: the path tracer takes about 10 GiB for them.
+const MOST_TRIANGLES: usize = 1 << 25;
 
 /// Coordinates that differ by whole repeats, each rounded to f32, are the same place.
 const SAME_PLACE: f64 = 1e-6;
@@ -23,14 +27,18 @@ const SAME_PLACE: f64 = 1e-6;
 /// mean; where texture coordinates meet in a seam, by the mean of their heights. Vertices shared
 /// with triangles without relief stay where they are: these triangles keep their shape and are cut
 /// only along such edges. Triangles left without area are dropped and counted.
-pub fn displace(scene: &Scene) -> Scene {
+///
+/// # Errors
+/// [`Error::Usage`]: more than 2²⁵ triangles.
+pub fn displace(scene: &Scene) -> Result<Scene> {
     let mut work = Refined::new(scene);
+    work.check_count(work.least_count())?;
     for _ in 0..MOST_ROUNDS {
-        if !work.refine() {
+        if !work.refine()? {
             break;
         }
     }
-    work.into_scene(scene)
+    Ok(work.into_scene(scene))
 }
 
 /// A triangle under refinement, with coordinates not yet rounded.
@@ -119,8 +127,30 @@ impl Refined {
         }
     }
 
+    /// No triangle whose edges are at most a texel long is larger than the equilateral one.
+    fn least_count(&self) -> f64 {
+        let largest = 0.75_f64.sqrt() / 2.0;
+        let texels = |piece: &Piece| {
+            let map = &self.reliefs[piece.material as usize].as_ref()?.map;
+            let [a, b, c] = piece.uv;
+            let area = (b - a).perp_dot(c - a).abs() / 2.0;
+            Some(area * f64::from(map.width) * f64::from(map.height))
+        };
+        self.pieces.iter().filter_map(texels).sum::<f64>() / largest
+    }
+
+    fn check_count(&self, count: f64) -> Result<()> {
+        if count <= MOST_TRIANGLES as f64 {
+            return Ok(());
+        }
+        Err(Error::Usage(format!(
+            "the relief as geometry takes more than {MOST_TRIANGLES} triangles, two or more for \
+             each texel on the surfaces: use smaller height maps"
+        )))
+    }
+
     /// Halves every edge that is longer than a texel once. Returns false if there was none.
-    fn refine(&mut self) -> bool {
+    fn refine(&mut self) -> Result<bool> {
         let mut middles: HashMap<[u32; 2], u32> = HashMap::new();
         for piece in &self.pieces {
             let Some(relief) = &self.reliefs[piece.material as usize] else {
@@ -148,13 +178,15 @@ impl Refined {
             }
         }
         if middles.is_empty() {
-            return false;
+            return Ok(false);
         }
+        // An edge within a surface lies in two triangles, each of which becomes one more.
+        self.check_count((self.pieces.len() + 2 * middles.len()) as f64)?;
         let pieces = std::mem::take(&mut self.pieces);
         for piece in pieces {
             self.split(piece, &middles);
         }
-        true
+        Ok(true)
     }
 
     /// Cuts a triangle at the middles of its halved edges, into two, three or four.

@@ -57,6 +57,17 @@ impl Lights {
         sky: None,
     };
 
+    /// What there is besides points that shine evenly, in the plural: the pixel estimator and most
+    /// peers of `bench pareto` do not know it.
+    pub fn beyond_points(&self) -> Option<&'static str> {
+        let kinds = [
+            (!self.suns.is_empty(), "suns"),
+            (self.sky.is_some(), "skies"),
+            (self.points.iter().any(|l| l.beam.is_some()), "beams"),
+        ];
+        kinds.into_iter().find(|kind| kind.0).map(|kind| kind.1)
+    }
+
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
         self.points.is_empty() && self.suns.is_empty() && self.sky.is_none()

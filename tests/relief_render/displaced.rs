@@ -55,7 +55,7 @@ fn pictures_are_those_of_the_displaced_scene() {
         let start = Instant::now();
         let solution = baked(&scene, &settings(64, 1e-3, Some(folder.path().to_owned())));
         let bake_time = start.elapsed();
-        let fine = displace(&scene);
+        let fine = displace(&scene).unwrap();
         let tracer = PathTracer::new(&fine).expect("the scene is good");
         println!(
             "{}: {} elements in {:.1} s; reference: {} triangles",
@@ -156,7 +156,7 @@ fn silhouettes_and_heights_are_those_of_the_displaced_mesh() {
             ..quick()
         },
     );
-    let fine = displace(&scene);
+    let fine = displace(&scene).unwrap();
     let dark = vec![Vec3::ZERO; fine.triangles.len()];
     // Its heights as a texture, lit by an irradiance of π.
     let mut painted = fine.clone();

@@ -77,7 +77,8 @@ impl Grid {
                     directions,
                 });
             }
-            if scale == 1.0 || scale == smallest {
+            let by_pixel = scene.lights.beyond_points().is_none();
+            if by_pixel && (scale == 1.0 || scale == smallest) {
                 let pixel = both(&self.pixel_hemicubes).into_iter();
                 tries.extend(pixel.map(|(hemicube, emitter_scale)| Try {
                     estimator: Estimator::Pixel,

@@ -198,7 +198,7 @@ pub fn run(
     go_on: impl Fn() -> bool,
 ) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, e))?;
-    let fine = displace(scene);
+    let fine = displace(scene)?;
     let Some(truth) = Truth::of(scene, &fine, &options.wanted, Some(folder), &go_on)? else {
         return Ok(());
     };
@@ -212,6 +212,9 @@ pub fn run(
         reference_noise: truth.noise(),
     };
     conditions.print();
+    if let Some(kind) = scene.lights.beyond_points() {
+        println!("the pixel estimator is left out: it knows no {kind}");
+    }
     println!("{HEADER}");
     let save = |rows: &[Row], breakdown: Option<&Breakdown>| {
         let found = Found {
@@ -254,7 +257,9 @@ pub fn run(
             println!("{}", line(&row));
             rows.push(row);
         };
-        job.instant_radiosity(&go_on, &mut add)?;
+        if let Some(why) = job.instant_radiosity(&go_on, &mut add)? {
+            println!("instant radiosity is left out: {why}");
+        }
         job.path_tracer(&go_on, &mut add)?;
         if let Some(why) = job.mitsuba(&options.python, &folder.join("mitsuba"), &mut add)? {
             println!("Mitsuba 3 is left out: {why}");

@@ -87,12 +87,16 @@ impl Job<'_> {
         }
     }
 
-    /// Keller's virtual point lights, with shadow rays on the CPU.
+    /// Keller's virtual point lights, with shadow rays on the CPU. Returns the reason in one line
+    /// where it cannot run.
     pub fn instant_radiosity(
         &self,
         go_on: &impl Fn() -> bool,
         mut add: impl FnMut(Row),
-    ) -> Result<()> {
+    ) -> Result<Option<String>> {
+        if let Some(kind) = self.fine.lights.beyond_points() {
+            return Ok(Some(format!("it knows no {kind}")));
+        }
         let start = Instant::now();
         let tracer = PathTracer::new(self.fine)?;
         let built = start.elapsed().as_secs_f64();
@@ -111,7 +115,7 @@ impl Job<'_> {
             add(self.row(Method::InstantRadiosity, paths, seconds, &found));
             paths *= 4;
             if 4 * taken > self.limit || paths > MOST_PATHS || !go_on() {
-                return Ok(());
+                return Ok(None);
             }
         }
     }
@@ -127,6 +131,9 @@ impl Job<'_> {
         let textured = |m: &crate::scene::Material| m.map_kd.is_some() || m.map_ke.is_some();
         if self.fine.materials.iter().any(textured) {
             return Ok(Some("its script knows no textures".into()));
+        }
+        if let Some(kind) = self.fine.lights.beyond_points() {
+            return Ok(Some(format!("it knows no {kind}")));
         }
         let ask = Ask::new(self);
         let obj = write_scene(self.fine, folder)?.with_file_name("scene.obj");
