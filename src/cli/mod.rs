@@ -33,8 +33,8 @@ use tracing_subscriber::prelude::*;
 /// Bake and draw global illumination with Vulkan: progressive radiosity through hemicube item
 /// buffers.
 ///
-/// SCENE is a built-in name (cornell, cornell-relief, bowl-and-bunny, fruit-platter), an .obj, .gltf
-/// or .glb file, or a scene.toml. Results go to files and stdout, everything else to stderr. Exit
+/// SCENE is a built-in name (cornell, cornell-relief, bowl-and-bunny, fruit-platter, brick-court), an
+/// .obj, .gltf or .glb file, or a scene.toml. Results go to files and stdout, everything else to stderr. Exit
 /// code 2 means that an input was wrong; nothing is written then.
 #[derive(Parser)]
 #[command(version, about)]

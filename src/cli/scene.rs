@@ -10,7 +10,7 @@ use mesolux::error::{Error, Result};
 /// Write a built-in scene as OBJ, MTL and scene.toml
 #[derive(Args)]
 pub struct Options {
-    /// A built-in name: cornell, fruit-platter, bowl-and-bunny or cornell-relief
+    /// A built-in name: cornell, fruit-platter, bowl-and-bunny, cornell-relief or brick-court
     name: String,
     /// The folder to write to
     #[arg(short, long, value_name = "DIR")]

@@ -8,7 +8,8 @@ use std::sync::Arc;
 
 use image::{DynamicImage, ImageBuffer, ImageFormat, Luma, Rgb};
 
-use super::{HeightMap, NormalMap, Scene};
+use super::texture::srgb_table;
+use super::{HeightMap, NormalMap, Scene, Texture};
 use crate::atomic_file::write_atomically;
 use crate::error::{Error, Result};
 
@@ -41,8 +42,18 @@ pub(super) fn write(scene: &Scene, dir: &Path) -> Result<MapFiles> {
         if files.textures.contains_key(&texture.path) {
             continue;
         }
-        let name = copy_name("texture", &texture.path, files.textures.len());
-        let bytes = fs::read(&texture.path).map_err(|source| Error::read(&texture.path, source))?;
+        let number = files.textures.len();
+        // Only in a scene without a file may a texture be made by code.
+        let is_file = scene.path.is_some()
+            || Texture::load(&texture.path).is_ok_and(|there| there == **texture);
+        let (name, bytes) = if is_file {
+            let read = fs::read(&texture.path);
+            let bytes = read.map_err(|source| Error::read(&texture.path, source))?;
+            (copy_name("texture", &texture.path, number), bytes)
+        } else {
+            let (extension, bytes) = encode_colours(texture)?;
+            (format!("texture-{number}.{extension}"), bytes)
+        };
         contents.push((name.clone(), bytes));
         files.textures.insert(texture.path.clone(), name);
     }
@@ -109,6 +120,34 @@ fn copy_name(kind: &str, path: &Path, number: usize) -> String {
     match path.extension() {
         Some(extension) => format!("{kind}-{number}.{}", extension.to_string_lossy()),
         None => format!("{kind}-{number}"),
+    }
+}
+
+/// A 16-bit PNG in sRGB if that holds every texel exactly, else OpenEXR.
+fn encode_colours(texture: &Texture) -> Result<(&'static str, Vec<u8>)> {
+    let (width, height) = (texture.width, texture.height);
+    let linear = || texture.texels.iter().flatten().copied();
+    let table = srgb_table();
+    let code = |c: f32| table.binary_search_by(|entry| entry.total_cmp(&c)).ok();
+    let codes: Option<Vec<u16>> = linear().map(|c| code(c).map(|code| code as u16)).collect();
+    match codes {
+        Some(codes) => {
+            let image = ImageBuffer::<Rgb<u16>, Vec<u16>>::from_raw(width, height, codes);
+            encode(
+                &texture.path,
+                image.map(DynamicImage::from),
+                ImageFormat::Png,
+            )
+        }
+        None => {
+            let image =
+                ImageBuffer::<Rgb<f32>, Vec<f32>>::from_raw(width, height, linear().collect());
+            encode(
+                &texture.path,
+                image.map(DynamicImage::from),
+                ImageFormat::OpenExr,
+            )
+        }
     }
 }
 

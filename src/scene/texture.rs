@@ -181,7 +181,7 @@ fn place_in_triangle(number: u64) -> (f64, f64) {
 }
 
 /// Linear light of each 16-bit sRGB code, IEC 61966-2-1. An 8-bit code c is the 16-bit code 257 c.
-fn srgb_table() -> Vec<f32> {
+pub(super) fn srgb_table() -> Vec<f32> {
     (0..=u16::MAX)
         .map(|code| {
             let c = f64::from(code) / f64::from(u16::MAX);

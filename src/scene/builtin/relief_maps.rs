@@ -62,19 +62,26 @@ fn make(name: &str, size: u32, height: impl Fn(f64, f64) -> f64) -> HeightMap {
         .flat_map(|row| (0..size).map(move |column| (place(column), 1.0 - place(row))))
         .map(|(u, v)| height(u, v))
         .collect();
+    stretched(name, size, size, &heights).0
+}
+
+/// A height map of heights `[row][column]` from the top, stretched to 0..=1 in steps of 1/65535, and
+/// its height scale: the range of the heights.
+pub(super) fn stretched(name: &str, width: u32, height: u32, heights: &[f64]) -> (HeightMap, f32) {
     let low = heights.iter().copied().fold(f64::INFINITY, f64::min);
     let high = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let span = (high - low).max(f64::MIN_POSITIVE);
-    HeightMap {
+    let map = HeightMap {
         path: PathBuf::from(format!("{name}.png")),
-        width: size,
-        height: size,
+        width,
+        height,
         values: heights
             .iter()
             .map(|h| ((h - low) / span * f64::from(u16::MAX)).round() as u16)
             .map(|code| f32::from(code) / f32::from(u16::MAX))
             .collect(),
-    }
+    };
+    (map, span as f32)
 }
 
 /// One random point in each cell of a square grid on the tile.

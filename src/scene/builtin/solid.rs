@@ -1,10 +1,10 @@
 //! Closed solids in an exact number of triangles.
 
-use std::collections::{BinaryHeap, HashMap};
 use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
+use super::splitting;
 use super::surface_nets::{Surface, polygonise};
 use crate::scene::assemble::Mesh;
 
@@ -107,55 +107,15 @@ fn resample(profile: &[DVec2], count: usize) -> Vec<DVec2> {
 
 /// Splits the longest edge of a closed mesh until there are `count` triangles; each split gives two
 /// more.
-fn exactly(mut positions: Vec<DVec3>, mut triangles: Vec<[u32; 3]>, count: usize) -> Mesh {
+fn exactly(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>, count: usize) -> Mesh {
     assert!(
         triangles.len() <= count && (count - triangles.len()).is_multiple_of(2),
         "{} triangles cannot become {count}",
         triangles.len()
     );
-    let mut beside: HashMap<[u32; 2], usize> = HashMap::new();
-    let mut heap = BinaryHeap::new();
-    // Squares of lengths are not negative: their bits sort as they do.
-    let entry = |positions: &[DVec3], a: u32, b: u32| {
-        let length = positions[a as usize].distance_squared(positions[b as usize]);
-        (length.to_bits(), a.min(b), a.max(b))
-    };
-    for (index, &[a, b, c]) in triangles.iter().enumerate() {
-        for [p, q] in [[a, b], [b, c], [c, a]] {
-            beside.insert([p, q], index);
-            if p < q {
-                heap.push(entry(&positions, p, q));
-            }
-        }
-    }
-    while triangles.len() < count {
-        let Some((_, a, b)) = heap.pop() else {
-            unreachable!("a closed mesh has edges");
-        };
-        let middle = positions.len() as u32;
-        positions.push((positions[a as usize] + positions[b as usize]) / 2.0);
-        for [from, to] in [[a, b], [b, a]] {
-            let Some(index) = beside.remove(&[from, to]) else {
-                unreachable!("a closed mesh has a triangle on either side of an edge");
-            };
-            let corners = triangles[index];
-            let across = corners[(0..3)
-                .find(|&k| corners[k] != a && corners[k] != b)
-                .unwrap_or(0)];
-            triangles[index] = [from, middle, across];
-            let added = triangles.len();
-            triangles.push([middle, to, across]);
-            beside.insert([from, middle], index);
-            beside.insert([middle, across], index);
-            beside.insert([middle, to], added);
-            beside.insert([to, across], added);
-            beside.insert([across, middle], added);
-            heap.push(entry(&positions, middle, across));
-        }
-        heap.push(entry(&positions, a, middle));
-        heap.push(entry(&positions, middle, b));
-    }
-    Mesh::bare(positions, triangles)
+    let mut mesh = Mesh::bare(positions, triangles);
+    splitting::split(&mut mesh, count, |_| 1.0);
+    mesh
 }
 
 #[cfg(test)]
