@@ -136,6 +136,27 @@ fn check(count: u32, value: impl Fn(f32) -> f32 + Copy) {
     assert_silent();
 }
 
+/// Emission in a place of its own beside colours elsewhere: the same light to the last bit.
+#[test]
+fn emission_in_a_place_of_its_own() {
+    let plain = textured(|u| u);
+    let mut own = plain.clone();
+    let lamp = own.materials.iter().position(|m| m.map_ke.is_some());
+    for t in &mut own.triangles {
+        if Some(t.material as usize) == lamp {
+            t.emission_uv = Some(t.uv);
+            t.uv = t.uv.map(|[u, v]| [0.25 * v, 0.3 - u]);
+        }
+    }
+    assert_eq!(light(&own), light(&plain));
+    assert_eq!(traced(&own), traced(&plain));
+    assert_ne!(own.hash(), plain.hash());
+    let dir = tempfile::tempdir().unwrap();
+    let error = write_scene(&own, dir.path()).unwrap_err().to_string();
+    assert!(error.contains("emission"), "{error}");
+    assert_silent();
+}
+
 #[test]
 fn a_half_dark_lamp_lights_as_two_halves() {
     check(2, |u| f32::from(u8::from(u < 0.5)));

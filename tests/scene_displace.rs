@@ -43,6 +43,7 @@ fn triangle(vertices: [u32; 3], uv: [[f32; 2]; 3], material: u32) -> Triangle {
     Triangle {
         vertices,
         uv,
+        emission_uv: None,
         material,
     }
 }

@@ -2,10 +2,13 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::DVec3;
 use mesolux::error::Result;
-use mesolux::scene::{ImportOptions, LoadOptions, Scene, load};
+use mesolux::scene::{
+    HeightMap, ImportOptions, LoadOptions, Refinement, Scene, Triangle, displace, load,
+};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -315,6 +318,88 @@ fn textures_and_their_transforms() {
     assert!(scene.materials[0].map_ke.is_some());
     let mean = scene.materials[0].mean_emission()[1];
     assert!((mean - 0.577_58).abs() < 1e-4, "{mean}");
+}
+
+/// Colours and a mask on one set of coordinates, emission on another with a transform: each follows
+/// the surface through all that cuts it, and what the colours' set says is not what the emission
+/// does.
+#[test]
+fn the_emission_has_a_set_of_its_own() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut file = with_texture(&dir);
+    let half = |x: u32, _| image::Rgba([255, 255, 255, if x < 8 { 100 } else { 200 }]);
+    let image = image::RgbaImage::from_fn(16, 16, half);
+    image.save(dir.path().join("a.png")).unwrap();
+    let glow = image::RgbImage::from_fn(8, 8, |x, y| image::Rgb([30 * x as u8, 30 * y as u8, 9]));
+    glow.save(dir.path().join("e.png")).unwrap();
+    file["images"]
+        .as_array_mut()
+        .unwrap()
+        .push(json!({"uri": "e.png"}));
+    file["textures"]
+        .as_array_mut()
+        .unwrap()
+        .push(json!({"source": 1}));
+    // Positions serve as coordinates too: the first two of each three floats.
+    file["bufferViews"].as_array_mut().unwrap().push(json!(
+        {"buffer": 0, "byteOffset": 0, "byteLength": 48, "byteStride": 12}
+    ));
+    file["accessors"].as_array_mut().unwrap().push(json!(
+        {"bufferView": 3, "componentType": 5126, "count": 4, "type": "VEC2"}
+    ));
+    file["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_1"] = json!(3);
+    let material = &mut file["materials"][0];
+    material["alphaMode"] = json!("MASK");
+    let moved = json!({"offset": [0.25, 0.125], "scale": [0.5, -0.25], "texCoord": 1});
+    material["emissiveTexture"] =
+        json!({"index": 1, "extensions": {"KHR_texture_transform": moved}});
+    let path = write(&dir, &file);
+    let check = |scene: &Scene, what: &str| {
+        assert!(scene.warnings.is_empty(), "{what}: {:?}", scene.warnings);
+        let mut worst = 0.0_f64;
+        for t in &scene.triangles {
+            let own = t.emission_uv.unwrap();
+            for (k, p) in scene.corners(t).into_iter().enumerate() {
+                let colours = [(p.x + 1.0) / 2.0, (p.y + 1.0) / 2.0];
+                let emission = [0.25 + 0.5 * p.x, 1.0 - (0.125 - 0.25 * p.y)];
+                for i in 0..2 {
+                    worst = worst.max((f64::from(t.uv[k][i]) - colours[i]).abs());
+                    worst = worst.max((f64::from(own[k][i]) - emission[i]).abs());
+                }
+            }
+        }
+        println!(
+            "{what}: {} triangles, {worst:.1e} off",
+            scene.triangles.len()
+        );
+        assert!(worst < 1e-6, "{what}: {worst}");
+    };
+    let scene = read(&path).unwrap();
+    check(&scene, "masked");
+    let cut = scene.refined(&Refinement::default());
+    assert!(cut.triangles.len() > 2 * scene.triangles.len());
+    check(&cut, "cut");
+    // The first and the last of a row are equal but for what the other set says.
+    let dark = |t: &Triangle| scene.materials[0].emitted_over(&t.uv_of_emission())[0] < 0.3;
+    assert!(cut.triangles.iter().any(dark) && !cut.triangles.iter().all(dark));
+
+    // A mirrored node, whose corners are in the other order.
+    file["nodes"][0]["scale"] = json!([1, 1, -1]);
+    check(&read(&write(&dir, &file)).unwrap(), "mirrored");
+    file["nodes"][0] = json!({"mesh": 0});
+    let relief = |scene: &Scene| {
+        let mut scene = scene.clone();
+        let values: Vec<f32> = (0..64).map(|i| f32::from(i as u8 % 8)).collect();
+        scene.materials[0].map_height = Some(Arc::new(HeightMap {
+            path: "h".into(),
+            width: 8,
+            height: 8,
+            values,
+        }));
+        scene.materials[0].height_scale = 1e-9;
+        scene
+    };
+    check(&displace(&relief(&scene)).unwrap(), "displaced");
 }
 
 /// A texture whose left half is transparent, and a factor that makes all of it so.

@@ -82,7 +82,9 @@ impl Glow {
             share: (scene.triangles.par_iter())
                 .map(|t| {
                     let map = scene.materials[t.material as usize].map_ke.as_ref();
-                    map.map_or(Vec3::ONE, |map| map.mean_over_triangle(&t.uv).into())
+                    map.map_or(Vec3::ONE, |map| {
+                        map.mean_over_triangle(&t.uv_of_emission()).into()
+                    })
                 })
                 .collect(),
             by_material: by_material(scene),

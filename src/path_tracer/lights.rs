@@ -95,10 +95,12 @@ impl Lights {
                     corners,
                     normal: cross.normalize(),
                     area: 0.5 * cross.length(),
-                    radiance: Vec3::from_array(material.emitted_over(&triangle.uv)).as_dvec3(),
+                    radiance: Vec3::from_array(material.emitted_over(&triangle.uv_of_emission()))
+                        .as_dvec3(),
                     texture: material.map_ke.is_some().then(|| Glow {
                         material: material.clone(),
-                        uv: (triangle.uv).map(|[u, v]| DVec3::new(u.into(), v.into(), 0.0)),
+                        uv: (triangle.uv_of_emission())
+                            .map(|[u, v]| DVec3::new(u.into(), v.into(), 0.0)),
                     }),
                 });
             }

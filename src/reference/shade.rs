@@ -88,12 +88,14 @@ fn radiance(
         return DVec3::ZERO;
     }
     let mixed = |values: [f64; 3]| (0..3).map(|k| weights[k] * values[k]).sum::<f64>();
-    let uv = [0, 1].map(|i| mixed(triangle.uv.map(|uv| f64::from(uv[i]))) as f32);
+    let at = |uv: [[f32; 2]; 3]| [0, 1].map(|i| mixed(uv.map(|uv| f64::from(uv[i]))));
+    let uv = at(triangle.uv).map(|x| x as f32);
     let texture = material
         .map_kd
         .as_ref()
         .map_or([1.0; 3], |map| map.sample_bilinear(uv[0], uv[1]));
-    let emitted = material.emitted_at(uv[0].into(), uv[1].into());
+    let [u, v] = at(triangle.uv_of_emission());
+    let emitted = material.emitted_at(u, v);
     DVec3::from_array(std::array::from_fn(|channel| {
         let incident = mixed(irradiance.map(|corner| f64::from(corner[channel])));
         let rho = f64::from(material.kd[channel]) * f64::from(texture[channel]);

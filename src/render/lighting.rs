@@ -177,8 +177,8 @@ impl<'a> Lighting<'a> {
                 let share = Vec3::select(all.cmpgt(Vec3::ZERO), shown[e] / all, Vec3::ZERO);
                 let triangle = &scene.triangles[e];
                 let material = &scene.materials[triangle.material as usize];
-                let emitted =
-                    Vec3::from(material.emitted_over(&triangle.uv)) * std::f32::consts::PI;
+                let emitted = Vec3::from(material.emitted_over(&triangle.uv_of_emission()))
+                    * std::f32::consts::PI;
                 sent.iter()
                     .map(move |s| (*s - emitted).max(Vec3::ZERO) * share)
             })

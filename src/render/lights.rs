@@ -76,7 +76,7 @@ fn shining(scene: &Scene) -> Vec<Shining> {
     let mut area = 0.0;
     for t in &scene.triangles {
         let corners = scene.corners(t);
-        let radiance = scene.materials[t.material as usize].emitted_over(&t.uv);
+        let radiance = scene.materials[t.material as usize].emitted_over(&t.uv_of_emission());
         let radiance = DVec3::from(radiance.map(f64::from));
         let of_triangle = triangle_area(corners);
         let power = radiance.element_sum() * of_triangle;

@@ -17,7 +17,7 @@ use crate::passes::buffers::upload;
 use crate::passes::shade::{Draw, Parameters, Vertex};
 use crate::passes::types::LitTriangle;
 use crate::picture::{NEAR, Projection, Tile};
-use crate::scene::{Material, Scene, Triangle};
+use crate::scene::{Material, Scene};
 use crate::vk::{Buffer, BufferUse, Device};
 
 /// The scene's fronts by material, then its backs.
@@ -127,7 +127,11 @@ impl Mesh {
                 let triangle = &scene.triangles[e];
                 let away = rest.and_then(|rest| rest.away.get(&e));
                 let places = away.copied().unwrap_or(scene.corners(triangle));
-                corners(triangle, places, light, projection)
+                let uv = match kind {
+                    Kind::Glow(_) => triangle.uv_of_emission(),
+                    _ => triangle.uv,
+                };
+                corners(uv, places, light, projection)
             })
             .collect();
         let mut ranges = Vec::new();
@@ -262,12 +266,12 @@ pub fn parameters([x, y, w]: [Vec3; 3], material: Option<&Material>, part: Light
 }
 
 fn corners(
-    triangle: &Triangle,
+    uv: [[f32; 2]; 3],
     positions: [DVec3; 3],
     irradiance: [Vec3; 3],
     projection: &Projection,
 ) -> [Vertex; 3] {
-    let images = triangle.uv.map(|[u, v]| Vec2::new(u, 1.0 - v));
+    let images = uv.map(|[u, v]| Vec2::new(u, 1.0 - v));
     // The texture repeats: coordinates shifted to near 0 are more precise.
     let whole = images[0].floor();
     std::array::from_fn(|k| Vertex {

@@ -56,6 +56,7 @@ impl Mesh {
                 .map(|corners| MeshTriangle {
                     corners,
                     uv: None,
+                    emission_uv: None,
                     material: 0,
                 })
                 .collect(),
@@ -69,6 +70,8 @@ pub(super) struct MeshTriangle {
     /// Indices into [`Mesh::positions`].
     pub corners: [u32; 3],
     pub uv: Option<[[f32; 2]; 3]>,
+    /// As [`Triangle::emission_uv`].
+    pub emission_uv: Option<[[f32; 2]; 3]>,
     /// Index into [`Mesh::materials`].
     pub material: u32,
 }
@@ -179,6 +182,7 @@ impl Assembly {
             self.scene.triangles.push(Triangle {
                 vertices,
                 uv,
+                emission_uv: triangle.emission_uv,
                 material: materials[triangle.material as usize],
             });
             let name = names.get(part).unwrap_or(&self.scene.name);

@@ -46,7 +46,19 @@ pub fn displace(scene: &Scene) -> Result<Scene> {
 struct Piece {
     vertices: [u32; 3],
     uv: [DVec2; 3],
+    emission_uv: Option<[DVec2; 3]>,
     material: u32,
+}
+
+/// A corner of a new triangle: its vertex, and its texture coordinates as in [`Piece`].
+type Corner = (u32, DVec2, Option<DVec2>);
+
+fn doubles(uv: [[f32; 2]; 3]) -> [DVec2; 3] {
+    uv.map(|uv| DVec2::from(uv.map(f64::from)))
+}
+
+fn floats(uv: [DVec2; 3]) -> [[f32; 2]; 3] {
+    uv.map(|uv| uv.as_vec2().to_array())
 }
 
 struct Relief {
@@ -120,7 +132,8 @@ impl Refined {
                 .iter()
                 .map(|t| Piece {
                     vertices: t.vertices,
-                    uv: t.uv.map(|uv| DVec2::from(uv.map(f64::from))),
+                    uv: doubles(t.uv),
+                    emission_uv: t.emission_uv.map(doubles),
                     material: t.material,
                 })
                 .collect(),
@@ -192,12 +205,24 @@ impl Refined {
     /// Cuts a triangle at the middles of its halved edges, into two, three or four.
     fn split(&mut self, piece: Piece, middles: &HashMap<[u32; 2], u32>) {
         let middle = edges_of(piece.vertices).map(|[a, b]| middles.get(&sorted(a, b)).copied());
-        let corner = |k: usize| (piece.vertices[k % 3], piece.uv[k % 3]);
-        let half = |k: usize, vertex| (vertex, (piece.uv[k % 3] + piece.uv[(k + 1) % 3]) / 2.0);
-        let mut push = |corners: [(u32, DVec2); 3]| {
+        let corner = |k: usize| -> Corner {
+            let k = k % 3;
+            (
+                piece.vertices[k],
+                piece.uv[k],
+                piece.emission_uv.map(|uv| uv[k]),
+            )
+        };
+        let half = |k: usize, vertex| -> Corner {
+            let middle = |uv: [DVec2; 3]| (uv[k % 3] + uv[(k + 1) % 3]) / 2.0;
+            (vertex, middle(piece.uv), piece.emission_uv.map(middle))
+        };
+        let mut push = |corners: [Corner; 3]| {
             self.pieces.push(Piece {
                 vertices: corners.map(|c| c.0),
                 uv: corners.map(|c| c.1),
+                // All corners have one, or none has.
+                emission_uv: (piece.emission_uv).map(|_| corners.map(|c| c.2.unwrap_or(c.1))),
                 material: piece.material,
             });
         };
@@ -216,7 +241,7 @@ impl Refined {
                     push([m, corner(k + 1), n]);
                     // The remaining quad is cut along its shorter diagonal; ties are broken by
                     // index, the same on every run.
-                    let place = |c: (u32, DVec2)| self.vertices[c.0 as usize];
+                    let place = |c: Corner| self.vertices[c.0 as usize];
                     let (a, c) = (corner(k), corner(k + 2));
                     if place(a).distance_squared(place(n)) <= place(m).distance_squared(place(c)) {
                         push([a, m, n]);
@@ -258,7 +283,8 @@ impl Refined {
             }
             result.triangles.push(Triangle {
                 vertices: piece.vertices,
-                uv: piece.uv.map(|uv| uv.as_vec2().to_array()),
+                uv: floats(piece.uv),
+                emission_uv: piece.emission_uv.map(floats),
                 material: piece.material,
             });
         }

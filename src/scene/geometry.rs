@@ -293,6 +293,7 @@ mod tests {
             scene.triangles.push(Triangle {
                 vertices: [first, first + 1, first + 2],
                 uv: [[0.0; 2]; 3],
+                emission_uv: None,
                 material: 0,
             });
         }

@@ -22,6 +22,10 @@ impl Scene {
                 .iter()
                 .for_each(|v| hash.update(v.to_le_bytes()));
             triangle.uv.iter().for_each(|uv| floats(&mut hash, uv));
+            if let Some(uv) = &triangle.emission_uv {
+                hash.update(b"emission elsewhere");
+                uv.iter().for_each(|uv| floats(&mut hash, uv));
+            }
             hash.update(triangle.material.to_le_bytes());
         }
         length(&mut hash, self.materials.len());

@@ -145,8 +145,17 @@ pub struct Triangle {
     pub vertices: [u32; 3],
     /// Texture coordinates per corner, v up; one repeat of a texture spans 0..1.
     pub uv: [[f32; 2]; 3],
+    /// The same of the emission texture, where that lies elsewhere than the others.
+    pub emission_uv: Option<[[f32; 2]; 3]>,
     /// Index into [`Scene::materials`].
     pub material: u32,
+}
+
+impl Triangle {
+    /// Texture coordinates of the emission texture per corner.
+    pub fn uv_of_emission(&self) -> [[f32; 2]; 3] {
+        self.emission_uv.unwrap_or(self.uv)
+    }
 }
 
 #[derive(Debug, Clone, PartialEq)]

@@ -179,6 +179,7 @@ fn faces(path: &Path, checked: &Checked, mesh: &mut Mesh) -> Result<()> {
             mesh.triangles.push(MeshTriangle {
                 corners: corners.map(|v| first + v),
                 uv,
+                emission_uv: None,
                 material,
             });
         }

@@ -46,6 +46,7 @@ impl Shapes {
         self.scene.triangles.push(Triangle {
             vertices: corners,
             uv: [[0.0; 2]; 3],
+            emission_uv: None,
             material,
         });
     }

@@ -173,12 +173,12 @@ pub(super) fn turn_dark(scene: &mut Scene, choices: &[Choice]) -> Vec<usize> {
 }
 
 pub(super) fn turned(triangle: &Triangle) -> Triangle {
-    let (mut vertices, mut uv) = (triangle.vertices, triangle.uv);
-    vertices.swap(1, 2);
-    uv.swap(1, 2);
+    let turned = |[a, b, c]: [[f32; 2]; 3]| [a, c, b];
+    let [a, b, c] = triangle.vertices;
     Triangle {
-        vertices,
-        uv,
+        vertices: [a, c, b],
+        uv: turned(triangle.uv),
+        emission_uv: triangle.emission_uv.map(turned),
         ..*triangle
     }
 }

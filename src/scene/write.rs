@@ -30,6 +30,12 @@ const SCENE: &str = "scene.toml";
 /// name that a material file cannot hold; only a scene made by code can have one.
 pub fn write_scene(scene: &Scene, dir: &Path) -> Result<PathBuf> {
     check_names(scene)?;
+    if scene.triangles.iter().any(|t| t.emission_uv.is_some()) {
+        return Err(Error::Scene {
+            scene: scene.name.clone(),
+            what: "the emission has texture coordinates of its own, which OBJ cannot hold".into(),
+        });
+    }
     fs::create_dir_all(dir).map_err(|source| Error::write(dir, source))?;
     let maps = map_files::write(scene, dir)?;
     let lights = write_lights::write(&scene.lights, dir)?;

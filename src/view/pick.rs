@@ -37,6 +37,7 @@ mod tests {
         let triangle = |first| Triangle {
             vertices: [first, first + 1, first + 2],
             uv: [[0.0; 2]; 3],
+            emission_uv: None,
             material: 0,
         };
         let scene = Scene {

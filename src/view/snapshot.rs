@@ -185,6 +185,7 @@ mod tests {
                 Triangle {
                     vertices: [0, 1, 2],
                     uv: [[0.0; 2]; 3],
+                    emission_uv: None,
                     material: 0,
                 };
                 10

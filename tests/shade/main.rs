@@ -69,6 +69,7 @@ fn add(scene: &mut Scene, corners: [[f64; 3]; 3], uv: [[f32; 2]; 3], material: u
     scene.triangles.push(Triangle {
         vertices: [first, first + 1, first + 2],
         uv,
+        emission_uv: None,
         material,
     });
 }
@@ -259,6 +260,7 @@ fn irradiance_is_smooth_up_to_a_crease() {
                 .map(|vertices| Triangle {
                     vertices,
                     uv: [[0.0; 2]; 3],
+                    emission_uv: None,
                     material: 0,
                 })
                 .to_vec(),

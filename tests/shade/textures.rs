@@ -105,5 +105,11 @@ fn a_texture_of_emission_agrees_with_the_twin() {
     let camera = camera(DVec3::new(0.3, 0.0, 0.0));
     let view = view(&camera, 50, 60);
     agree(&scene, &view, TEXTURED);
+    // In a place of its own, turned and stretched against that of the colours.
+    for triangle in &mut scene.triangles[..2] {
+        let turned = |[u, v]: [f32; 2]| [1.5 - 2.0 * v, 0.3 + u];
+        triangle.emission_uv = Some(triangle.uv.map(turned));
+    }
+    agree(&scene, &view, TEXTURED);
     no_messages();
 }

@@ -80,6 +80,7 @@ impl Slabs {
             self.mesh.triangles.push(MeshTriangle {
                 corners,
                 uv: None,
+                emission_uv: None,
                 material,
             });
         };

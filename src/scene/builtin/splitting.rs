@@ -122,6 +122,7 @@ impl<S: Fn(DVec3) -> f64> Edges<S> {
             let part = |corners| MeshTriangle {
                 corners,
                 uv: None,
+                emission_uv: None,
                 material,
             };
             triangles[index] = part([from, middle, across]);

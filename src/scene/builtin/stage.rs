@@ -118,6 +118,7 @@ pub(super) fn room(room: &Room, count: usize, material_of: fn(Part) -> u32) -> M
         mesh.triangles.push(MeshTriangle {
             corners: [first, first + 1, first + 2],
             uv: Some(box_projection(corners)),
+            emission_uv: None,
             material: material_of(part),
         });
     }

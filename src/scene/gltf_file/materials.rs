@@ -1,10 +1,12 @@
 //! Materials of a glTF file as diffuse ones.
 
 use std::collections::HashMap;
+use std::path::Path;
 use std::sync::Arc;
 
 use gltf::material::AlphaMode;
 use gltf::texture::{TextureTransform, WrappingMode};
+use image::DynamicImage;
 
 use super::document::File;
 use super::images;
@@ -21,6 +23,8 @@ pub(super) struct Materials {
     pub two_sided: Vec<bool>,
     /// Where the maps of each lie, `[material]`.
     pub places: Vec<Place>,
+    /// Where the emission of each lies, if that is elsewhere, `[material]`.
+    pub emission_places: Vec<Option<Place>>,
     /// What there is to say of each, if it is used.
     pub said: Vec<Said>,
     pub made_up: Vec<MadeUp>,
@@ -95,6 +99,7 @@ impl Materials {
             list: Vec::new(),
             two_sided: Vec::new(),
             places: Vec::new(),
+            emission_places: Vec::new(),
             said: Vec::new(),
             made_up: Vec::new(),
         };
@@ -109,6 +114,7 @@ impl Materials {
         });
         materials.two_sided.push(false);
         materials.places.push(Place::FIRST);
+        materials.emission_places.push(None);
         materials.said.push(Said::default());
         Ok(materials)
     }
@@ -135,7 +141,7 @@ impl Materials {
             ke: from.emissive_factor().map(|c| c * strength),
             ..Material::default()
         };
-        // Of the maps, the place of the relief counts, or else that of the reflectance.
+        // Reflectance lies where the relief does: light goes to and fro between its texels.
         let mut place = None;
         if let Some(map) = from.normal_texture() {
             let read = maps.normals(file, &map.texture())?;
@@ -160,17 +166,14 @@ impl Materials {
                     .push(about("the base colour repeats outside 0..1"));
             }
         }
+        let mut emission_place = None;
         if let Some(map) = from.emissive_texture() {
             let texture = maps.colours(file, &map.texture())?;
             let highest = texture.highest();
             if (0..3).any(|c| material.ke[c] * highest[c] > 0.0) {
                 material.map_ke = Some(texture);
                 let own = Place::new(map.tex_coord(), map.texture_transform());
-                if own != *place.get_or_insert(own) {
-                    said.warnings.push(about(
-                        "the emission lies elsewhere than the other maps, whose place it is given",
-                    ));
-                }
+                emission_place = Some(own).filter(|own| *own != *place.get_or_insert(*own));
             } else {
                 material.ke = [0.0; 3];
             }
@@ -205,6 +208,7 @@ impl Materials {
         })?;
         self.two_sided.push(from.double_sided());
         self.places.push(place.unwrap_or(Place::FIRST));
+        self.emission_places.push(emission_place);
         self.list.push(material);
         self.said.push(said);
         Ok(())
@@ -213,35 +217,32 @@ impl Materials {
 
 impl Maps {
     fn colours(&mut self, file: &File, texture: &gltf::Texture) -> Result<Arc<Texture>> {
-        let image = texture.source();
-        if let Some(map) = self.colours.get(&image.index()) {
-            return Ok(map.clone());
-        }
-        let (path, decoded) = images::read(file, &image)?;
-        let map = Arc::new(Texture::from_image(&path, decoded)?);
-        self.colours.insert(image.index(), map.clone());
-        Ok(map)
+        kept(&mut self.colours, file, texture, Texture::from_image)
     }
 
     fn alphas(&mut self, file: &File, texture: &gltf::Texture) -> Result<Arc<AlphaMap>> {
-        let image = texture.source();
-        if let Some(map) = self.alphas.get(&image.index()) {
-            return Ok(map.clone());
-        }
-        let (path, decoded) = images::read(file, &image)?;
-        let map = Arc::new(AlphaMap::alpha_of(&path, decoded));
-        self.alphas.insert(image.index(), map.clone());
-        Ok(map)
+        let alphas = |path: &Path, image| Ok(AlphaMap::alpha_of(path, image));
+        kept(&mut self.alphas, file, texture, alphas)
     }
 
     fn normals(&mut self, file: &File, texture: &gltf::Texture) -> Result<Arc<NormalMap>> {
-        let image = texture.source();
-        if let Some(map) = self.normals.get(&image.index()) {
-            return Ok(map.clone());
-        }
-        let (path, decoded) = images::read(file, &image)?;
-        let map = Arc::new(NormalMap::from_image(&path, decoded)?);
-        self.normals.insert(image.index(), map.clone());
-        Ok(map)
+        kept(&mut self.normals, file, texture, NormalMap::from_image)
     }
+}
+
+/// The map of a texture, made of its image unless that has been done.
+fn kept<T>(
+    known: &mut HashMap<usize, Arc<T>>,
+    file: &File,
+    texture: &gltf::Texture,
+    make: impl FnOnce(&Path, DynamicImage) -> Result<T>,
+) -> Result<Arc<T>> {
+    let image = texture.source();
+    if let Some(map) = known.get(&image.index()) {
+        return Ok(map.clone());
+    }
+    let (path, decoded) = images::read(file, &image)?;
+    let map = Arc::new(make(&path, decoded)?);
+    known.insert(image.index(), map.clone());
+    Ok(map)
 }

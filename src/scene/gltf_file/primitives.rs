@@ -5,6 +5,7 @@ use gltf::mesh::Mode;
 use gltf::{Primitive, Semantic};
 
 use super::Reader;
+use super::materials::Place;
 use crate::error::{Error, Result};
 use crate::scene::assemble::MeshTriangle;
 use crate::scene::material::DEFAULT_KD;
@@ -14,7 +15,9 @@ impl Reader<'_> {
     /// # Errors
     /// An index out of range; attributes of different lengths; a position that is not finite.
     pub fn primitive(&mut self, primitive: &Primitive, placed: DAffine3) -> Result<()> {
-        let refuse = |what: &str| Err(Error::file(self.path, format!("a primitive {what}")));
+        let path = self.path;
+        let bad = |what: &str| Error::file(path, format!("a primitive {what}"));
+        let refuse = |what: &str| Err(bad(what));
         let reader = primitive.reader(|buffer| {
             let data = self.file.buffers.get(buffer.index())?;
             Some(data.0.as_slice())
@@ -64,17 +67,24 @@ impl Reader<'_> {
                 kd: DEFAULT_KD,
             });
         }
-        let place = self.materials.places[material];
-        let uv: Option<Vec<[f32; 2]>> = (reader.read_tex_coords(place.set))
-            .map(|uv| uv.into_f32().map(|uv| place.apply(uv)).collect());
-        if let Some(uv) = &uv {
+        let coordinates = |place: Place| -> Result<Option<Vec<[f32; 2]>>> {
+            let Some(uv) = reader.read_tex_coords(place.set) else {
+                return Ok(None);
+            };
+            let uv: Vec<_> = uv.into_f32().map(|uv| place.apply(uv)).collect();
             if uv.len() < positions.len() {
-                return refuse("has fewer texture coordinates than positions");
+                return Err(bad("has fewer texture coordinates than positions"));
             }
             if !uv.iter().flatten().all(|c| c.is_finite()) {
-                return refuse("has a texture coordinate that is not finite");
+                return Err(bad("has a texture coordinate that is not finite"));
             }
-        }
+            Ok(Some(uv))
+        };
+        let uv = coordinates(self.materials.places[material])?;
+        let emission_uv = match self.materials.emission_places[material] {
+            Some(place) => coordinates(place)?,
+            None => None,
+        };
         // A mirrored node shows the other side of what it places.
         let mirrored = placed.matrix3.determinant() < 0.0;
         let mesh = &mut self.found.mesh;
@@ -87,6 +97,7 @@ impl Reader<'_> {
             mesh.triangles.push(MeshTriangle {
                 corners: corners.map(|v| first + v),
                 uv: uv.as_ref().map(|uv| corners.map(|v| uv[v as usize])),
+                emission_uv: (emission_uv.as_ref()).map(|uv| corners.map(|v| uv[v as usize])),
                 material: material as u32,
             });
         }

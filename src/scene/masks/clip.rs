@@ -31,6 +31,7 @@ pub(super) enum Node {
 pub(super) struct Shape {
     pub vertices: [u32; 3],
     pub uv: [[f32; 2]; 3],
+    pub emission_uv: Option<[[f32; 2]; 3]>,
     /// Whether the order turned it over.
     pub is_turned: bool,
 }
@@ -43,6 +44,7 @@ impl Shape {
         Self {
             vertices: order.map(|k| triangle.vertices[k]),
             uv: order.map(|k| triangle.uv[k]),
+            emission_uv: (triangle.emission_uv).map(|uv| order.map(|k| uv[k])),
             is_turned: (b + 3 - a) % 3 != 1,
         }
     }

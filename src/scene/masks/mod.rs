@@ -322,7 +322,9 @@ impl<'a> Cutting<'a> {
         };
         let triangle = Triangle {
             vertices: piece.map(|(node, at)| self.vertex(shape, node, at)),
-            uv: piece.map(|(node, at)| uv_at(shape, node, at)),
+            uv: piece.map(|(node, at)| uv_at(&shape.uv, node, at)),
+            emission_uv: (shape.emission_uv.as_ref())
+                .map(|uv| piece.map(|(node, at)| uv_at(uv, node, at))),
             material: self.scene.triangles[t].material,
         };
         let corners = triangle.vertices.map(|v| self.cut.vertices[v as usize]);
@@ -372,10 +374,10 @@ fn on_one_edge(from: Node, to: Node) -> bool {
     from == to || (0..3).any(|e| one[e] && other[e])
 }
 
-fn uv_at(shape: &Shape, node: Node, at: DVec2) -> [f32; 2] {
-    let uv = |k: usize, i: usize| f64::from(shape.uv[k][i]);
+fn uv_at(corners: &[[f32; 2]; 3], node: Node, at: DVec2) -> [f32; 2] {
+    let uv = |k: usize, i: usize| f64::from(corners[k][i]);
     [0, 1].map(|i| match node {
-        Node::Corner(k) => shape.uv[k][i],
+        Node::Corner(k) => corners[k][i],
         Node::OnEdge(edge, step) => {
             let ([from, to], share) = (EDGES[edge], f64::from(step) / STEPS);
             (uv(from, i) + share * (uv(to, i) - uv(from, i))) as f32

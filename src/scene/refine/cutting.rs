@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use glam::{DVec2, DVec3};
 
-use super::{OnInput, RefinedFrom, Scene, at_place, at_uv};
+use super::{OnInput, RefinedFrom, Scene, Triangle, at_place, at_uv};
 
 /// An edge by its vertices, the lower first.
 pub(super) type Edge = [u32; 2];
@@ -118,12 +118,12 @@ impl Cutting {
                 let (Corner::OnEdge(.., at) | Corner::Within(at)) = *corner else {
                     let Corner::Old(old) = *corner else { continue };
                     triangle.vertices[k] = whole.vertices[old];
-                    triangle.uv[k] = whole.uv[old];
+                    lay(&mut triangle, k, &whole, |uv| uv[old]);
                     part.corners[k] = on.corners[old];
                     continue;
                 };
                 part.corners[k] = in_whole(on.corners, at);
-                triangle.uv[k] = at_uv(whole.uv, at.to_array());
+                lay(&mut triangle, k, &whole, |uv| at_uv(uv, at.to_array()));
                 let vertices = &mut self.scene.vertices;
                 let new = || {
                     vertices.push(at_place(of_input, part.corners[k]));
@@ -178,12 +178,12 @@ impl Cutting {
             .find(|&k| edge(old.vertices[k], old.vertices[(k + 1) % 3]) == cut)
             .expect("the edge is one of the triangle's");
         let next = (k + 1) % 3;
-        let uv = [0, 1].map(|i| 0.5 * (old.uv[k][i] + old.uv[next][i]));
+        let middle_of = |uv: [[f32; 2]; 3]| [0, 1].map(|i| 0.5 * (uv[k][i] + uv[next][i]));
         let at = [0, 1].map(|i| 0.5 * (on.corners[k][i] + on.corners[next][i]));
         let mut halves = [(old, on), (old, on)];
         for ((triangle, on), corner) in halves.iter_mut().zip([next, k]) {
             triangle.vertices[corner] = middle;
-            triangle.uv[corner] = uv;
+            lay(triangle, corner, &old, middle_of);
             on.corners[corner] = at;
         }
         let half = self.scene.triangles.len() as u32;
@@ -219,6 +219,19 @@ impl Cutting {
 
 pub(super) fn edge(a: u32, b: u32) -> Edge {
     [a.min(b), a.max(b)]
+}
+
+/// Gives a corner of a piece its texture coordinates, found from those of the whole.
+fn lay(
+    piece: &mut Triangle,
+    corner: usize,
+    whole: &Triangle,
+    find: impl Fn([[f32; 2]; 3]) -> [f32; 2],
+) {
+    piece.uv[corner] = find(whole.uv);
+    if let (Some(own), Some(of_whole)) = (&mut piece.emission_uv, whole.emission_uv) {
+        own[corner] = find(of_whole);
+    }
 }
 
 /// Barycentric coordinates in the input of those in a part of it.

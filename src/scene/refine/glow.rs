@@ -19,7 +19,7 @@ impl<'a> Glow<'a> {
         }
         let of = |t: &super::Triangle| {
             let material = &input.materials[t.material as usize];
-            area(input.corners(t)) * luminance(material.emitted_over(&t.uv))
+            area(input.corners(t)) * luminance(material.emitted_over(&t.uv_of_emission()))
         };
         let power: f64 = input.triangles.iter().map(of).sum();
         (power > 0.0).then_some(Self { input, power })
@@ -35,7 +35,7 @@ impl<'a> Glow<'a> {
         if material.map_ke.is_none() || relief {
             return 0.0;
         }
-        let [a, b, c] = triangle.uv;
+        let [a, b, c] = triangle.uv_of_emission();
         let middle = |p: [f32; 2], q: [f32; 2]| [0, 1].map(|i| 0.5 * (p[i] + q[i]));
         let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
         let quarters = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]];

@@ -204,6 +204,7 @@ impl Scene {
                 Triangle {
                     vertices,
                     uv: on.corners.map(|at| at_uv(whole.uv, at)),
+                    emission_uv: (whole.emission_uv).map(|uv| on.corners.map(|at| at_uv(uv, at))),
                     material: whole.material,
                 }
             })

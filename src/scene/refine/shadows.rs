@@ -28,7 +28,7 @@ impl<'a> Shadows<'a> {
         let surface = |t: usize| Surface {
             corners: input.corners(&input.triangles[t]),
             emitted: std::f64::consts::PI
-                * luminance(material(t).emitted_over(&input.triangles[t].uv)),
+                * luminance(material(t).emitted_over(&input.triangles[t].uv_of_emission())),
             reflectance: luminance(material(t).kd),
         };
         let surfaces: Vec<Surface> = (0..input.triangles.len()).map(surface).collect();

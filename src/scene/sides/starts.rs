@@ -47,8 +47,10 @@ impl<'a> Starts<'a> {
             let corners = geometry.corners(t);
             let [a, b, c] = corners;
             let area = 0.5 * (b - a).cross(c - a).length();
-            let emitted =
-                luminance(scene.materials[triangle.material as usize].emitted_over(&triangle.uv));
+            let emitted = luminance(
+                scene.materials[triangle.material as usize]
+                    .emitted_over(&triangle.uv_of_emission()),
+            );
             add(Light::Triangle(corners), area * emitted);
         }
         for light in &scene.lights.points {
