@@ -11,11 +11,9 @@ use mesolux::scene::sky::{Dome, Gradation, Sky};
 use mesolux::solver::{Place, Settings, Solver};
 use rayon::prelude::*;
 
-/// Of each place's light, or of a hundredth of the brightest where less is left: measured 0.3 % at
-/// most, but at one place of 5.14.
-const MOST: f64 = 0.01;
-/// There: it also sees 0.05° beside the mask, which no ray finds. Measured 1.36 %.
-const MOST_OF_SLIVER: f64 = 0.025;
+/// Of each place's light, or of a hundredth of the brightest where less is left: measured 0.16 % at
+/// most, of a place that sees 0.05° beside a mask too.
+const MOST: f64 = 4e-3;
 
 /// A parallelogram.
 #[derive(Clone, Copy)]
@@ -197,27 +195,15 @@ fn places_receive_daylight_through_openings() {
             let off = |(light, right): (&mesolux::solver::LightAt, &f64)| {
                 (f64::from(light.indirect.x) - right).abs() / right.max(0.01 * brightest)
             };
-            let mut errors: Vec<f64> = found.iter().zip(&right).map(off).collect();
-            errors.sort_by(f64::total_cmp);
-            let [.., next, worst] = errors[..] else {
-                panic!("there are places");
-            };
+            let errors: Vec<f64> = found.iter().zip(&right).map(off).collect();
+            let worst = errors.iter().copied().fold(0.0, f64::max);
             println!(
                 "{}, {name}: worst of {} places {:.2} %",
                 case.name,
                 places.len(),
                 100.0 * worst
             );
-            let most = if case.name.starts_with("5.14") {
-                MOST_OF_SLIVER
-            } else {
-                MOST
-            };
-            assert!(
-                next < MOST && worst < most,
-                "{}, {name}: {next} {worst}",
-                case.name
-            );
+            assert!(worst < MOST, "{}, {name}: {worst}", case.name);
         }
         assert_silent();
     }

@@ -24,6 +24,36 @@ pub fn blocked(tree: &ShadowTree<ShadowOccluder>, from: DVec3, to: DVec3) -> boo
     is_blocked
 }
 
+/// The connected part of an occluder that crosses the way between two places as [`blocked`] asks
+/// for: of some one of them.
+pub fn blocked_by(tree: &ShadowTree<ShadowOccluder>, from: DVec3, to: DVec3) -> Option<u32> {
+    let way = to - from;
+    let mut part = None;
+    walk(tree, from, way, |leaf| {
+        let found = leaf.iter().find(|o| crosses(o, from, to, way));
+        part = found.map(|o| o.component);
+        if part.is_some() { 0.0 } else { 1.0 }
+    });
+    part
+}
+
+/// Whether an occluder of a connected part crosses the way between two places.
+pub fn blocked_by_part(
+    tree: &ShadowTree<ShadowOccluder>,
+    part: u32,
+    from: DVec3,
+    to: DVec3,
+) -> bool {
+    let way = to - from;
+    let mut is_blocked = false;
+    walk(tree, from, way, |leaf| {
+        let mut of_part = leaf.iter().filter(|o| o.component == part);
+        is_blocked = of_part.any(|o| crosses(o, from, to, way));
+        if is_blocked { 0.0 } else { 1.0 }
+    });
+    is_blocked
+}
+
 /// The first occluder on a way: where it is met, as a share of the way, and whether its back is
 /// seen. Where both sides lie in one place, the front.
 pub fn first_met(
