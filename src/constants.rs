@@ -28,17 +28,18 @@ shared! {
     /// Invocations of the one workgroup that selects sources.
     SELECT_GROUP = 256;
     /// How an element's form factor to a source is found: from afar as a point, by the source's
-    /// outline, by its parts as points, or near it.
+    /// outline, by its parts as points, by its outline where the horizon cuts that, or near it.
     RECEIVE_FAR = 0;
     RECEIVE_OUTLINE = 1;
     RECEIVE_PARTS = 2;
-    RECEIVE_NEAR = 3;
-    RECEIVE_KINDS = 4;
+    RECEIVE_CUT = 3;
+    RECEIVE_NEAR = 4;
+    RECEIVE_KINDS = 5;
     /// The lists after those: elements of which the item buffer leaves open whether they are seen,
     /// and elements that a silhouette may cut the source for.
-    RECEIVE_DOUBTFUL = 4;
-    RECEIVE_CROSSED = 5;
-    RECEIVE_LISTS = 6;
+    RECEIVE_DOUBTFUL = 5;
+    RECEIVE_CROSSED = 6;
+    RECEIVE_LISTS = 7;
     /// Places on a strong emitter from which rays find the share of it that such an element sees;
     /// on other sources fewer. A power of two.
     SOURCE_EYES = 128;

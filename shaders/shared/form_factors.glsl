@@ -21,7 +21,7 @@
 #include "shared/lambert.glsl"
 #include "shared/kept.glsl"
 
-// RECEIVE_FAR, RECEIVE_OUTLINE, RECEIVE_PARTS or RECEIVE_NEAR. A software device works through both
+// RECEIVE_FAR, _OUTLINE, _PARTS, _CUT or _NEAR. A software device works through both
 // sides of every branch, so that each kind has a pipeline of its own.
 layout(constant_id = 0) const uint KIND = RECEIVE_OUTLINE;
 
@@ -153,6 +153,9 @@ FLUX form_factor(vec3 p, vec3 n, uint element, Source s) {
     if (KIND == RECEIVE_OUTLINE) {
         return outline_above(p, n, s);
     }
+    if (KIND == RECEIVE_CUT) {
+        return outline(p, n, s);
+    }
     if (KIND == RECEIVE_PARTS) {
         return parts_as_points(p, n, s);
     }
@@ -213,7 +216,8 @@ vec3 before_plane(vec3 p, vec3 n, Source s) {
 FLUX mean_form_factor(uint element, vec4 ball, vec3 n, Source s) {
     if (KIND != RECEIVE_NEAR) {
         // These were looked at when they were sorted.
-        return form_factor(ball.xyz, n, element, s);
+        vec3 p = KIND == RECEIVE_CUT ? before_plane(ball.xyz, n, s) : ball.xyz;
+        return form_factor(p, n, element, s);
     }
     float gap = length(ball.xyz - s.middle) - s.radius;
     bool near = gap <= NEAR * ball.w;

@@ -1,22 +1,7 @@
-// Puts the form factors of near elements, which are found on the host, into the fresh rows of a
-// batch. VECTOR_FLUX: of elements with a relief, as vectors.
+// Puts the form factors of near elements into the fresh rows of a batch.
 
-#include "shared/types.glsl"
+#include "shared/near_factors.glsl"
 
-#ifdef VECTOR_FLUX
-#define FACTOR NearVector
-#define FLUX vec3
-#else
-#define FACTOR NearFactor
-#define FLUX float
-#endif
-
-layout(local_size_x = GROUP) in;
-
-layout(scalar, binding = 0) readonly buffer Slots { Slot slots[]; };
-// Where the factors of each source begin; one more than the sources.
-layout(scalar, binding = 1) readonly buffer Starts { uint starts[]; };
-layout(scalar, binding = 2) readonly buffer Factors { FACTOR factors[]; };
 // [slot][element of those of a kind]
 layout(scalar, binding = 3) writeonly buffer Fresh { FLUX fresh[]; };
 // 1 where any element of a block of GROUP sees the source, [slot][block].
@@ -30,12 +15,8 @@ layout(push_constant, scalar) uniform Parameters {
 
 void main() {
     uint slot = gl_WorkGroupID.y;
-    uint source = slots[slot].source;
-    if (source == NONE) {
-        return;
-    }
-    uint at = starts[source] + gl_GlobalInvocationID.x;
-    if (at >= starts[source + 1]) {
+    uint at = own_factor(slot);
+    if (at == NONE) {
         return;
     }
     FACTOR near = factors[at];

@@ -1,36 +1,7 @@
 // How elements receive from a source, and their lists. Including files have shared/receivers.glsl.
 
-// Lane k of a subgroup makes room in the list of kind k for all lanes.
-void append(uint slot, uint kind, bool mine, uint listed_word) {
-    uint count = 0;
-    uint before = 0;
-    for (uint k = 0; k < RECEIVE_KINDS; k++) {
-        uvec4 lanes = subgroupBallot(mine && kind == k);
-        count = gl_SubgroupInvocationID == k ? subgroupBallotBitCount(lanes) : count;
-        before = kind == k ? subgroupBallotExclusiveBitCount(lanes) : before;
-    }
-    uint first = 0;
-    if (count > 0) {
-        uint list = slot * RECEIVE_LISTS + gl_SubgroupInvocationID;
-        first = atomicAdd(lists[list].count, count);
-        atomicMax(lists[list].groups_x, (first + count + GROUP - 1) / GROUP);
-    }
-    for (uint k = 0; k < RECEIVE_KINDS; k++) {
-        uint first_of_kind = subgroupBroadcast(first, k);
-        before += kind == k ? first_of_kind : 0;
-    }
-    if (mine) {
-        listed[(slot * RECEIVE_LISTS + kind) * element_count + before] = listed_word;
-    }
-}
-
-// An element with the share of the source that it sees, rounded to a multiple of SHARE_STEP above 0.
-uint with_share(uint i, float share) {
-    return i | uint(max(share / SHARE_STEP - 0.5, 0.0)) << LISTED_BITS;
-}
-
-// The same for one of the lists that are resolved by rays.
-void append_open(uint slot, uint which, bool mine, uint i) {
+// Makes room in one list for all lanes.
+void append_one(uint slot, uint which, bool mine, uint listed_word) {
     uvec4 lanes = subgroupBallot(mine);
     if (lanes == uvec4(0)) {
         return;
@@ -44,8 +15,40 @@ void append_open(uint slot, uint which, bool mine, uint i) {
     }
     first = subgroupBroadcastFirst(first);
     if (mine) {
-        listed[list * element_count + first + subgroupBallotExclusiveBitCount(lanes)] = i;
+        listed[list * element_count + first + subgroupBallotExclusiveBitCount(lanes)] = listed_word;
     }
+}
+
+// The same in the list of each lane's kind: lane k for all lanes of kind k, but for RECEIVE_NEAR, of
+// which there are few.
+void append(uint slot, uint kind, bool mine, uint listed_word) {
+    append_one(slot, RECEIVE_NEAR, mine && kind == RECEIVE_NEAR, listed_word);
+    mine = mine && kind < RECEIVE_NEAR;
+    uint count = 0;
+    uint before = 0;
+    for (uint k = 0; k < RECEIVE_NEAR; k++) {
+        uvec4 lanes = subgroupBallot(mine && kind == k);
+        count = gl_SubgroupInvocationID == k ? subgroupBallotBitCount(lanes) : count;
+        before = kind == k ? subgroupBallotExclusiveBitCount(lanes) : before;
+    }
+    uint first = 0;
+    if (count > 0) {
+        uint list = slot * RECEIVE_LISTS + gl_SubgroupInvocationID;
+        first = atomicAdd(lists[list].count, count);
+        atomicMax(lists[list].groups_x, (first + count + GROUP - 1) / GROUP);
+    }
+    for (uint k = 0; k < RECEIVE_NEAR; k++) {
+        uint first_of_kind = subgroupBroadcast(first, k);
+        before += kind == k ? first_of_kind : 0;
+    }
+    if (mine) {
+        listed[(slot * RECEIVE_LISTS + kind) * element_count + before] = listed_word;
+    }
+}
+
+// An element with the share of the source that it sees, rounded to a multiple of SHARE_STEP above 0.
+uint with_share(uint i, float share) {
+    return i | uint(max(share / SHARE_STEP - 0.5, 0.0)) << LISTED_BITS;
 }
 
 // How the form factor from an element to a source is found, should it be seen; RECEIVE_KINDS where
@@ -64,7 +67,7 @@ uint kind_of(Source s, vec4 ball, vec3 n, out bool near) {
     bool far = s.kind == KIND_POINT || whole && distance_middle >= far_distance;
     bool by_parts = curved && points;
     uint kind = near ? RECEIVE_NEAR : far ? RECEIVE_FAR : by_parts ? RECEIVE_PARTS
-        : whole && above ? RECEIVE_OUTLINE : RECEIVE_NEAR;
+        : !whole ? RECEIVE_NEAR : above ? RECEIVE_OUTLINE : RECEIVE_CUT;
     bool shows = shows_front(s, ball.xyz) && !lies_in_plane(s, ball.xyz, n);
     return !behind && (near || shows) ? kind : RECEIVE_KINDS;
 }

@@ -27,7 +27,13 @@ layout(scalar, binding = 8) readonly buffer Blocks { ReceiverBlock blocks[]; };
 #ifdef SHADOW_RAYS
 // SOURCE_EYES a source.
 layout(binding = 10) uniform usamplerBuffer eyes;
+#define NEAR_MARKS 11
+#else
+#define NEAR_MARKS 9
 #endif
+// One bit an element that receives the source part by part, [slot][word]. Its form factor is found
+// on the host.
+layout(scalar, binding = NEAR_MARKS) readonly buffer NearMarks { uint near_marks[]; };
 
 // Rounding of distances, a few steps of f32 at coordinates up to 1.
 const float BLOCK_EPSILON = 1e-6;
@@ -75,6 +81,20 @@ float form_factor_about(Source s, vec3 p, vec3 n) {
     return s.kind == KIND_POINT ? 0.0 : s.area * facing * above * 0.318309886 / (square * square);
 }
 
+// An element that sees a source under a larger form factor is worth several rays.
+const float CROSSED_FACTOR = 1.0 / 64.0;
+
+// Whether the element of a lane receives a source part by part. Asks only where any lane may: one
+// that is not found here costs time alone.
+bool is_near_part(uint slot, uint i, bool may) {
+    if (subgroupBallot(may) == uvec4(0)) {
+        return false;
+    }
+    uint words = (element_count + 31) / 32;
+    uint word = near_marks[slot * words + min(i / 32, words - 1)];
+    return bitfieldExtract(word, int(i % 32), 1) == 1;
+}
+
 // Whether the eye of a source lies below the horizon of a place that sees more of the source than
 // this: what of the source is seen is found from other places on it.
 const float BELOW_FACTOR = 1.0 / 2048.0;
@@ -111,9 +131,6 @@ void cross_unlike(
 #endif
 
 #ifdef ITEM_BUFFER
-// An element that sees a source under a larger form factor is worth several rays.
-const float CROSSED_FACTOR = 1.0 / 64.0;
-
 // Whether places about p, as far off as the source is wide, are seen otherwise than p is.
 bool around_differs(vec3 p, vec3 n, uint slot, Source s, uint sight, bool asks) {
     if (subgroupBallot(asks) == uvec4(0)) {
@@ -185,10 +202,15 @@ void main() {
             bool seen[SORT_ELEMENTS];
             bool crossed[SORT_ELEMENTS];
             bool near[SORT_ELEMENTS];
+            bool wanted[SORT_ELEMENTS];
             for (uint j = 0; j < SORT_ELEMENTS; j++) {
                 uint i = first + j * gl_SubgroupSize;
                 kind[j] = kind_of(s, ball[j], n[j], near[j]);
-                seen[j] = i < element_count && kind[j] < RECEIVE_KINDS && !near[j];
+                wanted[j] = i < element_count && kind[j] < RECEIVE_KINDS;
+                bool may = near[j] || form_factor_about(s, ball[j].xyz, n[j]) > CROSSED_FACTOR;
+                bool by_parts = is_near_part(slot, i, wanted[j] && may);
+                wanted[j] = wanted[j] && !by_parts;
+                seen[j] = wanted[j] && !near[j];
                 // The element's own body would hide the eye.
                 crossed[j] = SILHOUETTES == 1 && seen[j] && eye_is_below(s, ball[j].xyz, n[j]);
                 seen[j] = seen[j] && !crossed[j];
@@ -200,9 +222,8 @@ void main() {
             }
             for (uint j = 0; j < SORT_ELEMENTS; j++) {
                 uint i = first + j * gl_SubgroupSize;
-                bool mine = i < element_count && kind[j] < RECEIVE_KINDS;
-                append(slot, kind[j], mine && (near[j] || seen[j]) && !crossed[j], with_share(i, 1.0));
-                append_open(slot, RECEIVE_CROSSED, crossed[j], i);
+                append(slot, kind[j], wanted[j] && (near[j] || seen[j]) && !crossed[j], with_share(i, 1.0));
+                append_one(slot, RECEIVE_CROSSED, crossed[j], i);
                 of_slot += subgroupBallotBitCount(subgroupBallot(i < element_count && kind[j] == RECEIVE_KINDS));
             }
 #else
@@ -212,16 +233,18 @@ void main() {
                 bool near;
                 uint kind = kind_of(s, ball[j], n[j], near);
                 bool mine = i < element_count && kind < RECEIVE_KINDS;
+                bool fills = form_factor_about(s, ball[j].xyz, n[j]) > CROSSED_FACTOR;
+                mine = mine && !is_near_part(slot, i, mine && (near || fills));
                 bool asks = mine && !near;
                 // The element's own body would hide the eye.
                 bool below = SILHOUETTES == 1 && asks && eye_is_below(s, ball[j].xyz, n[j]);
                 asks = asks && !below;
-                bool wide = SILHOUETTES == 1 && asks && form_factor_about(s, ball[j].xyz, n[j]) > CROSSED_FACTOR;
+                bool wide = SILHOUETTES == 1 && asks && fills;
                 uint sight = sight_of(ball[j].xyz, n[j], e, slot, s, asks);
                 bool crossed = below || wide && sight == DOUBTFUL || around_differs(ball[j].xyz, n[j], slot, s, sight, wide);
                 append(slot, kind, mine && (near || sight == SEEN) && !crossed, with_share(i, 1.0));
-                append_open(slot, RECEIVE_DOUBTFUL, sight == DOUBTFUL && !crossed, i);
-                append_open(slot, RECEIVE_CROSSED, crossed, i);
+                append_one(slot, RECEIVE_DOUBTFUL, sight == DOUBTFUL && !crossed, i);
+                append_one(slot, RECEIVE_CROSSED, crossed, i);
                 of_slot += subgroupBallotBitCount(subgroupBallot(i < element_count && kind == RECEIVE_KINDS));
             }
 #endif

@@ -40,6 +40,7 @@ impl CachedBake {
             nearness,
             silhouettes,
             normalise,
+            carries,
             culling,
             merging,
             batch,
@@ -52,8 +53,8 @@ impl CachedBake {
         let emitter_shadows = settings.emitter_shadows();
         let scene_hash = scene.hash();
         let key = format!(
-            "bake cache 6, layout {VERSION}\n{maker}\n{scene_hash}\n{estimator:?} {hemicube} {emitter_shadows:?} {residual:?} {shots:?} {seed} \
-             {grouping:?} {nearness:?} {silhouettes} {normalise} {culling:?} {merging} {batch} {visibility_memory:?} {coupling_memory} {:?} {:?}",
+            "bake cache 7, layout {VERSION}\n{maker}\n{scene_hash}\n{estimator:?} {hemicube} {emitter_shadows:?} {residual:?} {shots:?} {seed} \
+             {grouping:?} {nearness:?} {silhouettes} {normalise} {carries} {culling:?} {merging} {batch} {visibility_memory:?} {coupling_memory} {:?} {:?}",
             relief.transport, relief.directions
         );
         let name: String = Sha256::digest(key)[..16]

@@ -57,7 +57,7 @@ pub fn run(device: &Arc<Device>, scene: &Scene, hemicube: u32, rounds: usize) ->
                 let count = sources.len() as f64;
                 let drawing = stages.cull + stages.item_buffer;
                 draw[i].push(count / drawing);
-                whole[i].push(count / (drawing + stages.bin + stages.keep));
+                whole[i].push(count / (drawing + stages.form_factors() + stages.keep));
             }
         }
     }

@@ -228,7 +228,7 @@ fn bake(
         keep_seconds: report.seconds.stages.keep,
         cull_seconds: report.seconds.stages.cull,
         draw_seconds: report.seconds.stages.item_buffer,
-        form_factor_seconds: report.seconds.stages.bin,
+        form_factor_seconds: report.seconds.stages.form_factors(),
         gather_seconds: report.seconds.gather,
         hemicubes: report.hemicubes,
         shots: report.shots,

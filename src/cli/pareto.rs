@@ -65,10 +65,11 @@ pub struct Options {
     /// Most seconds of one measurement of another method, at as many places as a bake has elements
     #[arg(long, value_name = "SECONDS", default_value_t = 120.0)]
     peer_limit: f64,
-    /// Leave out instant radiosity, the path tracer and Mitsuba
+    /// Leave out instant radiosity, the path tracer, Mitsuba and Cycles
     #[arg(long)]
     no_peers: bool,
-    /// The Python whose Mitsuba 3 is measured, if it has one; LLVM is found by DRJIT_LIBLLVM_PATH
+    /// The Python whose Mitsuba 3 and Blender (packages `mitsuba` and `bpy`) are measured, if it has
+    /// them; Mitsuba finds LLVM by DRJIT_LIBLLVM_PATH
     #[arg(long, value_name = "PYTHON", default_value = "python3")]
     python: PathBuf,
     #[command(flatten)]

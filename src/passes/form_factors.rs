@@ -10,6 +10,7 @@ use super::batch::{Batch, Hemicubes, Sight};
 use super::buffers::SceneBuffers;
 use super::fresh_rows::{FreshRows, ReceiverLists};
 use super::groups;
+use super::near_marks::NearMarks;
 use super::occluder_tree::OccluderTree;
 use super::shaders::{
     form_factors, form_factors_rays, form_factors_relief, form_factors_relief_rays,
@@ -54,6 +55,7 @@ struct Range {
     first_block: u32,
     lists: ReceiverLists,
     fresh: Buffer,
+    near: NearMarks,
     sort: BoundCompute,
     /// What rays decide about, with its list.
     resolve: Vec<(u32, BoundCompute)>,
@@ -146,16 +148,23 @@ impl FormFactors {
         })
     }
 
-    /// After a barrier between earlier readers of the rows and transfers.
-    pub fn record(&self, cmd: &Commands) {
+    /// After a barrier between earlier readers of the rows and transfers. Calls `stamp` when the
+    /// elements are sorted, and when rays have decided.
+    pub fn record(&self, cmd: &Commands, mut stamp: impl FnMut()) {
         let rows = &self.rows;
-        for Range { lists, fresh, .. } in &self.ranges {
+        for Range {
+            lists, fresh, near, ..
+        } in &self.ranges
+        {
             cmd.copy(&lists.empty, 0, &lists.counts, 0, lists.empty.bytes());
             cmd.fill(fresh, 0);
+            near.clear(cmd);
         }
         cmd.fill(&rows.occupied, 0);
         cmd.fill(&rows.facing_away, 0);
         cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
+        self.ranges.iter().for_each(|range| range.near.record(cmd));
+        cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         // All of these shaders have the same.
         let parameters = |range: &Range, slots: std::ops::Range<u32>| sort_receivers::Parameters {
             first_element: range.first_element,
@@ -173,6 +182,7 @@ impl FormFactors {
                 cmd.dispatch(&range.sort, &parameters(range, slots), size);
             }
         }
+        stamp();
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         let list_at = |slot: u32, list: u32| {
             size_of::<ReceiverList>() as u64 * u64::from(slot * RECEIVE_LISTS + list)
@@ -185,8 +195,9 @@ impl FormFactors {
                     cmd.dispatch_indirect(resolve, &push, &range.lists.counts, at);
                 }
             }
-            cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         }
+        stamp();
+        cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         // Every element is in one list of a slot at most.
         for range in &self.ranges {
             for slot in 0..self.slot_count {
@@ -207,20 +218,32 @@ impl Range {
             None => [0, shape.plain_count, 0],
             Some(_) => [shape.plain_count, shape.meso_count, shape.plain_blocks()],
         };
+        let relief = on.meso.is_some();
+        let pairs = match relief {
+            false => &on.scene.near_rows,
+            true => &on.scene.near_relief_rows,
+        };
+        let near = NearMarks::new(device, on.batch, pairs, element_count, relief)?;
         Ok(Self {
             first_element,
             element_count,
             first_block,
             lists: on.lists.clone(),
             fresh: on.fresh.clone(),
-            sort: sort(device, on, care)?,
+            sort: sort(device, on, &near.marks, care)?,
+            near,
             resolve: resolve(device, on)?,
             form_factors: form_factors(device, on)?,
         })
     }
 }
 
-fn sort(device: &Arc<Device>, on: &On<'_>, care: Care) -> Result<BoundCompute> {
+fn sort(
+    device: &Arc<Device>,
+    on: &On<'_>,
+    near_marks: &Buffer,
+    care: Care,
+) -> Result<BoundCompute> {
     let pipeline = |shader: &ComputeShader<'_>| {
         let constants = [care.culls, care.silhouettes].map(u32::from);
         ComputePipeline::in_subgroups(device, "sort receivers", shader, &constants)
@@ -229,7 +252,7 @@ fn sort(device: &Arc<Device>, on: &On<'_>, care: Care) -> Result<BoundCompute> {
     match &on.batch.sight {
         Sight::Hemicubes(hemicubes) => {
             let items = hemicubes.sampled_items();
-            let bindings = receivers!(sort_receivers, on, items, away_count, blocks);
+            let bindings = receivers!(sort_receivers, on, items, away_count, blocks, near_marks);
             pipeline(&sort_receivers::SHADER)?.bind(&bindings)
         }
         Sight::Rays(tree) => {
@@ -241,6 +264,7 @@ fn sort(device: &Arc<Device>, on: &On<'_>, care: Care) -> Result<BoundCompute> {
                 away_count,
                 blocks,
                 shadow_occluders,
+                near_marks,
                 eyes: &on.scene.eyes
             );
             pipeline(&sort_receivers_rays::SHADER)?.bind(&bindings)

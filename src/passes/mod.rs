@@ -15,6 +15,7 @@ pub mod kept_rows;
 pub mod light_rows;
 pub mod measure;
 pub mod measure_relief;
+pub mod near_marks;
 pub mod near_rows;
 pub mod near_to_relief;
 pub mod normalise;

@@ -60,8 +60,9 @@ impl Evaluate {
         }
     }
 
-    /// Ends with a barrier before compute passes.
-    pub fn record(&self, cmd: &Commands) {
+    /// Ends with a barrier before compute passes. Calls `stamp` twice: when it is sorted which
+    /// elements see the sources, and when rays have decided where that was left open.
+    pub fn record(&self, cmd: &Commands, mut stamp: impl FnMut()) {
         cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
         match self {
             Self::Receivers {
@@ -69,7 +70,7 @@ impl Evaluate {
                 near,
                 normalise,
             } => {
-                form_factors.record(cmd);
+                form_factors.record(cmd, stamp);
                 cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
                 near.record(cmd);
                 if let Some(normalise) = normalise {
@@ -77,8 +78,16 @@ impl Evaluate {
                     normalise.record(cmd);
                 }
             }
-            Self::Pixels(bin) => bin.record(cmd),
-            Self::Lights(rows) => rows.record(cmd),
+            Self::Pixels(bin) => {
+                stamp();
+                stamp();
+                bin.record(cmd);
+            }
+            Self::Lights(rows) => {
+                stamp();
+                stamp();
+                rows.record(cmd);
+            }
         }
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
     }

@@ -1,6 +1,7 @@
 //! What each source has sent, and what it still has to send.
 
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use super::Problem;
 use super::coupling::{CouplingRow, Targets};
@@ -9,7 +10,7 @@ use super::makers::RowKind;
 use super::near::Sent;
 use super::progress::Bound;
 use super::rows::looks_closer;
-use super::system::System;
+use super::system::{Carrier, System};
 use crate::constants::KIND_SKY;
 use crate::passes::types::KeptRow;
 use crate::vk::Device;
@@ -20,6 +21,8 @@ pub(super) struct Ledger {
     /// `[source]`
     pub sources: Vec<Drawn>,
     pub bound: Bound,
+    /// See [`NearPairs::shares`].
+    near_shares: Vec<f64>,
 }
 
 /// Sources that are to be drawn, with the power that they have to send.
@@ -59,6 +62,10 @@ const UNGATHERED: f64 = 0.04;
 /// About the share of a relief's light that leaves in other directions than if it left evenly.
 const UNEVEN: f64 = 0.1;
 
+/// A source whose row carries the light of another lies beside it and faces as it does: how much a
+/// unit of 1 − cos of the angle between the two counts as squared distance, internal units.
+const TURNED: f64 = 0.05;
+
 /// How often the importance of sources is lowered before the first is drawn, for those with rows.
 const RESTORED_WEIGHINGS: usize = 8;
 
@@ -95,6 +102,7 @@ impl Ledger {
             system,
             sources,
             bound,
+            near_shares: on.near.shares(&on.elements, list),
         };
         (0..RESTORED_WEIGHINGS).for_each(|_| ledger.weigh(on));
         ledger
@@ -184,7 +192,7 @@ impl Ledger {
             true => self.system.emitted(s).as_vec3(),
             false => Vec3::ZERO,
         };
-        let shot = self.system.shot(s);
+        let shot = self.system.shot(s) + self.system.carried(s);
         let reflected = shot - drawn.gathered;
         // What rounding to f32 has left is nothing.
         let rounding = f64::from(f32::EPSILON) * shot.abs();
@@ -203,13 +211,45 @@ impl Ledger {
         self.system.area(s) * light.element_sum()
     }
 
+    /// Lets rows that are kept carry the light of sources without rows, see [`System::carry`]: each
+    /// by the row of the source beside it that faces most as it does. Without that all that such
+    /// sources reflect is missing; with it, that light may arrive some place beside where it should.
+    pub fn carry(&mut self, on: &Problem) {
+        let list = &on.sources.list;
+        let plain = |s: usize| list[s].is_surface() && !self.sources[s].relief;
+        let carries =
+            |&s: &usize| plain(s) && self.sources[s].row.is_some() && self.system.has_row(s);
+        let carriers: Vec<usize> = (0..list.len()).filter(carries).collect();
+        let is_dark = |s: usize| self.system.reflected(s) == DVec3::ZERO;
+        let waits = |&s: &usize| plain(s) && !self.system.is_drawn(s) && !is_dark(s);
+        let waiting: Vec<usize> = (0..list.len()).filter(waits).collect();
+        let near = &self.near_shares;
+        let found: Vec<_> = (waiting.par_iter())
+            .map(|&s| {
+                let apart = |c: usize| {
+                    let turned = 1.0 - list[s].normal.dot(list[c].normal);
+                    list[s].centroid.distance_squared(list[c].centroid) + TURNED * turned
+                };
+                let nearest = carriers.iter().map(|&c| (apart(c), c));
+                let (_, source) = nearest.min_by(|a, b| a.0.total_cmp(&b.0))?;
+                let far = |s: usize| list[s].area * (1.0 - near[s]);
+                let share = far(s) / far(source);
+                Some((s, Carrier { source, share }))
+            })
+            .collect();
+        for (s, carrier) in found.into_iter().flatten() {
+            self.system.carry(s, carrier);
+        }
+    }
+
     /// What each source has sent to the elements through its row; none of one that sent nothing.
-    pub fn sent(&self) -> Vec<Option<Sent>> {
+    pub fn sent(&self, on: &Problem) -> Vec<Option<Sent>> {
         let sent = |drawn: &Drawn| {
             Some(Sent {
                 emission: drawn.emission_gathered,
                 reflected: drawn.gathered,
-                scale: drawn.scale?.into(),
+                // A source that was not drawn has sent nothing: its parts send all that they have.
+                scale: (drawn.scale.map(f64::from)).or(on.settings.carries.then_some(1.0))?,
             })
         };
         self.sources.iter().map(sent).collect()

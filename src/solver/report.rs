@@ -64,6 +64,21 @@ pub struct Skipped {
     pub dark_slots: u64,
 }
 
+/// Pairs of source and element whose form factor the device has found, by how.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct Pairs {
+    /// As of a point.
+    pub far: u64,
+    /// By the outline of the source.
+    pub outline: u64,
+    /// By the parts of a curved source, as points.
+    pub parts: u64,
+    /// By the outline, cut at the element's horizon.
+    pub cut: u64,
+    /// Member by member, or from several places on the element.
+    pub near: u64,
+}
+
 /// Pairs of source and element about which rays decided.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct ByRays {
@@ -165,6 +180,7 @@ pub struct Report {
     pub sweeps: u64,
     pub near: Near,
     pub by_rays: ByRays,
+    pub pairs: Pairs,
     /// Null in open scenes.
     pub raw_sums: Option<RawSums>,
     /// Bytes of the coupling between the sources.
@@ -265,7 +281,12 @@ impl Report {
                 row.scale != 1.0 || share == 1.0,
             );
         }
-        let [doubtful, silhouettes] = row.resolved;
+        let [far, outline, parts, cut, near, doubtful, silhouettes] = row.listed;
+        self.pairs.far += far;
+        self.pairs.outline += outline;
+        self.pairs.parts += parts;
+        self.pairs.cut += cut;
+        self.pairs.near += near;
         self.by_rays.doubtful += doubtful;
         self.by_rays.silhouettes += silhouettes;
         self.add_drawn(&row.counts, kind == RowKind::Strong);

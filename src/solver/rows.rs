@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::drawing::{Drawing, read_items};
 use super::estimate::Evaluate;
 use super::{EmitterShadows, Settings};
-use crate::constants::{FACES, RECEIVE_CROSSED, RECEIVE_DOUBTFUL, RECEIVE_LISTS};
+use crate::constants::{FACES, RECEIVE_LISTS};
 use crate::error::Result;
 use crate::passes::batch::{Batch, Sight};
 use crate::passes::buffers::SceneBuffers;
@@ -39,9 +39,8 @@ pub(super) struct Row {
     pub counts: Vec<[u32; 3]>,
     /// Elements that see nothing of the source, whatever stands between.
     pub facing_away: u32,
-    /// Elements of which rays found whether they see it, and elements of which they found the share
-    /// of it that they see, since a silhouette may cut it.
-    pub resolved: [u64; 2],
+    /// Elements in each of the lists of receivers, by how their form factor is found.
+    pub listed: [u64; RECEIVE_LISTS as usize],
 }
 
 /// Where the form factors of a row are.
@@ -64,6 +63,10 @@ pub(super) struct FactorWords {
 pub struct Stages {
     pub cull: f64,
     pub item_buffer: f64,
+    /// Finding which elements see the sources by the item buffers, or by rays to strong emitters.
+    pub sort: f64,
+    /// Rays where that leaves open what an element sees.
+    pub rays: f64,
     /// Form factors, normalised.
     pub bin: f64,
     /// Coupling the sources, and keeping the form factors.
@@ -71,12 +74,21 @@ pub struct Stages {
 }
 
 /// One more than the stages.
-const STAMPS: u32 = 5;
+const STAMPS: u32 = 7;
+
+impl Stages {
+    /// From item buffers to form factors.
+    pub fn form_factors(&self) -> f64 {
+        self.sort + self.rays + self.bin
+    }
+}
 
 impl AddAssign for Stages {
     fn add_assign(&mut self, other: Self) {
         self.cull += other.cull;
         self.item_buffer += other.item_buffer;
+        self.sort += other.sort;
+        self.rays += other.rays;
         self.bin += other.bin;
         self.keep += other.keep;
     }
@@ -214,13 +226,17 @@ impl RowMaker {
                     None => cmd.timestamp(stamps, 1),
                 }
                 cmd.timestamp(stamps, 2);
-                evaluate.record(cmd);
-                cmd.timestamp(stamps, 3);
+                let mut stamp = 2;
+                evaluate.record(cmd, || {
+                    stamp += 1;
+                    cmd.timestamp(stamps, stamp);
+                });
+                cmd.timestamp(stamps, 5);
                 couple.record(cmd);
                 if let Some(keep) = &keep {
                     keep.record(cmd, i as u32);
                 }
-                cmd.timestamp(stamps, 4);
+                cmd.timestamp(stamps, 6);
                 cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
                 layout.record(cmd, &readback[i]);
                 cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
@@ -268,12 +284,14 @@ impl RowMaker {
         self.commands[i].wait()?;
         let row = |(slot, &source)| self.layout.read(slot, source, &self.readback[i]);
         let rows = (0..).zip(&sources).map(row).collect();
-        let [cull, item_buffer, bin, keep] = self.timestamps[i].intervals()?[..] else {
+        let [cull, item_buffer, sort, rays, bin, keep] = self.timestamps[i].intervals()?[..] else {
             unreachable!("a batch has {STAMPS} timestamps");
         };
         let stages = Stages {
             cull,
             item_buffer,
+            sort,
+            rays,
             bin,
             keep,
         };
@@ -386,10 +404,10 @@ impl Layout {
             },
             counts: from.read(at(COUNTS), bytes(COUNTS) / size_of::<[u32; 3]>()),
             facing_away: from.read(at(AWAY), 1)[0],
-            resolved: [RECEIVE_DOUBTFUL, RECEIVE_CROSSED].map(|list| {
+            listed: std::array::from_fn(|list| {
                 let of = |part| {
                     let lists: Vec<ReceiverList> = from.read(at(part), RECEIVE_LISTS as usize);
-                    u64::from(lists[list as usize].count)
+                    u64::from(lists[list].count)
                 };
                 of(LISTS) + of(MESO_LISTS)
             }),

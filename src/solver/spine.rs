@@ -139,6 +139,7 @@ impl Spine {
     pub fn run(&mut self, on: &Problem, report: &mut Report, watch: &mut Watch<'_>) -> Result<()> {
         let limit = on.settings.shots.unwrap_or(u32::MAX);
         let (mut corrections, mut turns) = (0, 0);
+        let mut drawn_before = None;
         while self.draw(on, Phase::First, report, watch)? {
             self.solve(
                 UNSOLVED * self.ledger.bound.stop_power(),
@@ -148,8 +149,11 @@ impl Spine {
             if report.shots < limit && self.ledger.undrawn().is_some() {
                 continue;
             }
+            self.carry(on, report);
             self.settle(on, corrections > 0, report)?;
-            if report.shots < limit && self.ledger.undrawn().is_some() {
+            // Without what is carried less may be unshot, so that nothing more is drawn.
+            let drew = drawn_before.replace(report.shots) != Some(report.shots);
+            if drew && report.shots < limit && self.ledger.undrawn().is_some() {
                 continue;
             }
             if !self.draw(on, Phase::Again, report, watch)? {
@@ -180,11 +184,7 @@ impl Spine {
             self.ledger.system.shoot_unknown();
         }
         if watch.stop.is_some() {
-            self.solve(
-                UNSOLVED * self.ledger.bound.stop_power(),
-                MOST_SWEEPS,
-                report,
-            );
+            self.carry(on, report);
         }
         let done = match self.ledger.missing() <= self.ledger.bound.most_missing() {
             true => StopReason::Residual,
@@ -214,6 +214,9 @@ impl Spine {
         report: &mut Report,
         watch: &mut Watch<'_>,
     ) -> Result<bool> {
+        if phase == Phase::First {
+            self.ledger.system.release();
+        }
         loop {
             while let Some(batch) = self.choose(on, phase, report)? {
                 for &source in &batch.sources {
@@ -335,6 +338,17 @@ impl Spine {
         let start = Instant::now();
         self.ledger.system.solve(most, sweeps);
         report.seconds.solve += start.elapsed().as_secs_f64();
+    }
+
+    /// Lets rows carry what undrawn sources send, and solves.
+    fn carry(&mut self, on: &Problem, report: &mut Report) {
+        let start = Instant::now();
+        if on.settings.carries {
+            self.ledger.carry(on);
+        }
+        report.seconds.solve += start.elapsed().as_secs_f64();
+        let most = UNSOLVED * self.ledger.bound.stop_power();
+        self.solve(most, MOST_SWEEPS, report);
     }
 
     /// Goes on from the light that the elements have.

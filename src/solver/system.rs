@@ -34,6 +34,10 @@ struct Unknown {
     is_surface: bool,
     drawn: bool,
     row: Option<CouplingRow>,
+    /// Of a source that was not drawn, see [`System::carry`].
+    carrier: Option<Carrier>,
+    /// Radiosity that its row carries for others.
+    carried: DVec3,
     emission_shot: bool,
     /// Reflected radiosity that has been shot.
     shot: DVec3,
@@ -45,6 +49,24 @@ struct Unknown {
     unmeasured: DVec3,
     /// Power that arrives at elements in the end for a unit of power that is sent, at most; RGB.
     importance: DVec3,
+}
+
+/// A source whose row carries the light of one without a row.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Carrier {
+    pub source: usize,
+    /// Radiosity of the carrier for a unit of radiosity that it carries: the areas' ratio.
+    pub share: f64,
+}
+
+impl Unknown {
+    /// What it has shot through a row of its own.
+    fn shot_itself(&self) -> DVec3 {
+        match self.carrier {
+            Some(_) => DVec3::ZERO,
+            None => self.shot,
+        }
+    }
 }
 
 /// Sums of unshot power, internal units, over the colours.
@@ -69,6 +91,8 @@ impl System {
             is_surface: source.is_surface(),
             drawn: false,
             row: None,
+            carrier: None,
+            carried: DVec3::ZERO,
             emission_shot: false,
             shot: DVec3::ZERO,
             measured: DVec3::ZERO,
@@ -119,8 +143,8 @@ impl System {
             true => 0.0,
             false => source.emitted_power,
         };
-        let reflected = (self.reflected(s) - source.shot).abs().element_sum() * source.area;
-        (emitted + reflected, emitted)
+        let unshot = self.reflected(s) - source.shot_itself();
+        (emitted + unshot.abs().element_sum() * source.area, emitted)
     }
 
     pub fn unshot(&self) -> Unshot {
@@ -175,7 +199,7 @@ impl System {
             true => DVec3::ZERO,
             false => source.emitted,
         };
-        emitted + (self.reflected(s) - source.shot).abs()
+        emitted + (self.reflected(s) - source.shot_itself()).abs()
     }
 
     /// Power that is missing at the elements for what a source has not shot, or has shot without
@@ -218,6 +242,66 @@ impl System {
         }
     }
 
+    /// Lets the row of another source carry what a source without a row reflects. For the error
+    /// bound that light stays unshot: it may arrive elsewhere than it should.
+    pub fn carry(&mut self, s: usize, carrier: Carrier) {
+        self.sources[s].carrier = Some(carrier);
+        self.shoot(s);
+    }
+
+    /// Takes back what rows of other sources have carried.
+    pub fn release(&mut self) {
+        for s in 0..self.sources.len() {
+            let source = &mut self.sources[s];
+            source.carried = DVec3::ZERO;
+            let Some(carrier) = source.carrier.take() else {
+                continue;
+            };
+            let back = -carrier.share * std::mem::take(&mut source.shot);
+            if let Some(row) = &self.sources[carrier.source].row {
+                self.arrived.add(row, back);
+            }
+        }
+    }
+
+    /// Whether its coupling is known.
+    pub fn has_row(&self, s: usize) -> bool {
+        self.sources[s].row.is_some()
+    }
+
+    /// Radiosity that the row of a source carries for others.
+    pub fn carried(&self, s: usize) -> DVec3 {
+        self.sources[s].carried
+    }
+
+    /// Shoots what a source has through its row, or through that of its carrier.
+    fn shoot(&mut self, s: usize) {
+        let reflected = self.reflected(s);
+        let unshot = reflected - self.sources[s].shot;
+        let through = self.through(s);
+        let Some(row) = &self.sources[through.source].row else {
+            return;
+        };
+        self.arrived.add(row, through.share * unshot);
+        self.sources[s].shot = reflected;
+        if through.source != s {
+            self.sources[through.source].carried += through.share * unshot;
+        }
+    }
+
+    /// Whose row a source shoots through: its own where it is no carrier's.
+    fn through(&self, s: usize) -> Carrier {
+        self.sources[s].carrier.unwrap_or(Carrier {
+            source: s,
+            share: 1.0,
+        })
+    }
+
+    /// Whether it shoots through a row.
+    fn has_way(&self, s: usize) -> bool {
+        self.sources[self.through(s).source].row.is_some()
+    }
+
     /// The row of a source, which is not known any more.
     pub fn take_row(&mut self, s: usize) -> Option<CouplingRow> {
         self.sources[s].row.take()
@@ -257,11 +341,20 @@ impl System {
         left <= most
     }
 
-    /// Unshot power of the sources with rows.
+    /// Power that the sources which shoot through rows have not shot.
     fn left(&self) -> f64 {
+        let left = |s: usize| {
+            let emitted = match self.sources[s].emission_shot {
+                true => 0.0,
+                false => self.sources[s].emitted_power,
+            };
+            let reflected = (self.reflected(s) - self.sources[s].shot).abs();
+            let carried = self.sources[s].carrier.is_some();
+            reflected.element_sum() * self.sources[s].area + if carried { 0.0 } else { emitted }
+        };
         (0..self.sources.len())
-            .filter(|&s| self.sources[s].row.is_some())
-            .map(|s| self.unshot_power(s).0)
+            .filter(|&s| self.has_way(s))
+            .map(left)
             .sum()
     }
 
@@ -269,13 +362,13 @@ impl System {
     fn sweep(&mut self, least: f64) {
         self.sweeps += 1;
         for s in 0..self.sources.len() {
-            let reflected = self.reflected(s);
-            let source = &mut self.sources[s];
-            let Some(row) = &source.row else { continue };
-            let unshot = reflected - source.shot;
+            if !self.has_way(s) {
+                continue;
+            }
+            let source = &self.sources[s];
+            let unshot = self.reflected(s) - source.shot;
             if unshot.abs().element_sum() * source.area > 0.5 * least {
-                source.shot = reflected;
-                self.arrived.add(row, unshot);
+                self.shoot(s);
             }
         }
     }
@@ -286,13 +379,13 @@ impl System {
         let mut through = Arrived::none(&self.targets);
         for source in &self.sources {
             if let Some(row) = &source.row {
-                through.add(row, source.shot);
+                through.add(row, source.shot + source.carried);
             }
         }
         let (mut shot, mut unshot, mut lost) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
         for s in 0..self.sources.len() {
             let source = &self.sources[s];
-            if source.row.is_some() {
+            if self.has_way(s) {
                 shot += source.shot * source.area;
                 unshot += (self.reflected(s) - source.shot) * source.area;
                 lost += (source.shot - through.reflected(&self.targets, s)) * source.area;
@@ -304,9 +397,11 @@ impl System {
         };
         let share = DVec3::new(share(0), share(1), share(2));
         self.arrived.add_scaled(&through, share);
-        for source in &mut self.sources {
-            if source.row.is_some() {
+        for s in 0..self.sources.len() {
+            if self.has_way(s) {
+                let source = &mut self.sources[s];
                 source.shot += source.shot * share;
+                source.carried += source.carried * share;
             }
         }
     }
@@ -319,7 +414,9 @@ impl System {
         {
             source.measured = reflected;
             source.unmeasured = DVec3::ZERO;
-            source.shot = sent;
+            if source.carrier.is_none() {
+                source.shot = sent - source.carried;
+            }
         }
     }
 

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 pub use bakes::Grid;
 pub use breakdown::{Breakdown, Part, Worst};
@@ -26,10 +26,10 @@ use crate::error::{Error, Result};
 use crate::scene::{Scene, displace};
 use crate::vk::Device;
 use bakes::Done;
-use peers::Job;
+use peers::{Job, SCRIPTS};
 
 /// A method that computes irradiance.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// A bake by the estimator of that name.
@@ -41,15 +41,21 @@ pub enum Method {
     PathTracer,
     /// Mitsuba 3, LLVM.
     Mitsuba,
+    /// A light map by Blender's Cycles, CPU.
+    Cycles,
+    /// The same denoised by OpenImageDenoise.
+    CyclesOidn,
 }
 
 impl Method {
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 7] = [
         Self::Receiver,
         Self::Pixel,
         Self::InstantRadiosity,
         Self::PathTracer,
         Self::Mitsuba,
+        Self::Cycles,
+        Self::CyclesOidn,
     ];
 
     /// Name in tables and plots.
@@ -60,6 +66,8 @@ impl Method {
             Self::InstantRadiosity => "instant radiosity",
             Self::PathTracer => "path tracer",
             Self::Mitsuba => "Mitsuba 3",
+            Self::Cycles => "Cycles",
+            Self::CyclesOidn => "Cycles, OIDN",
         }
     }
 
@@ -142,7 +150,7 @@ pub struct Options {
     pub grid: Grid,
     /// Most time of one measurement of another method; None leaves the others out.
     pub peers: Option<Duration>,
-    /// A Python interpreter that may have Mitsuba.
+    /// A Python interpreter that may have Mitsuba and Blender's `bpy`.
     pub python: PathBuf,
 }
 
@@ -261,8 +269,11 @@ pub fn run(
             println!("instant radiosity is left out: {why}");
         }
         job.path_tracer(&go_on, &mut add)?;
-        if let Some(why) = job.mitsuba(&options.python, &folder.join("mitsuba"), &mut add)? {
-            println!("Mitsuba 3 is left out: {why}");
+        for script in SCRIPTS.iter().filter(|_| go_on()) {
+            let into = folder.join("peers");
+            if let Some(why) = job.script(script, &options.python, &into, &mut add)? {
+                println!("{} is left out: {why}", script.name);
+            }
         }
         save(&rows, breakdown.as_ref())?;
     }

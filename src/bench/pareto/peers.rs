@@ -1,9 +1,9 @@
-//! The same irradiance by other methods: the path tracer, instant radiosity, and Mitsuba 3 where it
-//! is installed.
+//! The same irradiance by other methods: the path tracer, instant radiosity, and Mitsuba 3 and
+//! Blender's Cycles where they are installed.
 //!
 //! They compute the centroid of every element, as a bake does, and take the time that this takes;
 //! errors are compared at the reference's places. Between the centroids their light is linear as a
-//! bake's is.
+//! bake's is. Cycles bakes a light map instead, in which a centroid is looked up.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -31,9 +31,6 @@ const MOST_PATHS: u32 = 1 << 20;
 
 /// Seed, different from the reference's.
 const SEED: u64 = 0x5eed << 32;
-
-/// The script that runs Mitsuba.
-const MITSUBA: &str = include_str!("../../../tests/peers/mitsuba_irradiance.py");
 
 /// Input of the peers.
 pub(super) struct Job<'a> {
@@ -120,10 +117,11 @@ impl Job<'_> {
         }
     }
 
-    /// Mitsuba 3 in a separate process, which reads the scene from `folder`. Returns the reason in
-    /// one line where it cannot run.
-    pub fn mitsuba(
+    /// Mitsuba 3 or Blender's Cycles in a separate process, which reads the scene from `folder`.
+    /// Returns the reason in one line where it cannot run.
+    pub fn script(
         &self,
+        script: &Script,
         python: &Path,
         folder: &Path,
         mut add: impl FnMut(Row),
@@ -135,17 +133,17 @@ impl Job<'_> {
         if let Some(kind) = self.fine.lights.beyond_points() {
             return Ok(Some(format!("it knows no {kind}")));
         }
-        let ask = Ask::new(self);
+        if script.bakes && self.scene.materials.iter().any(|m| m.has_relief()) {
+            return Ok(Some("its script bakes no relief".into()));
+        }
+        let ask = Ask::new(self, script.bakes);
         let obj = write_scene(self.fine, folder)?.with_file_name("scene.obj");
-        let (script, job) = (
-            folder.join("mitsuba_irradiance.py"),
-            folder.join("job.json"),
-        );
-        write_atomically(&script, |out| out.write_all(MITSUBA.as_bytes()))?;
+        let (program, job) = (folder.join(script.file), folder.join("job.json"));
+        write_atomically(&program, |out| out.write_all(script.text.as_bytes()))?;
         let text = serde_json::to_string(&ask).map_err(|e| Error::file(&job, e.to_string()))?;
         write_atomically(&job, |out| out.write_all(text.as_bytes()))?;
         let run = Command::new(python)
-            .args([&script, &obj, &job])
+            .args([&program, &obj, &job])
             .stdin(Stdio::null())
             .output();
         let output = match run {
@@ -165,7 +163,8 @@ impl Job<'_> {
             if found.len() != self.scene.triangles.len() {
                 return Ok(Some("not one answer for each place".into()));
             }
-            add(self.row(Method::Mitsuba, answer.paths, answer.seconds, &found));
+            let method = answer.method.unwrap_or(Method::Mitsuba);
+            add(self.row(method, answer.paths, answer.seconds, &found));
         }
         let said = String::from_utf8_lossy(&output.stderr);
         let last = said.lines().rfind(|line| !line.trim().is_empty());
@@ -176,7 +175,34 @@ impl Job<'_> {
     }
 }
 
-/// Input of Mitsuba's script besides the mesh.
+/// A program of another renderer.
+pub(super) struct Script {
+    /// Of the renderer, in tables.
+    pub name: &'static str,
+    file: &'static str,
+    text: &'static str,
+    /// It bakes the triangles of the scene into a light map, whose texels take the place of
+    /// centroids.
+    bakes: bool,
+}
+
+/// What is measured if the interpreter has it.
+pub(super) const SCRIPTS: [Script; 2] = [
+    Script {
+        name: "Mitsuba 3",
+        file: "mitsuba_irradiance.py",
+        text: include_str!("../../../tests/peers/mitsuba_irradiance.py"),
+        bakes: false,
+    },
+    Script {
+        name: "Cycles",
+        file: "cycles_irradiance.py",
+        text: include_str!("../../../tests/peers/cycles_irradiance.py"),
+        bakes: true,
+    },
+];
+
+/// Input of a script besides the mesh.
 #[derive(Serialize)]
 struct Ask {
     materials: Vec<Surface>,
@@ -187,6 +213,13 @@ struct Ask {
     /// Numbers of paths to try while a trial takes no longer than `limit` seconds.
     paths: Vec<u32>,
     limit: f64,
+    /// Of a renderer that bakes: the corners and the material of each triangle, scene units.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    triangles: Vec<[[f64; 3]; 3]>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    material: Vec<u32>,
+    /// The light map is looked up as renderers do.
+    bilinear: bool,
 }
 
 #[derive(Serialize)]
@@ -202,18 +235,21 @@ struct Point {
     intensity: [f32; 3],
 }
 
-/// A line of the script's output.
+/// A line of a script's output.
 #[derive(Deserialize)]
 struct Answer {
+    /// None of one that has one method, Mitsuba's.
+    method: Option<Method>,
     paths: u32,
     seconds: f64,
     irradiance: Vec<[f32; 3]>,
 }
 
 impl Ask {
-    fn new(job: &Job<'_>) -> Self {
+    fn new(job: &Job<'_>, bakes: bool) -> Self {
         let places = (0..job.scene.triangles.len()).map(|e| place_of(job.scene, e));
         let (places, normals) = places.map(|(p, n)| (p.to_array(), n.to_array())).unzip();
+        let triangles: &[_] = if bakes { &job.scene.triangles } else { &[] };
         let paths = std::iter::successors(Some(FIRST_PATHS), |p| p.checked_mul(4));
         Self {
             materials: job
@@ -240,6 +276,11 @@ impl Ask {
             normals,
             paths: paths.take_while(|&p| p <= MOST_PATHS).collect(),
             limit: job.limit.as_secs_f64(),
+            triangles: (triangles.iter())
+                .map(|t| job.scene.corners(t).map(|corner| corner.to_array()))
+                .collect(),
+            material: triangles.iter().map(|t| t.material).collect(),
+            bilinear: true,
         }
     }
 }

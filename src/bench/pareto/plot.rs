@@ -47,6 +47,8 @@ fn colour(method: Method) -> RGBColor {
         Method::InstantRadiosity => RGBColor(35, 139, 69),
         Method::PathTracer => RGBColor(120, 120, 120),
         Method::Mitsuba => RGBColor(203, 24, 29),
+        Method::Cycles => RGBColor(252, 174, 145),
+        Method::CyclesOidn => RGBColor(241, 105, 19),
     }
 }
 

@@ -176,6 +176,30 @@ impl NearPairs {
         self.rows.factors.len() + self.relief_rows.factors.len()
     }
 
+    /// Share of the power of each source that elements receive part by part, `[source]`.
+    pub fn shares(&self, elements: &Elements, sources: &[Source]) -> Vec<f64> {
+        let mut of_part = vec![0.0; self.parts as usize];
+        let plain = elements.plain_count();
+        for (e, area) in elements.area.iter().enumerate() {
+            match e.checked_sub(plain) {
+                None => (self.entries.of(e).iter())
+                    .for_each(|of| of_part[of.part as usize] += area * f64::from(of.factor)),
+                Some(meso) => (self.relief_entries.of(meso).iter())
+                    .for_each(|of| of_part[of.part as usize] += area * f64::from(of.factor.z)),
+            }
+        }
+        let share = |(s, &first): (usize, &u32)| {
+            if first == NONE {
+                return 0.0;
+            }
+            // The source itself is listed for relief after its parts.
+            let first = first as usize;
+            let parts = &of_part[first..first + self.trees[s].part_count()];
+            (parts.iter().sum::<f64>() / sources[s].area).clamp(0.0, 1.0 - LEAST_FAR)
+        };
+        self.first_part.iter().enumerate().map(share).collect()
+    }
+
     /// Parts that elements receive, over all elements.
     pub fn entry_count(&self) -> usize {
         self.entries.list.len() + self.relief_entries.list.len()

@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 use super::parts::Part;
 use super::rays::{blocked, is_clear};
 use super::receivers::Receiver;
-use super::seen::{ABOVE, Before, Seen};
+use super::seen::{ABOVE, Before, ROUGH, Seen};
 use super::{Nearness, OfSource, Pair};
 use crate::math::form_factor::{sample_points, to_triangle};
 use crate::math::kept::{as_kept, direction_code, kept_direction};
@@ -41,6 +41,7 @@ impl Search<'_> {
         let reach =
             (source.area / (std::f64::consts::PI * self.nearness.source)).sqrt() + source.radius;
         let hull = seen.hull(source);
+        let curved = source.cone > 0.0;
         for block in receivers {
             let mut clear = None;
             let beside = source.radius + CLOSE * block.largest;
@@ -51,7 +52,7 @@ impl Search<'_> {
                 if self.may_be_near(e, source) {
                     let is_clear = || is_clear(self.occluders, &block.corners, &hull);
                     let clear = || *clear.get_or_insert_with(is_clear);
-                    self.pair(e, &seen, clear, &mut factors, &mut found);
+                    self.pair(e, &seen, clear, curved, &mut factors, &mut found);
                 }
             }
         }
@@ -91,6 +92,7 @@ impl Search<'_> {
         e: usize,
         seen: &Seen,
         clear: impl FnOnce() -> bool,
+        curved: bool,
         factors: &mut [f64],
         found: &mut OfSource,
     ) {
@@ -117,11 +119,20 @@ impl Search<'_> {
         let middle = [(centroid, 1.0)];
         // That of one beside a member may see nothing: across a thin gap a place sees no further
         // than the gap is wide.
-        if !is_beside
-            && (seen.is_less(centroid, normal, of_centroid)
-                || seen.note(whole, &before(&middle, false), factors) <= of_centroid)
-        {
-            return;
+        if !is_beside {
+            let rough = seen.roughly(centroid, normal);
+            if rough == 0.0 && !close && gap <= 0.0 && curved {
+                found.pairs.push(Pair {
+                    element: e as u32,
+                    factor: Vec3::ZERO,
+                    entries: 0,
+                });
+            }
+            if rough < ROUGH * of_centroid
+                || seen.note(whole, &before(&middle, false), factors) <= of_centroid
+            {
+                return;
+            }
         }
         let [a, b, c] = elements.triangle(e);
         let points = sample_points(close, is_beside);

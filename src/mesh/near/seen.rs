@@ -14,8 +14,8 @@ const AS_POINTS: f64 = 4.0;
 /// As [`AS_POINTS`], for a plane part where a form factor within [`ROUGH`] of the true one will do.
 const AS_ROUGH_POINTS: f64 = 2.0;
 
-/// Of a form factor, the least that [`Seen::is_less`] may take it for.
-const ROUGH: f64 = 0.7;
+/// Of a form factor, the least that [`Seen::roughly`] may take it for.
+pub(super) const ROUGH: f64 = 0.7;
 
 /// Sine of the largest angle between a part's axis and a member's normal, for a part that is not in
 /// one plane to count as a far.
@@ -132,9 +132,9 @@ impl Seen {
         self.factor_by(part, p, n, AS_POINTS)
     }
 
-    /// Whether the form factor from a place to the whole is surely less than `least`.
-    pub fn is_less(&self, p: DVec3, n: DVec3, least: f64) -> bool {
-        self.factor_by(self.tree.whole(), p, n, AS_ROUGH_POINTS) < ROUGH * least
+    /// The form factor from a place to the whole, at least [`ROUGH`] of it; 0 if it is none.
+    pub fn roughly(&self, p: DVec3, n: DVec3) -> f64 {
+        self.factor_by(self.tree.whole(), p, n, AS_ROUGH_POINTS)
     }
 
     fn factor_by(&self, part: Part, p: DVec3, n: DVec3, as_points: f64) -> f64 {

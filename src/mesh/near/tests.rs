@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec3, EulerRot};
 
 use super::parts::Part;
-use super::seen::{Before, Seen};
+use super::seen::{Before, ROUGH, Seen};
 use crate::math::form_factor::to_triangle;
 use crate::mesh::elements::Elements;
 use crate::mesh::sources::{self, Grouping};
@@ -71,7 +71,10 @@ fn near_factors_by_parts_are_those_by_members() {
                 clear: false,
             };
             let all = seen.note(seen.tree.whole(), &before, &mut factors);
-            assert!(!seen.is_less(p, n, all), "a rough form factor is too small");
+            assert!(
+                seen.roughly(p, n) >= ROUGH * all,
+                "a rough form factor is too small"
+            );
             let mut stack = vec![seen.tree.whole()];
             while let Some(part) = stack.pop() {
                 let factor = factors[part.index];

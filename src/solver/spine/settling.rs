@@ -32,7 +32,7 @@ impl Spine {
         let sum: DVec3 = brought.iter().sum();
         let mean = sum.max_element() / brought.len() as f64;
         let most = UNSETTLED * on.settings.residual * mean;
-        let sent = self.ledger.sent();
+        let sent = self.ledger.sent(on);
         self.near.solve(on, &brought, &sent, most);
         self.gathering.near(&self.near.send_to_relief(on, &sent))?;
         let moved = self.turn_near(on);
