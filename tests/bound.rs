@@ -74,7 +74,6 @@ fn holds(reflectances: &[f32], lights: &Lights) {
             let settings = Settings {
                 residual,
                 shots,
-                carries: false,
                 ..Settings::default()
             };
             solve(room(rho), lights, &settings)

@@ -176,6 +176,7 @@ fn a_thin_wall_keeps_rooms_apart() {
         // What one source carries for another stays in its room.
         let few = Settings {
             residual: 0.5,
+            carries: true,
             ..Settings::default()
         };
         for settings in [Settings::default(), few] {

@@ -1,16 +1,12 @@
 //! Presets of a bake's settings, from coarse and quick to fine and slow; `mesolux bench pareto`
 //! measures error against time.
 
-use crate::mesh::near::Nearness;
 use crate::mesh::sources::Grouping;
 use crate::solver::Settings;
 
 /// Quality of a bake.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Quality {
-    /// About 5 % off (rms), the soonest.
-    Preview,
-    /// About 1 % off.
     Draft,
     #[default]
     Normal,
@@ -19,33 +15,18 @@ pub enum Quality {
 }
 
 impl Quality {
-    pub const ALL: [Self; 5] = [
-        Self::Preview,
-        Self::Draft,
-        Self::Normal,
-        Self::High,
-        Self::Reference,
-    ];
+    pub const ALL: [Self; 4] = [Self::Draft, Self::Normal, Self::High, Self::Reference];
 
     /// The settings, all others at their defaults.
     pub fn settings(self) -> Settings {
         let (hemicube, scale, residual) = match self {
-            Self::Preview => (64, 8.0, 5e-1),
-            Self::Draft => (64, 4.0, 3e-2),
+            Self::Draft => (64, 4.0, 5e-2),
             Self::Normal => (128, 1.0, 1e-3),
             Self::High => (256, 1.0 / 16.0, 1e-4),
             Self::Reference => (512, 1.0 / 32.0, 1e-5),
         };
-        let nearness = match self {
-            Self::Preview => Nearness {
-                source: 1.0 / 5.0,
-                part: 1.0 / 8.0,
-            },
-            _ => Nearness::default(),
-        };
         Settings {
             hemicube,
-            nearness,
             residual,
             grouping: scaled(scale),
             ..Settings::default()

@@ -94,10 +94,10 @@ pub struct SolveOptions {
     /// light arrives; the report gives their sums either way
     #[arg(long)]
     no_normalise: bool,
-    /// Leave the light of sources that are not drawn missing, in place of letting the sources beside
-    /// them send it
+    /// Let the sources beside those that are not drawn send the light of these, in place of leaving
+    /// it missing; scenes with relief do without
     #[arg(long)]
-    no_carry: bool,
+    carry: bool,
     /// Stop after this many seconds
     #[arg(long, value_name = "SECONDS")]
     budget: Option<f64>,
@@ -141,7 +141,6 @@ enum TransportName {
 #[derive(Clone, Copy, ValueEnum, Serialize)]
 #[serde(rename_all = "lowercase")]
 enum QualityName {
-    Preview,
     Draft,
     Normal,
     High,
@@ -211,7 +210,6 @@ impl SolveOptions {
 
     pub fn settings(&self) -> Result<Settings> {
         let preset = match self.quality {
-            QualityName::Preview => Quality::Preview,
             QualityName::Draft => Quality::Draft,
             QualityName::Normal => Quality::Normal,
             QualityName::High => Quality::High,
@@ -228,7 +226,7 @@ impl SolveOptions {
             residual: self.residual.unwrap_or(preset.residual),
             grouping: self.grouping(preset.grouping)?,
             normalise: !self.no_normalise,
-            carries: !self.no_carry,
+            carries: self.carry,
             budget: self.budget()?,
             shots: self.shots,
             seed: self.seed,

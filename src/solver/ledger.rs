@@ -232,8 +232,8 @@ impl Ledger {
                 };
                 let nearest = carriers.iter().map(|&c| (apart(c), c));
                 let (_, source) = nearest.min_by(|a, b| a.0.total_cmp(&b.0))?;
-                let far = |s: usize| list[s].area * (1.0 - near[s]);
-                let share = far(s) / far(source);
+                // Its near elements receive it part by part.
+                let share = list[s].area * (1.0 - near[s]) / list[source].area;
                 Some((s, Carrier { source, share }))
             })
             .collect();
@@ -244,15 +244,16 @@ impl Ledger {
 
     /// What each source has sent to the elements through its row; none of one that sent nothing.
     pub fn sent(&self, on: &Problem) -> Vec<Option<Sent>> {
-        let sent = |drawn: &Drawn| {
+        let sent = |(s, drawn): (usize, &Drawn)| {
             Some(Sent {
                 emission: drawn.emission_gathered,
-                reflected: drawn.gathered,
+                // What its row carries for others is not of its own members.
+                reflected: drawn.gathered - self.system.carried(s),
                 // A source that was not drawn has sent nothing: its parts send all that they have.
-                scale: (drawn.scale.map(f64::from)).or(on.settings.carries.then_some(1.0))?,
+                scale: (drawn.scale.map(f64::from)).or(on.carries().then_some(1.0))?,
             })
         };
-        self.sources.iter().map(sent).collect()
+        self.sources.iter().enumerate().map(sent).collect()
     }
 
     /// What a source has to send through its row, which counts as sent from now on.
