@@ -124,11 +124,12 @@ fn check(rho: f32, emitted: f64, all: &Solved, stopped: &Solved) -> f64 {
 }
 
 /// Of the power that arrives in the end, what is missing where the light of undrawn sources is
-/// carried, at most. Measured where an eighth of the sources is drawn: −0.026, without −0.79.
-const MOST_MISSING: f64 = 0.05;
+/// carried, at most. Measured where 1/8, 1/4 and 1/2 of them are drawn: −0.003, −0.016, −0.011;
+/// without −0.79, −0.72, −0.57.
+const MOST_MISSING: f64 = 0.035;
 
-/// The light of sources that are not drawn is sent by those beside them: little is missing, and much
-/// less than without.
+/// The light of sources that are not drawn is sent by those beside them: little is missing, and
+/// much less than without.
 #[test]
 fn neighbours_carry_the_light_of_undrawn_sources() {
     let solve_to = |carries: bool, residual: f64, shots: Option<u32>| {

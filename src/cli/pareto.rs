@@ -68,8 +68,8 @@ pub struct Options {
     /// Leave out instant radiosity, the path tracer, Mitsuba and Cycles
     #[arg(long)]
     no_peers: bool,
-    /// The Python whose Mitsuba 3 and Blender (packages `mitsuba` and `bpy`) are measured, if it has
-    /// them; Mitsuba finds LLVM by DRJIT_LIBLLVM_PATH
+    /// The Python whose Mitsuba 3 and Blender (packages `mitsuba` and `bpy`) are measured, if it
+    /// has them; Mitsuba finds LLVM by DRJIT_LIBLLVM_PATH
     #[arg(long, value_name = "PYTHON", default_value = "python3")]
     python: PathBuf,
     #[command(flatten)]

@@ -21,7 +21,7 @@ pub(super) struct Ledger {
     /// `[source]`
     pub sources: Vec<Drawn>,
     pub bound: Bound,
-    /// See [`NearPairs::shares`].
+    /// See [`crate::mesh::near::NearPairs::shares`]; empty where nothing is carried.
     near_shares: Vec<f64>,
 }
 
@@ -102,7 +102,10 @@ impl Ledger {
             system,
             sources,
             bound,
-            near_shares: on.near.shares(&on.elements, list),
+            near_shares: match on.carries() {
+                true => on.near.shares(&on.elements, list),
+                false => Vec::new(),
+            },
         };
         (0..RESTORED_WEIGHINGS).for_each(|_| ledger.weigh(on));
         ledger
@@ -213,7 +216,7 @@ impl Ledger {
 
     /// Lets rows that are kept carry the light of sources without rows, see [`System::carry`]: each
     /// by the row of the source beside it that faces most as it does. Without that all that such
-    /// sources reflect is missing; with it, that light may arrive some place beside where it should.
+    /// sources reflect is missing; with it, that light may arrive beside where it should.
     pub fn carry(&mut self, on: &Problem) {
         let list = &on.sources.list;
         let plain = |s: usize| list[s].is_surface() && !self.sources[s].relief;
