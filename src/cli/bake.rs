@@ -94,10 +94,10 @@ pub struct SolveOptions {
     /// light arrives; the report gives their sums either way
     #[arg(long)]
     no_normalise: bool,
-    /// Let the sources beside those that are not drawn send the light of these, in place of leaving
-    /// it missing; scenes with relief do without
+    /// Leave the light of sources that are not drawn missing, in place of letting those beside them
+    /// send it
     #[arg(long)]
-    carry: bool,
+    no_carry: bool,
     /// Stop after this many seconds
     #[arg(long, value_name = "SECONDS")]
     budget: Option<f64>,
@@ -226,7 +226,7 @@ impl SolveOptions {
             residual: self.residual.unwrap_or(preset.residual),
             grouping: self.grouping(preset.grouping)?,
             normalise: !self.no_normalise,
-            carries: self.carry,
+            carries: !self.no_carry,
             budget: self.budget()?,
             shots: self.shots,
             seed: self.seed,

@@ -19,7 +19,7 @@ pub struct ReferenceOptions {
     /// paths so far.
     #[arg(long, conflicts_with_all = [
         "estimator", "quality", "hemicube", "residual", "source_elements", "source_area",
-        "source_power", "shots", "visibility_memory", "no_normalise", "carry", "directions", "transport",
+        "source_power", "shots", "visibility_memory", "no_normalise", "no_carry", "directions", "transport",
         "cache", "no_cache", "device", "validate",
     ])]
     pub reference: bool,

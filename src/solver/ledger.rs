@@ -102,7 +102,7 @@ impl Ledger {
             system,
             sources,
             bound,
-            near_shares: match on.carries() {
+            near_shares: match on.settings.carries {
                 true => on.near.shares(&on.elements, list),
                 false => Vec::new(),
             },
@@ -219,12 +219,14 @@ impl Ledger {
     /// sources reflect is missing; with it, that light may arrive beside where it should.
     pub fn carry(&mut self, on: &Problem) {
         let list = &on.sources.list;
-        let plain = |s: usize| list[s].is_surface() && !self.sources[s].relief;
-        let carries =
-            |&s: &usize| plain(s) && self.sources[s].row.is_some() && self.system.has_row(s);
-        let carriers: Vec<usize> = (0..list.len()).filter(carries).collect();
+        let has_rows = |s: usize| self.sources[s].row.is_some() && self.system.has_row(s);
+        let carries = |s: &usize| list[*s].is_surface() && has_rows(*s);
+        // Relief sends by direction: it carries for relief.
+        let (relief, plain): (Vec<usize>, Vec<usize>) = (0..list.len())
+            .filter(carries)
+            .partition(|&s| self.sources[s].relief);
         let is_dark = |s: usize| self.system.reflected(s) == DVec3::ZERO;
-        let waits = |&s: &usize| plain(s) && !self.system.is_drawn(s) && !is_dark(s);
+        let waits = |&s: &usize| list[s].is_surface() && !self.system.is_drawn(s) && !is_dark(s);
         let waiting: Vec<usize> = (0..list.len()).filter(waits).collect();
         let near = &self.near_shares;
         let found: Vec<_> = (waiting.par_iter())
@@ -232,6 +234,11 @@ impl Ledger {
                 let apart = |c: usize| {
                     let turned = 1.0 - list[s].normal.dot(list[c].normal);
                     list[s].centroid.distance_squared(list[c].centroid) + TURNED * turned
+                };
+                let carriers = if self.sources[s].relief {
+                    &relief
+                } else {
+                    &plain
                 };
                 let nearest = carriers.iter().map(|&c| (apart(c), c));
                 let (_, source) = nearest.min_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -253,7 +260,7 @@ impl Ledger {
                 // What its row carries for others is not of its own members.
                 reflected: drawn.gathered - self.system.carried(s),
                 // A source that was not drawn has sent nothing: its parts send all that they have.
-                scale: (drawn.scale.map(f64::from)).or(on.carries().then_some(1.0))?,
+                scale: (drawn.scale.map(f64::from)).or(on.settings.carries.then_some(1.0))?,
             })
         };
         self.sources.iter().enumerate().map(sent).collect()

@@ -179,11 +179,6 @@ impl Problem {
         Ok(moved)
     }
 
-    /// Whether light of undrawn sources is carried by others.
-    pub(super) fn carries(&self) -> bool {
-        self.settings.carries && self.relief.is_none()
-    }
-
     /// The scene's buffers on another device.
     pub(super) fn buffers(&self, device: &Arc<Device>) -> Result<SceneBuffers> {
         SceneBuffers::new(

@@ -60,7 +60,7 @@ pub struct Settings {
     /// Whether form factors in enclosed scenes are scaled so that all that is sent arrives.
     pub normalise: bool,
     /// Whether the sources beside those that are not drawn send the light of these; without it that
-    /// light is missing. Scenes with relief do without.
+    /// light is missing.
     pub carries: bool,
     pub culling: Culling,
     /// Draws connected elements of one plane as few triangles; see [`crate::mesh::occluders`]. The
@@ -96,7 +96,7 @@ impl Default for Settings {
             nearness: Nearness::default(),
             silhouettes: true,
             normalise: true,
-            carries: false,
+            carries: true,
             culling: Culling::default(),
             merging: true,
             batch: 16,

@@ -343,7 +343,7 @@ impl Spine {
     /// Lets rows carry what undrawn sources send, and solves.
     fn carry(&mut self, on: &Problem, report: &mut Report) {
         let start = Instant::now();
-        if on.carries() {
+        if on.settings.carries {
             self.ledger.carry(on);
         }
         report.seconds.solve += start.elapsed().as_secs_f64();
