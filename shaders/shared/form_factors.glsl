@@ -30,7 +30,8 @@ layout(constant_id = 0) const uint KIND = RECEIVE_OUTLINE;
 layout(binding = 7) uniform usamplerBuffer contours;
 // TRIANGLE_TEXELS an element.
 layout(binding = 8) uniform usamplerBuffer triangles;
-// Of curved sources: centroid and sum of area times normal, two words unused; PART_TEXELS a part.
+// Of curved sources, PART_TEXELS a part: centroid, sum of area times normal, radius of the ball
+// about the centroid; how many members it has, and these.
 layout(binding = 9) uniform usamplerBuffer parts;
 // 1 where any element of a block of GROUP sees the source, [slot][block]. A batch
 // begins with zeros.
@@ -41,7 +42,8 @@ layout(scalar, binding = 11) writeonly buffer Fresh { FLUX fresh[]; };
 layout(scalar, binding = 12) readonly buffer MesoElements { MesoElement meso_elements[]; };
 #endif
 
-const uint PART_TEXELS = 2;
+const uint PART_TEXELS = 4;
+const float INV_PI = 0.318309886;
 const uint TRIANGLE_TEXELS = 4;
 
 Triangle load_triangle(uint index) {
@@ -105,34 +107,54 @@ FLUX parts_as_points(vec3 p, vec3 n, Source s) {
         float square = dot(way, way);
         sum += flux_above(flux(way, n), n) * (max(-dot(vector_area, way), 0.0) / (square * square));
     }
-    return sum * 0.318309886;
+    return sum * INV_PI;
 }
 
-// Of the members that show p their fronts, exactly.
-FLUX members(vec3 p, vec3 n, uint element, Source s) {
+// A part of a curved source is a point from so many of its radii off, for receivers beside others of
+// its parts.
+const float NEAR_POINT_DISTANCE = 4.0;
+
+// Of a member: nothing where it does not show p its front.
+FLUX member(vec3 p, vec3 n, uint index, bool shows) {
+    Triangle t = load_triangle(index);
+    vec3 a = t.a - p;
+    vec3 b = t.b - p;
+    vec3 c = t.c - p;
+    Contour contour = contour_begin();
+    contour_edge(contour, a, b, n);
+    contour_edge(contour, b, c, n);
+    contour_edge(contour, c, a, n);
+    contour_close(contour, n);
+    return shows ? flux_above(contour_form_factor(contour), n) : FLUX(0.0);
+}
+
+// Of the parts that show p their fronts: those far off as points, of the others each member exactly.
+FLUX parts_or_members(vec3 p, vec3 n, uint element, Source s) {
     FLUX sum = FLUX(0.0);
-    uint member = s.first_element;
-    uint end = member + s.element_count;
-    while (member < end) {
-        // On to the next one that shows its front to any lane, in a loop of its own: a software
-        // device works through what a branch leaves out.
-        bool shows;
-        do {
-            float height = fetch(triangles, TRIANGLE_TEXELS * member + 1).w;
-            vec3 normal = fetch(triangles, TRIANGLE_TEXELS * member + 3).xyz;
-            shows = member != element && dot(normal, p) > height;
-            member++;
-        } while (subgroupBallot(shows) == uvec4(0) && member < end);
-        Triangle t = load_triangle(member - 1);
-        vec3 a = t.a - p;
-        vec3 b = t.b - p;
-        vec3 c = t.c - p;
-        Contour contour = contour_begin();
-        contour_edge(contour, a, b, n);
-        contour_edge(contour, b, c, n);
-        contour_edge(contour, c, a, n);
-        contour_close(contour, n);
-        sum += shows ? flux_above(contour_form_factor(contour), n) : FLUX(0.0);
+    for (uint i = 0; i < s.part_count; i++) {
+        uint at = PART_TEXELS * (s.first_part + i);
+        vec4 low = fetch(parts, at);
+        uvec4 high = fetch_words(parts, at + 1);
+        vec3 way = low.xyz - p;
+        vec3 vector_area = vec3(low.w, uintBitsToFloat(high.xy));
+        float square = dot(way, way);
+        float least = NEAR_POINT_DISTANCE * uintBitsToFloat(high.z);
+        bool far = square > least * least;
+        float facing = max(-dot(vector_area, way), 0.0);
+        sum += far ? flux_above(flux(way, n), n) * (INV_PI * facing / (square * square)) : FLUX(0.0);
+        // A software device works through what a branch leaves out.
+        if (subgroupBallot(!far) == uvec4(0)) {
+            continue;
+        }
+        for (uint k = 0; k < high.w; k++) {
+            uint index = fetch_words(parts, at + 2 + k / 4)[k % 4];
+            float height = fetch(triangles, TRIANGLE_TEXELS * index + 1).w;
+            vec3 normal = fetch(triangles, TRIANGLE_TEXELS * index + 3).xyz;
+            bool shows = !far && index != element && dot(normal, p) > height;
+            if (subgroupBallot(shows) != uvec4(0)) {
+                sum += member(p, n, index, shows);
+            }
+        }
     }
     return sum;
 }
@@ -165,8 +187,8 @@ FLUX form_factor(vec3 p, vec3 n, uint element, Source s) {
         f = outline(p, n, s);
     }
     if (subgroupAny(!whole)) {
-        FLUX by_member = members(p, n, element, s);
-        f = whole ? f : by_member;
+        FLUX by_parts = parts_or_members(p, n, element, s);
+        f = whole ? f : by_parts;
     }
     return f;
 }
@@ -221,17 +243,20 @@ FLUX mean_form_factor(uint element, vec4 ball, vec3 n, Source s) {
     }
     float gap = length(ball.xyz - s.middle) - s.radius;
     bool near = gap <= NEAR * ball.w;
-    bool touching = gap <= ball.w;
-    uint first = touching ? 4 : near ? 1 : 0;
-    uint count = touching ? 7 : near ? 3 : 1;
-    uint most = subgroupBallot(touching) != uvec4(0) ? 7 : subgroupBallot(near) != uvec4(0) ? 3 : 1;
+    // What sees much of a curved source receives it part by part instead: within its ball, but off
+    // its members, one place will do.
+    bool several = near && s.cone_sin == 0.0;
+    bool touching = several && gap <= ball.w;
+    uint first = touching ? 4 : several ? 1 : 0;
+    uint count = touching ? 7 : several ? 3 : 1;
+    uint most = subgroupBallot(touching) != uvec4(0) ? 7 : subgroupBallot(several) != uvec4(0) ? 3 : 1;
     vec3 a = own_corner(element, 0);
     vec3 ab = own_corner(element, 1) - a;
     vec3 ac = own_corner(element, 2) - a;
     FLUX sum = FLUX(0.0);
     for (uint i = 0; i < most; i++) {
         vec3 point = POINTS[min(first + i, 10)];
-        vec3 p = before_plane(near ? a + point.x * ab + point.y * ac : ball.xyz, n, s);
+        vec3 p = before_plane(several ? a + point.x * ab + point.y * ac : ball.xyz, n, s);
         bool mine = i < count && shows_front(s, p);
         bool open = visible(p, n, element, s, mine && near);
         // What is not near was looked at when it was sorted.

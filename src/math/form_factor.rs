@@ -1,7 +1,7 @@
 //! Lambert's formula: form factor from a point to a polygon, clipped to the receiver's horizon.
 //! Pure mathematics in f64; `shaders/shared/lambert.glsl` is the same in f32.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
 
@@ -53,13 +53,38 @@ pub fn vector_to_triangle(p: DVec3, n: DVec3, triangle: &[DVec3; 3]) -> DVec3 {
     for i in 0..count {
         let (a, b) = (clipped[i], clipped[if i + 1 < count { i + 1 } else { 0 }]);
         let normal = a.cross(b);
+        let lengths = (a.length_squared() * b.length_squared()).sqrt();
         let length = normal.length();
         if length > 0.0 {
-            sum += normal * (length.atan2(a.dot(b)) / length);
+            let over_sine = angle_over_sine(a.dot(b) / lengths, lengths / length);
+            sum += normal * (over_sine / lengths);
         }
     }
     -sum / TAU
 }
+
+/// θ / sin θ for the angle θ of which `x` is the cosine and `over_sine` is 1 / sin θ, within
+/// 3·10⁻⁷: `shaders/shared/lambert.glsl` is the same.
+fn angle_over_sine(x: f64, over_sine: f64) -> f64 {
+    let of_acute = ACUTE.iter().fold(0.0, |sum, c| sum * x.abs() + c);
+    match x >= 0.0 {
+        true => of_acute,
+        false => PI * over_sine - of_acute,
+    }
+}
+
+/// Coefficients of θ / sin θ for cosines from 0 to 1, highest power first.
+const ACUTE: [f64; 9] = [
+    1.7478988e-2,
+    -9.7265430e-2,
+    2.5208697e-1,
+    -4.2358306e-1,
+    5.5655622e-1,
+    -6.6096932e-1,
+    7.8488100e-1,
+    -9.9998152e-1,
+    1.5707963,
+];
 
 /// Sample points of a triangle (two barycentric coordinates, weight), by how close what it sees is:
 /// the centroid; degree 2; Radon's degree 5. `shaders/shared/form_factors.glsl` has the same.

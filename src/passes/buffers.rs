@@ -15,7 +15,7 @@ use crate::mesh::elements::Elements;
 use crate::mesh::meshlets;
 use crate::mesh::near::{NearPairs, Rows};
 use crate::mesh::occluders::Occluders;
-use crate::mesh::sources::{self, SourcePlace, Sources};
+use crate::mesh::sources::{self, PART_MEMBERS, SourcePlace, Sources};
 use crate::vk::{Buffer, BufferUse, Commands, Device, Stage};
 
 /// The scene in internal units: read by the passes, never written.
@@ -34,7 +34,8 @@ pub struct SceneBuffers {
     /// The element that each is drawn as.
     pub occluder_items: Buffer,
     pub triangles: Buffer,
-    /// Of curved sources: centroid and sum of area times normal, eight words a part.
+    /// Of curved sources, [`PART_WORDS`] a part: centroid, sum of area times normal, radius; how
+    /// many members it has, and these.
     pub parts: Buffer,
     /// Normal and n · x.
     pub planes: Buffer,
@@ -216,12 +217,15 @@ fn triangles(elements: &Elements, planes: &[[f32; 4]]) -> Vec<Triangle> {
         .collect()
 }
 
+/// Words of a part in [`SceneBuffers::parts`], whole texels.
+const PART_WORDS: usize = (8 + PART_MEMBERS).next_multiple_of(4);
+
 /// Sources with what they refer to in the buffers of all.
 struct Outlined {
     list: Vec<Source>,
     contours: Vec<[f32; 4]>,
-    /// Centroid and sum of area times normal, eight words a part.
-    parts: Vec<[f32; 8]>,
+    /// See [`SceneBuffers::parts`].
+    parts: Vec<[f32; PART_WORDS]>,
     /// Of beams, `[row][column]` of each, to whole texels.
     webs: Vec<f32>,
 }
@@ -251,7 +255,22 @@ impl Outlined {
             outlined.parts.extend(source.parts.iter().map(|part| {
                 let [x, y, z] = part.centroid.as_vec3().to_array();
                 let [u, v, w] = part.vector_area.as_vec3().to_array();
-                [x, y, z, u, v, w, 0.0, 0.0]
+                let mut words = [0.0; PART_WORDS];
+                let count = part.members.len() as u32;
+                words[..8].copy_from_slice(&[
+                    x,
+                    y,
+                    z,
+                    u,
+                    v,
+                    w,
+                    part.radius as f32,
+                    f32::from_bits(count),
+                ]);
+                for (word, &member) in words[8..].iter_mut().zip(&part.members) {
+                    *word = f32::from_bits(member);
+                }
+                words
             }));
         }
         let texels = outlined.webs.len().div_ceil(4);

@@ -17,7 +17,8 @@ const REACH: f64 = 1.5;
 const SMOOTH: f64 = 0.35;
 
 /// Mean over an element of form factor times visibility: irradiance from a unit of the source's
-/// radiosity. `seen` says whether the source sees a place.
+/// radiosity. `seen` says whether the source sees a place. What sees much of a curved source
+/// receives it part by part instead, so that the centroid stands for an element beside one.
 pub fn gather(
     elements: &Elements,
     source: &Source,
@@ -31,7 +32,8 @@ pub fn gather(
     if gap > 4.0 * size && lies_in_plane(centroid, elements.normal[element], source) {
         return 0.0;
     }
-    let points = sample_points(gap <= 4.0 * size, gap <= size);
+    let plane = source.cone == 0.0;
+    let points = sample_points(plane && gap <= 4.0 * size, plane && gap <= size);
     points
         .iter()
         .map(|&[u, v, weight]| {

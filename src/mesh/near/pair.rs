@@ -79,8 +79,17 @@ impl Search<'_> {
         let cosine = (way.dot(n) + source.radius) / distance;
         let facing = match plane {
             true => (-way.dot(source.normal) + source.radius) / distance,
-            false => 1.0,
+            // Of the member that is turned to the element most.
+            false => {
+                let angle = (-way.dot(source.normal) / distance).clamp(-1.0, 1.0).acos();
+                (angle - source.cone - (source.radius / distance).asin())
+                    .max(0.0)
+                    .cos()
+            }
         };
+        if facing <= 0.0 {
+            return false;
+        }
         let most = cosine.min(1.0) * facing.min(1.0) * source.area;
         most > self.nearness.source * std::f64::consts::PI * gap * gap
     }
@@ -117,9 +126,21 @@ impl Search<'_> {
             clear,
         };
         let middle = [(centroid, 1.0)];
-        // That of one beside a member may see nothing: across a thin gap a place sees no further
-        // than the gap is wide.
-        if !is_beside {
+        let [a, b, c] = elements.triangle(e);
+        let place = |&[u, v, weight]: &[f64; 3]| (a + u * (b - a) + v * (c - a), weight);
+        // The centroid of one beside a member may see nothing: across a thin gap a place sees no
+        // further than the gap is wide.
+        if is_beside {
+            let roughly = |(p, weight)| weight * seen.roughly(p, normal);
+            let rough: f64 = sample_points(true, false)
+                .iter()
+                .map(place)
+                .map(roughly)
+                .sum();
+            if rough < ROUGH * 0.5 * least {
+                return;
+            }
+        } else {
             let rough = seen.roughly(centroid, normal);
             if rough == 0.0 && !close && gap <= 0.0 && curved {
                 found.pairs.push(Pair {
@@ -134,11 +155,10 @@ impl Search<'_> {
                 return;
             }
         }
-        let [a, b, c] = elements.triangle(e);
         let points = sample_points(close, is_beside);
         let mut samples = [(centroid, 1.0); 7];
-        for (sample, &[u, v, weight]) in samples.iter_mut().zip(points) {
-            *sample = (a + u * (b - a) + v * (c - a), weight);
+        for (sample, point) in samples.iter_mut().zip(points) {
+            *sample = place(point);
         }
         let before = before(&samples[..points.len()], clear());
         if close && seen.note(whole, &before, factors) <= least {

@@ -3,16 +3,21 @@
 use glam::DVec3;
 
 use super::parts::{Part, PartTree};
-use crate::math::form_factor::vector_to_triangle;
+use crate::math::form_factor::{to_triangle, vector_to_triangle};
 use crate::mesh::elements::Elements;
 use crate::mesh::sources::Source;
 
 /// A part further off than this many of its radii, and wholly above the receiver's horizon, counts
 /// as four points with its moments of area up to the second.
-const AS_POINTS: f64 = 4.0;
+const AS_POINTS: f64 = 3.0;
 
-/// As [`AS_POINTS`], for a plane part where a form factor within [`ROUGH`] of the true one will do.
-const AS_ROUGH_POINTS: f64 = 2.0;
+/// A part further off than this many of its radii counts as one point where a form factor within
+/// [`ROUGH`] of the true one will do.
+const AS_ROUGH_POINT: f64 = 2.5;
+
+/// Of a part that crosses a horizon: the share of its height above the lowest it may have that
+/// counts as its height, at least.
+const CROSSES: f64 = 0.1;
 
 /// Of a form factor, the least that [`Seen::roughly`] may take it for.
 pub(super) const ROUGH: f64 = 0.7;
@@ -20,6 +25,9 @@ pub(super) const ROUGH: f64 = 0.7;
 /// Sine of the largest angle between a part's axis and a member's normal, for a part that is not in
 /// one plane to count as a far.
 const NARROW: f64 = 0.1;
+
+/// As [`NARROW`], where a form factor within [`ROUGH`] of the true one will do.
+const NARROW_ROUGHLY: f64 = 0.7;
 
 /// Height above a plane from which on a place sees its front, internal units.
 pub(super) const ABOVE: f64 = 1e-7;
@@ -64,10 +72,9 @@ struct Far {
     vector_area: DVec3,
     /// The four points `centre` ± a ± b have the second moments of its area.
     spread: [DVec3; 2],
-    /// Sine of the angle above the plane across the axis from which on a place sees the front of
-    /// every member, at [`AS_POINTS`] radii; 0 of a part in one plane, and more than 1 of one that
-    /// is not narrow.
-    front: f64,
+    /// Sine of the largest angle between the axis and a member's normal; 0 of a part in one plane,
+    /// and more than 1 of one that turns further than a right angle.
+    turned: f64,
 }
 
 impl Seen {
@@ -102,7 +109,7 @@ impl Seen {
     pub fn note(&self, part: Part, before: &Before, factors: &mut [f64]) -> f64 {
         let (far, n) = (&self.far[part.index], before.normal);
         let add = |sum: f64, &(p, weight): &(DVec3, f64)| {
-            let factor = far.vector(p, n, AS_POINTS)?.dot(n).max(0.0);
+            let factor = far.vector(p, n)?.dot(n).max(0.0);
             Some(sum + weight * factor)
         };
         let as_far = before.samples.iter().try_fold(0.0, add);
@@ -129,31 +136,39 @@ impl Seen {
 
     /// Form factor from a place to a part, as if nothing stood between.
     pub fn factor(&self, part: Part, p: DVec3, n: DVec3) -> f64 {
-        self.factor_by(part, p, n, AS_POINTS)
-    }
-
-    /// The form factor from a place to the whole, at least [`ROUGH`] of it; 0 if it is none.
-    pub fn roughly(&self, p: DVec3, n: DVec3) -> f64 {
-        self.factor_by(self.tree.whole(), p, n, AS_ROUGH_POINTS)
-    }
-
-    fn factor_by(&self, part: Part, p: DVec3, n: DVec3, as_points: f64) -> f64 {
-        match (self.far[part.index].vector(p, n, as_points), part.count) {
+        match (self.far[part.index].vector(p, n), part.count) {
             (Some(vector), _) => vector.dot(n).max(0.0),
-            (None, 1) => {
-                let triangle = &self.triangles[part.first];
-                vector_to_triangle(p, n, triangle).dot(n).max(0.0)
-            }
+            (None, 1) => self.of_member(part.first, p, n),
             (None, _) => {
                 let [one, other] = part.halves();
-                self.factor_by(one, p, n, as_points) + self.factor_by(other, p, n, as_points)
+                self.factor(one, p, n) + self.factor(other, p, n)
             }
         }
     }
 
+    /// The form factor from a place to the whole, at least [`ROUGH`] of it; 0 if it is none.
+    pub fn roughly(&self, p: DVec3, n: DVec3) -> f64 {
+        self.part_roughly(self.tree.whole(), p, n)
+    }
+
+    fn part_roughly(&self, part: Part, p: DVec3, n: DVec3) -> f64 {
+        match (self.far[part.index].roughly(p, n), part.count) {
+            (Some(factor), _) => factor,
+            (None, 1) => self.of_member(part.first, p, n),
+            (None, _) => {
+                let [one, other] = part.halves();
+                self.part_roughly(one, p, n) + self.part_roughly(other, p, n)
+            }
+        }
+    }
+
+    fn of_member(&self, member: usize, p: DVec3, n: DVec3) -> f64 {
+        to_triangle(p, n, &self.triangles[member]).max(0.0)
+    }
+
     /// [`Self::factor`] as a vector; see [`vector_to_triangle`].
     pub fn vector(&self, part: Part, p: DVec3, n: DVec3) -> DVec3 {
-        match (self.far[part.index].vector(p, n, AS_POINTS), part.count) {
+        match (self.far[part.index].vector(p, n), part.count) {
             (Some(vector), _) => vector,
             (None, 1) => vector_to_triangle(p, n, &self.triangles[part.first]),
             (None, _) => (part.halves().into_iter())
@@ -226,7 +241,7 @@ impl Far {
             area,
             vector_area: area * normal,
             spread: spread(normal, triangle.map(|v| (v - centre) / 12_f64.sqrt())),
-            front: 0.0,
+            turned: 0.0,
         }
     }
 
@@ -254,28 +269,30 @@ impl Far {
             area,
             vector_area,
             spread,
-            front: match plane {
+            turned: match plane {
                 true => 0.0,
-                false if cosine <= 0.0 || sine > NARROW => 2.0,
-                false => sine * (1.0 - AS_POINTS.powi(-2)).sqrt() + cosine / AS_POINTS,
+                false if cosine <= 0.0 => 2.0,
+                false => sine,
             },
         }
     }
 
     /// Form factor as a vector from a place with this normal; none where the part does not count as
-    /// points. One in a plane does from `as_points` radii on.
-    fn vector(&self, p: DVec3, n: DVec3, as_points: f64) -> Option<DVec3> {
+    /// points.
+    fn vector(&self, p: DVec3, n: DVec3) -> Option<DVec3> {
         let way = self.centre - p;
         let facing = -way.dot(self.vector_area);
-        let is_plane = self.front == 0.0;
+        let is_plane = self.turned == 0.0;
         if self.is_above(p, -n) || is_plane && facing <= ABOVE * self.area {
             return Some(DVec3::ZERO);
         }
         let square = way.length_squared();
-        let least = self.radius * if is_plane { as_points } else { AS_POINTS };
-        let is_far = square > least * least;
-        let turned = self.front * self.area;
-        if !is_far || !is_plane && facing * facing <= turned * turned * square {
+        let least = AS_POINTS * self.radius;
+        if square <= least * least || self.turned > NARROW {
+            return None;
+        }
+        let front = front(self.turned, 1.0 / AS_POINTS) * self.area;
+        if !is_plane && facing * facing <= front * front * square {
             return None;
         }
         if facing <= 0.0 {
@@ -288,11 +305,46 @@ impl Far {
         (self.is_above(p, n)).then(|| share * points.iter().map(of).sum::<DVec3>())
     }
 
+    /// About the form factor from a place, rather too large than too small; none where the part does
+    /// not count as a point.
+    fn roughly(&self, p: DVec3, n: DVec3) -> Option<f64> {
+        let way = self.centre - p;
+        let facing = -way.dot(self.vector_area);
+        let is_plane = self.turned == 0.0;
+        if self.is_above(p, -n) || is_plane && facing <= ABOVE * self.area {
+            return Some(0.0);
+        }
+        let square = way.length_squared();
+        let least = AS_ROUGH_POINT * self.radius;
+        if square <= least * least || self.turned > NARROW_ROUGHLY {
+            return None;
+        }
+        // Of a part that crosses a horizon, its own or the place's, something is seen.
+        let above = |height: f64, most: f64| height.max(CROSSES * (height + most)).max(0.0);
+        let facing = match is_plane {
+            true => facing,
+            false => {
+                let front = front(self.turned, 1.0 / AS_ROUGH_POINT);
+                above(facing, front * self.area * square.sqrt())
+            }
+        };
+        let height = above(way.dot(n), self.radius);
+        Some(facing * height / (std::f64::consts::PI * square * square))
+    }
+
     /// Whether all of it lies above the horizon of a place with this normal.
     fn is_above(&self, p: DVec3, n: DVec3) -> bool {
         let lowest = DVec3::select(n.cmpgt(DVec3::ZERO), self.low, self.high);
         (lowest - p).dot(n) >= -ABOVE
     }
+}
+
+/// Sine of the angle above the plane across a part's axis from which on a place sees the front of
+/// every member: the sum of two angles, of which these are the sines: of the part's normals, and
+/// under which its radius is seen.
+fn front(turned: f64, radius: f64) -> f64 {
+    let cosine = |sine: f64| (1.0 - sine * sine).sqrt();
+    turned * cosine(radius) + cosine(turned) * radius
 }
 
 fn centroid(triangle: &[DVec3; 3]) -> DVec3 {

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{Part, Source};
+use super::{PART_MEMBERS, Part, Source};
 use crate::constants::KIND_SURFACE;
 use crate::mesh::charts::Connections;
 use crate::mesh::contour::contour;
@@ -136,14 +136,11 @@ pub(super) fn group(
     }
 }
 
-/// Most members of a part.
-const PART: usize = 6;
-
 fn parts(elements: &Elements, range: std::ops::Range<usize>) -> Vec<Part> {
     let mut parts = Vec::new();
     let mut stack = vec![range.map(|e| e as u32).collect::<Vec<_>>()];
     while let Some(mut members) = stack.pop() {
-        if members.len() > PART {
+        if members.len() > PART_MEMBERS {
             let at = bisect(elements, &mut members);
             stack.push(members.split_off(at));
             stack.push(members);
@@ -161,6 +158,7 @@ fn parts(elements: &Elements, range: std::ops::Range<usize>) -> Vec<Part> {
             centroid,
             vector_area: weigh(&elements.normal),
             radius: corners.map(|v| v.distance(centroid)).fold(0.0, f64::max),
+            members,
         });
     }
     parts

@@ -120,14 +120,19 @@ pub struct SourcePlace {
     pub normal: DVec3,
 }
 
+/// Most members of a part.
+pub const PART_MEMBERS: usize = 6;
+
 /// A few members of a curved source.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Part {
     pub centroid: DVec3,
     /// Sum of area times normal.
     pub vector_area: DVec3,
     /// Radius of the ball about `centroid` that holds the part.
     pub radius: f64,
+    /// Elements, [`PART_MEMBERS`] at most.
+    pub members: Vec<u32>,
 }
 
 impl Source {
