@@ -74,6 +74,8 @@ fn holds(reflectances: &[f32], lights: &Lights) {
             let settings = Settings {
                 residual,
                 shots,
+                // What is carried is not missing.
+                carries: false,
                 ..Settings::default()
             };
             solve(room(rho), lights, &settings)

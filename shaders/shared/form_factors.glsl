@@ -112,7 +112,7 @@ FLUX parts_as_points(vec3 p, vec3 n, Source s) {
 
 // A part of a curved source is a point from so many of its radii off, for receivers beside others of
 // its parts.
-const float NEAR_POINT_DISTANCE = 4.0;
+const float NEAR_POINT_DISTANCE = 9.0;
 
 // Of a member: nothing where it does not show p its front.
 FLUX member(vec3 p, vec3 n, uint index, bool shows) {

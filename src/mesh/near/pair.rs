@@ -132,7 +132,7 @@ impl Search<'_> {
         // further than the gap is wide.
         if is_beside {
             let roughly = |(p, weight)| weight * seen.roughly(p, normal);
-            let rough: f64 = sample_points(true, false)
+            let rough: f64 = sample_points(true, true)
                 .iter()
                 .map(place)
                 .map(roughly)

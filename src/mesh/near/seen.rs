@@ -17,10 +17,10 @@ const AS_ROUGH_POINT: f64 = 2.5;
 
 /// Of a part that crosses a horizon: the share of its height above the lowest it may have that
 /// counts as its height, at least.
-const CROSSES: f64 = 0.1;
+const CROSSES: f64 = 0.15;
 
 /// Of a form factor, the least that [`Seen::roughly`] may take it for.
-pub(super) const ROUGH: f64 = 0.7;
+pub(super) const ROUGH: f64 = 0.4;
 
 /// Sine of the largest angle between a part's axis and a member's normal, for a part that is not in
 /// one plane to count as a far.
