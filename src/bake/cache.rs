@@ -31,6 +31,7 @@ impl CachedBake {
             estimator,
             hemicube,
             emitter_hemicube: _,
+            emitter_places,
             residual,
             // A bake that this stopped is not kept.
             budget: _,
@@ -53,7 +54,7 @@ impl CachedBake {
         let emitter_shadows = settings.emitter_shadows();
         let scene_hash = scene.hash();
         let key = format!(
-            "bake cache 7, layout {VERSION}\n{maker}\n{scene_hash}\n{estimator:?} {hemicube} {emitter_shadows:?} {residual:?} {shots:?} {seed} \
+            "bake cache 8, layout {VERSION}\n{maker}\n{scene_hash}\n{estimator:?} {hemicube} {emitter_shadows:?} {emitter_places} {residual:?} {shots:?} {seed} \
              {grouping:?} {nearness:?} {silhouettes} {normalise} {carries} {culling:?} {merging} {batch} {visibility_memory:?} {coupling_memory} {:?} {:?}",
             relief.transport, relief.directions
         );

@@ -1,12 +1,16 @@
 //! Presets of a bake's settings, from coarse and quick to fine and slow; `mesolux bench pareto`
 //! measures error against time.
 
+use crate::mesh::near::Nearness;
 use crate::mesh::sources::Grouping;
 use crate::solver::Settings;
 
 /// Quality of a bake.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Quality {
+    /// Light to look at while a scene is made.
+    Preview,
+    /// About 1 % in the Cornell box.
     Draft,
     #[default]
     Normal,
@@ -15,21 +19,41 @@ pub enum Quality {
 }
 
 impl Quality {
-    pub const ALL: [Self; 4] = [Self::Draft, Self::Normal, Self::High, Self::Reference];
+    pub const ALL: [Self; 5] = [
+        Self::Preview,
+        Self::Draft,
+        Self::Normal,
+        Self::High,
+        Self::Reference,
+    ];
 
     /// The settings, all others at their defaults.
     pub fn settings(self) -> Settings {
         let (hemicube, scale, residual) = match self {
-            Self::Draft => (64, 4.0, 5e-2),
+            Self::Preview => (64, 8.0, 0.5),
+            Self::Draft => (64, 4.0, 2.5e-2),
             Self::Normal => (128, 1.0, 1e-3),
             Self::High => (256, 1.0 / 16.0, 1e-4),
             Self::Reference => (512, 1.0 / 32.0, 1e-5),
         };
+        let plain = Settings::default();
         Settings {
             hemicube,
+            emitter_places: match self {
+                Self::Preview => 16,
+                Self::Draft => 32,
+                _ => plain.emitter_places,
+            },
+            nearness: match self {
+                Self::Preview => Nearness {
+                    source: 1.0 / 5.0,
+                    part: 1.0 / 8.0,
+                },
+                _ => plain.nearness,
+            },
             residual,
             grouping: scaled(scale),
-            ..Settings::default()
+            ..plain
         }
     }
 }
@@ -65,6 +89,8 @@ mod tests {
             assert!(better.hemicube >= worse.hemicube && better.residual <= worse.residual);
             assert!(b.max_elements <= a.max_elements && b.max_area <= a.max_area);
             assert!(b.max_power <= a.max_power);
+            assert!(better.emitter_places >= worse.emitter_places);
+            assert!(better.nearness.source <= worse.nearness.source);
         }
     }
 }

@@ -141,6 +141,7 @@ enum TransportName {
 #[derive(Clone, Copy, ValueEnum, Serialize)]
 #[serde(rename_all = "lowercase")]
 enum QualityName {
+    Preview,
     Draft,
     Normal,
     High,
@@ -210,6 +211,7 @@ impl SolveOptions {
 
     pub fn settings(&self) -> Result<Settings> {
         let preset = match self.quality {
+            QualityName::Preview => Quality::Preview,
             QualityName::Draft => Quality::Draft,
             QualityName::Normal => Quality::Normal,
             QualityName::High => Quality::High,

@@ -19,7 +19,6 @@ use super::shaders::{
 use super::types::ReceiverList;
 use crate::constants::{
     RECEIVE_CROSSED, RECEIVE_DOUBTFUL, RECEIVE_KINDS, RECEIVE_LISTS, SORT_ELEMENTS, SORT_SLOTS,
-    SOURCE_EYES,
 };
 use crate::error::Result;
 use crate::vk::{
@@ -34,6 +33,8 @@ pub struct Care {
     pub culls: bool,
     /// Where a silhouette may cut a source, rays find the share of it that an element sees.
     pub silhouettes: bool,
+    /// Places on a source without a hemicube from which they do; divides [`SOURCE_EYES`].
+    pub places: u32,
 }
 
 /// Bound to a batch.
@@ -232,7 +233,7 @@ impl Range {
             fresh: on.fresh.clone(),
             sort: sort(device, on, &near.marks, care)?,
             near,
-            resolve: resolve(device, on)?,
+            resolve: resolve(device, on, care.places)?,
             form_factors: form_factors(device, on)?,
         })
     }
@@ -282,10 +283,10 @@ fn rays(hemicubes: &Hemicubes) -> &OccluderTree {
 const HEMICUBE_EYES: u32 = 4;
 
 /// One a list that is left open.
-fn resolve(device: &Arc<Device>, on: &On<'_>) -> Result<Vec<(u32, BoundCompute)>> {
+fn resolve(device: &Arc<Device>, on: &On<'_>, places: u32) -> Result<Vec<(u32, BoundCompute)>> {
     // Those of strong emitters are the sharpest shadows.
     let (tree, from) = match &on.batch.sight {
-        Sight::Rays(tree) => (tree, SOURCE_EYES),
+        Sight::Rays(tree) => (tree, places),
         Sight::Hemicubes(hemicubes) => (rays(hemicubes), HEMICUBE_EYES),
     };
     let (shadow_nodes, shadow_occluders) = (&tree.nodes, &tree.occluders);

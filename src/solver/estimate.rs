@@ -43,6 +43,7 @@ impl Evaluate {
         let care = Care {
             culls: settings.culling != Culling::Off,
             silhouettes: settings.silhouettes,
+            places: settings.emitter_places,
         };
         let normalise = || Normalise::new(device, scene, batch, fresh, settings.normalise);
         Ok(Self::Receivers {

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use crate::constants::SOURCE_EYES;
 use crate::error::{Error, Result};
 use crate::mesh::near::Nearness;
 use crate::mesh::sources::Grouping;
@@ -45,6 +46,9 @@ pub struct Settings {
     /// The same for sources that emit strongly; `hemicube` or more, even. None: see
     /// [`Self::emitter_shadows`].
     pub emitter_hemicube: Option<u32>,
+    /// Places on a strong emitter from which rays find the share of it that is seen where something
+    /// may cut it; divides [`crate::constants::SOURCE_EYES`].
+    pub emitter_places: u32,
     /// Stops when the error bound is no more than this.
     pub residual: f64,
     /// Stops after this time.
@@ -88,6 +92,7 @@ impl Default for Settings {
             estimator: Estimator::default(),
             hemicube: 128,
             emitter_hemicube: None,
+            emitter_places: SOURCE_EYES,
             residual: 1e-3,
             budget: None,
             shots: None,

@@ -82,9 +82,14 @@ fn key(scene: &Scene, settings: &Settings) -> String {
     let estimator = settings.estimator;
     let sizes = (settings.hemicube, settings.emitter_shadows());
     let (seed, grouping) = (settings.seed, settings.grouping);
-    let near = (settings.nearness, settings.silhouettes, settings.normalise);
+    let near = (
+        settings.nearness,
+        settings.silhouettes,
+        settings.normalise,
+        settings.emitter_places,
+    );
     hash.update(format!(
-        "8 {estimator:?} {sizes:?} {seed} {grouping:?} {near:?} {flat}"
+        "9 {estimator:?} {sizes:?} {seed} {grouping:?} {near:?} {flat}"
     ));
     hexadecimal(hash)
 }
