@@ -56,7 +56,7 @@ pub(super) struct Drawn {
 
 /// Of the missing power at which the solution is done: what undrawn sources may lack, and what need
 /// not be drawn again.
-const UNDRAWN: f64 = 0.9;
+const UNDRAWN: f64 = 0.75;
 const UNGATHERED: f64 = 0.04;
 
 /// About the share of a relief's light that leaves in other directions than if it left evenly.

@@ -171,9 +171,7 @@ impl Spine {
             }
             self.measure(on)?;
             let left = self.ledger.missing();
-            if corrections > u32::from(on.relief.is_some())
-                && left <= self.ledger.bound.most_missing()
-            {
+            if corrections > 0 && left <= self.ledger.bound.most_missing() {
                 break;
             }
             if corrections == CORRECTIONS {

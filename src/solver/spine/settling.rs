@@ -14,7 +14,7 @@ use crate::solver::{Problem, Report};
 const UNSETTLED: f64 = 0.01;
 
 /// Of the unshot power that turns into what may be missing: what near sources may still move.
-const UNMOVED: f64 = 0.05;
+const UNMOVED: f64 = 0.2;
 
 /// Times that light is brought and solved by turns, at most.
 pub(super) const MOST_TURNS: usize = 24;
