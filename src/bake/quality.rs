@@ -36,25 +36,35 @@ impl Quality {
             Self::High => (256, 1.0 / 16.0, 1e-4),
             Self::Reference => (512, 1.0 / 32.0, 1e-5),
         };
-        let plain = Settings::default();
         Settings {
-            hemicube,
-            emitter_places: match self {
-                Self::Preview => 16,
-                Self::Draft => 32,
-                _ => plain.emitter_places,
-            },
-            nearness: match self {
-                Self::Preview => Nearness {
-                    source: 1.0 / 5.0,
-                    part: 1.0 / 8.0,
-                },
-                _ => plain.nearness,
-            },
             residual,
-            grouping: scaled(scale),
-            ..plain
+            ..sized(hemicube, scale)
         }
+    }
+}
+
+/// The settings of hemicubes of so many pixels a side and sources `scale` times the default size:
+/// where sources are large, emitters are looked at from fewer places, and fewer sources are near.
+pub fn sized(hemicube: u32, scale: f64) -> Settings {
+    let plain = Settings::default();
+    let emitter_places = match scale {
+        8.0.. => 16,
+        4.0.. => 32,
+        _ => plain.emitter_places,
+    };
+    let nearness = match scale {
+        8.0.. => Nearness {
+            source: 1.0 / 5.0,
+            part: 1.0 / 8.0,
+        },
+        _ => plain.nearness,
+    };
+    Settings {
+        hemicube,
+        emitter_places,
+        nearness,
+        grouping: scaled(scale),
+        ..plain
     }
 }
 

@@ -7,7 +7,7 @@ use glam::Vec3;
 
 use super::{Method, Row};
 use crate::bake;
-use crate::bake::quality::scaled;
+use crate::bake::quality::sized;
 use crate::bench::measure::Measure;
 use crate::bench::truth::Truth;
 use crate::error::Result;
@@ -23,7 +23,7 @@ pub struct Grid {
     pub hemicubes: Vec<u32>,
     /// Sides of the hemicubes of strong emitters over those; 0 for [`Settings::emitter_shadows`].
     pub emitter_scales: Vec<u32>,
-    /// Sizes of sources over the default ones, see [`scaled`].
+    /// Sizes of sources over the default ones, see [`sized`].
     pub scales: Vec<f64>,
     /// Hemicubes of the `pixel` estimator, at the default size of sources and at the smallest.
     pub pixel_hemicubes: Vec<u32>,
@@ -112,11 +112,9 @@ impl Try {
     fn settings(&self, grid: &Grid) -> Result<Settings> {
         let mut settings = Settings {
             estimator: self.estimator,
-            hemicube: self.hemicube,
             emitter_hemicube: self.emitter_hemicube(),
             residual: grid.residual,
-            grouping: scaled(self.scale),
-            ..Settings::default()
+            ..sized(self.hemicube, self.scale)
         };
         settings.relief.directions = Directions::new(self.directions)?;
         if self.estimator == Estimator::Pixel {

@@ -83,7 +83,7 @@ pub struct Row {
     pub hemicube: Option<u32>,
     /// Hemicube of strong emitters.
     pub emitter_hemicube: Option<u32>,
-    /// Size of the sources over the default one, see [`crate::bake::quality::scaled`].
+    /// Size of the sources over the default one, see [`crate::bake::quality::sized`].
     pub source_scale: Option<f64>,
     pub directions: Option<u32>,
     pub sources: Option<u64>,
