@@ -100,7 +100,8 @@ def irradiance(scene, integrator, places, normals, paths, seed):
     emitted = emitter.eval(hit)
     density = scene.pdf_emitter_direction(si, mi.DirectionSample3f(scene, hit, si), emitter != None)
     met = dr.maximum(dr.dot(si.n, direction), 0) / math.pi
-    found += emitted * math.pi * met / (met + density)
+    # A grazing direction has no density at all where it meets no emitter.
+    found += emitted * math.pi * dr.select(met > 0, met / (met + density), 0)
     seen, _, _ = integrator.sample(scene, sampler, mi.RayDifferential3f(ray))
     found += math.pi * (seen - emitted)
 

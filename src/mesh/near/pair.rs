@@ -132,7 +132,7 @@ impl Search<'_> {
         // further than the gap is wide.
         if is_beside {
             let roughly = |(p, weight)| weight * seen.roughly(p, normal);
-            let rough: f64 = sample_points(true, true)
+            let rough: f64 = sample_points(true, !curved)
                 .iter()
                 .map(place)
                 .map(roughly)
@@ -155,7 +155,8 @@ impl Search<'_> {
                 return;
             }
         }
-        let points = sample_points(close, is_beside);
+        // Elements of a curved surface lie beside each other and see little of each other.
+        let points = sample_points(close, is_beside && !curved);
         let mut samples = [(centroid, 1.0); 7];
         for (sample, point) in samples.iter_mut().zip(points) {
             *sample = place(point);
