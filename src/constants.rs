@@ -41,7 +41,7 @@ shared! {
     RECEIVE_CROSSED = 6;
     RECEIVE_LISTS = 7;
     /// Places on a strong emitter from which rays find the share of it that such an element sees;
-    /// on other sources fewer. A power of two.
+    /// on other sources, and where settings ask for it, fewer. A power of two.
     SOURCE_EYES = 128;
     /// The first of those are its ends: where they are seen as its eye is, no silhouette cuts it.
     SOURCE_ENDS = 4;

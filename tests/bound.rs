@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use mesolux::mesh::elements::Elements;
 use mesolux::scene::shapes::Shapes;
 use mesolux::scene::{Lights, PointLight};
-use mesolux::solver::Settings;
+use mesolux::solver::{Settings, StopReason};
 
 /// A closed room with a ball and a lamp in the ceiling. Walls on one side reflect `rho`, all else
 /// less: half of it in some colours.
@@ -162,5 +162,24 @@ fn neighbours_carry_the_light_of_undrawn_sources() {
         println!("1/{share} of {sources} drawn: bias, rms {with:.4?}; not carried {without:.4?}");
         assert!(with[0].abs() <= MOST_MISSING, "1/{share}");
         assert!(with[1] <= 0.5 * without[1], "1/{share}");
+    }
+}
+
+/// What is carried bounces, and counts as missing: a bake draws on until the bound holds with it.
+#[test]
+fn the_bound_is_met_with_carried_light() {
+    for (rho, residual) in [(0.5, 0.5), (0.5, 0.05), (0.9, 2.0), (0.9, 0.2)] {
+        let settings = Settings {
+            residual,
+            ..Settings::default()
+        };
+        let solved = solve(room(rho), &Lights::NONE, &settings);
+        let report = &solved.report;
+        let bound = report.error_bound.expect("the room absorbs light");
+        println!(
+            "{rho}, {residual}: {} of {}, bound {bound}",
+            report.shots, report.sources
+        );
+        assert!(bound <= residual && report.stop == StopReason::Residual);
     }
 }

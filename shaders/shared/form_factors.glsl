@@ -110,8 +110,8 @@ FLUX parts_as_points(vec3 p, vec3 n, Source s) {
     return sum * INV_PI;
 }
 
-// A part of a curved source is a point from so many of its radii off, for receivers beside others of
-// its parts.
+// A part of a curved source is a point from so many of its radii off, for receivers beside others
+// of its parts.
 const float NEAR_POINT_DISTANCE = 9.0;
 
 // Of a member: nothing where it does not show p its front.
@@ -128,7 +128,8 @@ FLUX member(vec3 p, vec3 n, uint index, bool shows) {
     return shows ? flux_above(contour_form_factor(contour), n) : FLUX(0.0);
 }
 
-// Of the parts that show p their fronts: those far off as points, of the others each member exactly.
+// Of the parts that show p their fronts: those far off as points, of the others each member
+// exactly.
 FLUX parts_or_members(vec3 p, vec3 n, uint element, Source s) {
     FLUX sum = FLUX(0.0);
     for (uint i = 0; i < s.part_count; i++) {
@@ -141,7 +142,8 @@ FLUX parts_or_members(vec3 p, vec3 n, uint element, Source s) {
         float least = NEAR_POINT_DISTANCE * uintBitsToFloat(high.z);
         bool far = square > least * least;
         float facing = max(-dot(vector_area, way), 0.0);
-        sum += far ? flux_above(flux(way, n), n) * (INV_PI * facing / (square * square)) : FLUX(0.0);
+        float share = far ? INV_PI * facing / (square * square) : 0.0;
+        sum += flux_above(flux(way, n), n) * share;
         // A software device works through what a branch leaves out.
         if (subgroupBallot(!far) == uvec4(0)) {
             continue;
@@ -245,11 +247,11 @@ FLUX mean_form_factor(uint element, vec4 ball, vec3 n, Source s) {
     bool near = gap <= NEAR * ball.w;
     // What sees much of a curved source receives it part by part instead: within its ball, but off
     // its members, one place will do.
-    bool several = near && s.cone_sin == 0.0;
+    bool several = near && (s.kind == KIND_POINT || s.cone_sin == 0.0);
     bool touching = several && gap <= ball.w;
     uint first = touching ? 4 : several ? 1 : 0;
     uint count = touching ? 7 : several ? 3 : 1;
-    uint most = subgroupBallot(touching) != uvec4(0) ? 7 : subgroupBallot(several) != uvec4(0) ? 3 : 1;
+    uint most = subgroupAny(touching) ? 7 : subgroupAny(several) ? 3 : 1;
     vec3 a = own_corner(element, 0);
     vec3 ab = own_corner(element, 1) - a;
     vec3 ac = own_corner(element, 2) - a;

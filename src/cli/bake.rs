@@ -62,8 +62,9 @@ pub struct SolveOptions {
     /// Form factors by Lambert's formula for each receiver, or by the pixels' sums as in the paper
     #[arg(long, value_enum, default_value = "receiver")]
     estimator: EstimatorName,
-    /// Sets --hemicube, --residual and the sizes of the sources where they are not given; `bench
-    /// pareto` measures what each gains
+    /// Sets --hemicube, --residual and the sizes of the sources where they are not given, and how
+    /// closely shadows of emitters and light beside surfaces are looked at; `bench pareto` measures
+    /// what each gains
     #[arg(long, value_enum, default_value = "normal")]
     quality: QualityName,
     /// Pixels a side of a hemicube face [default: that of --quality, 128 for normal]

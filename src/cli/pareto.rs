@@ -40,7 +40,8 @@ pub struct Options {
     /// others, 0 is a bake's default: shadow rays, and four times as fine with the pixel estimator
     #[arg(long, value_name = "N,...", value_delimiter = ',', default_value = "0")]
     emitter_scale: Vec<u32>,
-    /// Sizes of the sources over the default one
+    /// Sizes of the sources over the default one; from 4 on with fewer places on emitters, as
+    /// `draft`, from 8 on with fewer near sources, as `preview`
     #[arg(
         long,
         value_name = "X,...",

@@ -21,7 +21,7 @@ pub fn to_polygon(p: DVec3, n: DVec3, contour: &[DVec3]) -> f64 {
     -sum / TAU
 }
 
-/// [`to_polygon`] of a triangle.
+/// [`to_polygon`] of a triangle, within 10⁻⁷.
 pub fn to_triangle(p: DVec3, n: DVec3, triangle: &[DVec3; 3]) -> f64 {
     vector_to_triangle(p, n, triangle).dot(n)
 }

@@ -34,7 +34,7 @@ pub struct SceneBuffers {
     /// The element that each is drawn as.
     pub occluder_items: Buffer,
     pub triangles: Buffer,
-    /// Of curved sources, [`PART_WORDS`] a part: centroid, sum of area times normal, radius; how
+    /// Of curved sources, 16 words a part: centroid, sum of area times normal, radius; how
     /// many members it has, and these.
     pub parts: Buffer,
     /// Normal and n · x.

@@ -33,7 +33,8 @@ pub struct Care {
     pub culls: bool,
     /// Where a silhouette may cut a source, rays find the share of it that an element sees.
     pub silhouettes: bool,
-    /// Places on a source without a hemicube from which they do; divides [`SOURCE_EYES`].
+    /// Places on a source without a hemicube from which rays find that share; divides
+    /// [`crate::constants::SOURCE_EYES`].
     pub places: u32,
 }
 

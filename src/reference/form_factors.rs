@@ -32,7 +32,7 @@ pub fn gather(
     if gap > 4.0 * size && lies_in_plane(centroid, elements.normal[element], source) {
         return 0.0;
     }
-    let plane = source.cone == 0.0;
+    let plane = source.kind == KIND_POINT || source.cone == 0.0;
     let points = sample_points(plane && gap <= 4.0 * size, plane && gap <= size);
     points
         .iter()

@@ -23,6 +23,8 @@ pub(super) struct Ledger {
     pub bound: Bound,
     /// See [`crate::mesh::near::NearPairs::shares`]; empty where nothing is carried.
     near_shares: Vec<f64>,
+    /// Of the missing power at which the solution is done: what is to be left to undrawn sources.
+    aim: f64,
 }
 
 /// Sources that are to be drawn, with the power that they have to send.
@@ -56,8 +58,13 @@ pub(super) struct Drawn {
 
 /// Of the missing power at which the solution is done: what undrawn sources may lack, and what need
 /// not be drawn again.
-const UNDRAWN: f64 = 0.75;
-const UNGATHERED: f64 = 0.04;
+/// Together with what sweeps and turns leave (`spine.rs`, `spine/settling.rs`) these sum to less
+/// than 1, what is not gathered counting twice, with its first bounce.
+const UNDRAWN: f64 = 0.74;
+const UNGATHERED: f64 = 0.02;
+
+/// Of [`UNDRAWN`] what drawing aims at first: carried light bounces, which adds to what is unshot.
+const AIM: f64 = 0.95;
 
 /// About the share of a relief's light that leaves in other directions than if it left evenly.
 const UNEVEN: f64 = 0.1;
@@ -106,6 +113,7 @@ impl Ledger {
                 true => on.near.shares(&on.elements, list),
                 false => Vec::new(),
             },
+            aim: AIM * UNDRAWN,
         };
         (0..RESTORED_WEIGHINGS).for_each(|_| ledger.weigh(on));
         ledger
@@ -151,7 +159,7 @@ impl Ledger {
             });
         }
         let bound = self.bound;
-        let little = missing <= UNDRAWN * bound.most_missing() && squared <= bound.most_squared();
+        let little = missing <= self.aim * bound.most_missing() && squared <= bound.most_squared();
         let mut powers = emitting;
         if !little {
             powers.extend(others);
@@ -240,7 +248,8 @@ impl Ledger {
                 } else {
                     &plain
                 };
-                let nearest = carriers.iter().map(|&c| (apart(c), c));
+                let faces = |&&c: &&usize| list[s].normal.dot(list[c].normal) > 0.0;
+                let nearest = carriers.iter().filter(faces).map(|&c| (apart(c), c));
                 let (_, source) = nearest.min_by(|a, b| a.0.total_cmp(&b.0))?;
                 // Its near elements receive it part by part.
                 let share = list[s].area * (1.0 - near[s]) / list[source].area;
@@ -250,6 +259,19 @@ impl Ledger {
         for (s, carrier) in found.into_iter().flatten() {
             self.system.carry(s, carrier);
         }
+    }
+
+    /// Whether undrawn sources lack more than they may, now that their light is carried: then less is
+    /// to be left to them.
+    pub fn lacks(&mut self) -> bool {
+        let undrawn = (0..self.sources.len()).filter(|&s| !self.system.is_drawn(s));
+        let missing: f64 = undrawn.map(|s| self.system.missing(s)).sum();
+        let most = UNDRAWN * self.bound.most_missing();
+        if missing <= most {
+            return false;
+        }
+        self.aim *= AIM * most / missing;
+        true
     }
 
     /// What each source has sent to the elements through its row; none of one that sent nothing.

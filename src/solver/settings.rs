@@ -163,6 +163,12 @@ impl Settings {
                 finer.end()
             )));
         }
+        let places = self.emitter_places;
+        if places == 0 || !SOURCE_EYES.is_multiple_of(places) {
+            return Err(Error::Usage(format!(
+                "places on an emitter: {places} does not divide {SOURCE_EYES}"
+            )));
+        }
         if !(self.residual.is_finite() && self.residual > 0.0) {
             return Err(Error::Usage(format!(
                 "--residual {}: must be above 0",

@@ -150,6 +150,9 @@ impl Spine {
                 continue;
             }
             self.carry(on, report);
+            if report.shots < limit && self.ledger.lacks() {
+                continue;
+            }
             self.settle(on, corrections > 0, report)?;
             // Without what is carried less may be unshot, so that nothing more is drawn.
             let drew = drawn_before.replace(report.shots) != Some(report.shots);

@@ -23,7 +23,7 @@ pub struct Grid {
     pub hemicubes: Vec<u32>,
     /// Sides of the hemicubes of strong emitters over those; 0 for [`Settings::emitter_shadows`].
     pub emitter_scales: Vec<u32>,
-    /// Sizes of sources over the default ones, see [`sized`].
+    /// Sizes of sources over the default ones, and what goes with them, see [`sized`].
     pub scales: Vec<f64>,
     /// Hemicubes of the `pixel` estimator, at the default size of sources and at the smallest.
     pub pixel_hemicubes: Vec<u32>,

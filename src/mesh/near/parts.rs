@@ -79,6 +79,11 @@ impl PartTree {
         let mut before = 0.0;
         let mut m = 0;
         let shift = (GOLDEN * turn as f64 + 0.5).fract();
+        // A few of the places, evenly chosen, lie evenly too: neighbours in the sequence lie far apart.
+        let turned = |k: usize| match count.is_power_of_two() {
+            true => k.reverse_bits() >> (usize::BITS - count.ilog2()).min(usize::BITS - 1),
+            false => k,
+        };
         for k in 0..count {
             // Members follow one another along the tree, so that equal steps of area spread out.
             let at = all * (k as f64 + shift) / count as f64;
@@ -87,7 +92,7 @@ impl PartTree {
                 m += 1;
             }
             let [a, b, c] = triangle(self.members[m]);
-            let [u, v] = spread_in_triangle(turn * count + k);
+            let [u, v] = spread_in_triangle(turn * count + turned(k));
             places.push(SourcePlace {
                 at: a + u * (b - a) + v * (c - a),
                 normal: elements.normal[self.members[m] as usize],

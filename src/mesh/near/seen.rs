@@ -272,7 +272,8 @@ impl Far {
             turned: match plane {
                 true => 0.0,
                 false if cosine <= 0.0 => 2.0,
-                false => sine,
+                // Members at several heights may face one way.
+                false => sine.max(1e-9),
             },
         }
     }

@@ -58,9 +58,18 @@ impl Spine {
         let apart = before.iter().zip(&found).zip(&areas);
         let moved = apart.map(|((a, b), area)| area * (*a - *b).abs().element_sum());
         let moved = moved.sum();
-        let next = self.turns.next(before, found, &areas);
+        // What has settled takes no step further.
+        let next = match self.is_still(moved) {
+            true => found,
+            false => self.turns.next(before, found, &areas),
+        };
         self.ledger.system.set_near(&next);
         moved
+    }
+
+    /// Whether so little power has moved that the solution has settled.
+    fn is_still(&self, moved: f64) -> bool {
+        moved <= UNMOVED * self.ledger.bound.stop_power()
     }
 
     /// Brings light and solves by turns, until what near sources send fits the rest.
@@ -91,7 +100,7 @@ impl Spine {
         report: &mut Report,
     ) -> Result<bool> {
         let moved = self.bring(on, by_direction, report)?;
-        let settled = moved <= UNMOVED * self.ledger.bound.stop_power();
+        let settled = self.is_still(moved);
         if !settled {
             let most = UNSOLVED * self.ledger.bound.stop_power();
             self.solve(most, MOST_SWEEPS, report);
