@@ -127,8 +127,8 @@ impl Ledger {
         }
     }
 
-    /// Sources that are to be drawn, with their unshot power, of one kind: the
-    /// strong emitters, then other lights; after them all others, until little is left; and then what still emits.
+    /// Sources that are to be drawn, with their unshot power, of one kind: the strong emitters, then
+    /// other lights; after them all others, until little is left; and then what still emits.
     pub fn undrawn(&self) -> Option<Candidates> {
         let (mut first, mut emitting, mut others) = (Vec::new(), Vec::new(), Vec::new());
         let (mut missing, mut squared) = (0.0, 0.0);

@@ -79,7 +79,7 @@ impl PartTree {
         let mut before = 0.0;
         let mut m = 0;
         let shift = (GOLDEN * turn as f64 + 0.5).fract();
-        // A few of the places, evenly chosen, lie evenly too: neighbours in the sequence lie far apart.
+        // So that a few of the places, evenly chosen, lie evenly too.
         let turned = |k: usize| match count.is_power_of_two() {
             true => k.reverse_bits() >> (usize::BITS - count.ilog2()).min(usize::BITS - 1),
             false => k,

@@ -146,7 +146,7 @@ impl Seen {
         }
     }
 
-    /// The form factor from a place to the whole, at least [`ROUGH`] of it; 0 if it is none.
+    /// The form factor from a place to the whole, in the tests' scenes at least [`ROUGH`] of it.
     pub fn roughly(&self, p: DVec3, n: DVec3) -> f64 {
         self.part_roughly(self.tree.whole(), p, n)
     }
@@ -306,8 +306,8 @@ impl Far {
         (self.is_above(p, n)).then(|| share * points.iter().map(of).sum::<DVec3>())
     }
 
-    /// About the form factor from a place, rather too large than too small; none where the part does
-    /// not count as a point.
+    /// About the form factor from a place, rather too large than too small; none where the part
+    /// does not count as a point.
     fn roughly(&self, p: DVec3, n: DVec3) -> Option<f64> {
         let way = self.centre - p;
         let facing = -way.dot(self.vector_area);
