@@ -1,13 +1,15 @@
 //! Twin of the receiver estimator: form factors and visibility of one source for every element, in
 //! f64.
 
+use std::f64::consts::PI;
+
 use glam::DVec3;
 
 use crate::constants::{KIND_POINT, NONE};
 use crate::math::form_factor::{sample_points, to_polygon};
 use crate::math::hemicube::{Pixel, direction_of, pixel_of, texel_of};
 use crate::mesh::elements::Elements;
-use crate::mesh::sources::Source;
+use crate::mesh::sources::{Part, Source};
 
 /// Rounding of a plane's height at a point, as in the shader.
 const HEIGHT_EPSILON: f64 = 1e-6;
@@ -97,11 +99,38 @@ fn form_factor(elements: &Elements, source: &Source, p: DVec3, element: usize) -
             .max(0.0);
     }
     // A curved source: the sum over the members whose fronts face the point.
-    (source.first_element..source.first_element + source.element_count)
-        .map(|m| m as usize)
-        .filter(|&m| m != element && (p - elements.centroid[m]).dot(elements.normal[m]) > 0.0)
-        .map(|m| to_polygon(p, normal, &elements.triangle(m)).max(0.0))
-        .sum()
+    let of_member = |m: usize| {
+        let faces = (p - elements.centroid[m]).dot(elements.normal[m]) > 0.0;
+        match faces && m != element {
+            true => to_polygon(p, normal, &elements.triangle(m)).max(0.0),
+            false => 0.0,
+        }
+    };
+    if shows_whole_front(p, source) {
+        return source.members().map(of_member).sum();
+    }
+    // Where some turn away, parts that are far off count as points.
+    let of_part = |part: &Part| {
+        let way = part.centroid - p;
+        let square = way.length_squared();
+        if square <= (NEAR_POINT_DISTANCE * part.radius).powi(2) {
+            return part.members.iter().map(|&m| of_member(m as usize)).sum();
+        }
+        let facing = (-part.vector_area.dot(way)).max(0.0);
+        way.dot(normal).max(0.0) * facing / (PI * square * square)
+    };
+    source.parts.iter().map(of_part).sum()
+}
+
+/// Radii of a part from which on it counts as a point, as in the shader.
+const NEAR_POINT_DISTANCE: f64 = 9.0;
+
+/// As in the shader: whether every member of a curved source shows a place its front.
+fn shows_whole_front(p: DVec3, source: &Source) -> bool {
+    let d = p - source.centroid;
+    let height = d.dot(source.normal);
+    let flat_part = (d.length_squared() - height * height).max(0.0).sqrt();
+    height * source.cone.cos() - flat_part * source.cone.sin() - source.radius > 0.0
 }
 
 /// What an item buffer says of a place.
