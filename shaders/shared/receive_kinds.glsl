@@ -19,8 +19,8 @@ void append_one(uint slot, uint which, bool mine, uint listed_word) {
     }
 }
 
-// The same in the list of each lane's kind: lane k for all lanes of kind k, but for RECEIVE_NEAR, of
-// which there are few.
+// The same in the list of each lane's kind: lane k for all lanes of kind k, but for RECEIVE_NEAR,
+// of which there are few.
 void append(uint slot, uint kind, bool mine, uint listed_word) {
     append_one(slot, RECEIVE_NEAR, mine && kind == RECEIVE_NEAR, listed_word);
     mine = mine && kind < RECEIVE_NEAR;

@@ -222,7 +222,8 @@ void main() {
             }
             for (uint j = 0; j < SORT_ELEMENTS; j++) {
                 uint i = first + j * gl_SubgroupSize;
-                append(slot, kind[j], wanted[j] && (near[j] || seen[j]) && !crossed[j], with_share(i, 1.0));
+                bool found = wanted[j] && (near[j] || seen[j]) && !crossed[j];
+                append(slot, kind[j], found, with_share(i, 1.0));
                 append_one(slot, RECEIVE_CROSSED, crossed[j], i);
                 of_slot += subgroupBallotBitCount(subgroupBallot(i < element_count && kind[j] == RECEIVE_KINDS));
             }

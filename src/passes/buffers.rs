@@ -253,20 +253,11 @@ impl Outlined {
             outlined.list.push(Source::new(source, outline, first_part));
             outlined.contours.extend(corners);
             outlined.parts.extend(source.parts.iter().map(|part| {
-                let [x, y, z] = part.centroid.as_vec3().to_array();
-                let [u, v, w] = part.vector_area.as_vec3().to_array();
                 let mut words = [0.0; PART_WORDS];
-                let count = part.members.len() as u32;
-                words[..8].copy_from_slice(&[
-                    x,
-                    y,
-                    z,
-                    u,
-                    v,
-                    w,
-                    part.radius as f32,
-                    f32::from_bits(count),
-                ]);
+                words[..3].copy_from_slice(&part.centroid.as_vec3().to_array());
+                words[3..6].copy_from_slice(&part.vector_area.as_vec3().to_array());
+                words[6] = part.radius as f32;
+                words[7] = f32::from_bits(part.members.len() as u32);
                 for (word, &member) in words[8..].iter_mut().zip(&part.members) {
                     *word = f32::from_bits(member);
                 }

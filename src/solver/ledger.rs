@@ -57,9 +57,8 @@ pub(super) struct Drawn {
 }
 
 /// Of the missing power at which the solution is done: what undrawn sources may lack, and what need
-/// not be drawn again.
-/// Together with what sweeps and turns leave (`spine.rs`, `spine/settling.rs`) these sum to less
-/// than 1, what is not gathered counting twice, with its first bounce.
+/// not be drawn again. With what sweeps and turns leave (`spine.rs`, `spine/settling.rs`) these sum
+/// to less than 1; what is not gathered counts twice, with its first bounce.
 const UNDRAWN: f64 = 0.74;
 const UNGATHERED: f64 = 0.02;
 
@@ -127,8 +126,8 @@ impl Ledger {
         }
     }
 
-    /// Sources that are to be drawn, with their unshot power, of one kind: the strong emitters, then
-    /// other lights; after them all others, until little is left; and then what still emits.
+    /// Sources that are to be drawn, with their unshot power, of one kind: the strong emitters,
+    /// then other lights; after them all others, until little is left; then what still emits.
     pub fn undrawn(&self) -> Option<Candidates> {
         let (mut first, mut emitting, mut others) = (Vec::new(), Vec::new(), Vec::new());
         let (mut missing, mut squared) = (0.0, 0.0);
@@ -261,8 +260,8 @@ impl Ledger {
         }
     }
 
-    /// Whether undrawn sources lack more than they may, now that their light is carried: then less is
-    /// to be left to them.
+    /// Whether undrawn sources lack more than they may, now that their light is carried: then less
+    /// is to be left to them.
     pub fn lacks(&mut self) -> bool {
         let undrawn = (0..self.sources.len()).filter(|&s| !self.system.is_drawn(s));
         let missing: f64 = undrawn.map(|s| self.system.missing(s)).sum();

@@ -5,7 +5,11 @@
 //! its radiosity through its row, and what it has not shot is the residual of its equation. So rows
 //! can join at any time, and the sum of what is unshot bounds what is missing.
 
+mod carrying;
+
 use glam::DVec3;
+
+pub(super) use carrying::Carrier;
 
 use super::coupling::{Arrived, CouplingRow, Targets, Weights};
 use crate::constants::KIND_POINT;
@@ -49,14 +53,6 @@ struct Unknown {
     unmeasured: DVec3,
     /// Power that arrives at elements in the end for a unit of power that is sent, at most; RGB.
     importance: DVec3,
-}
-
-/// A source whose row carries the light of one without a row.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Carrier {
-    pub source: usize,
-    /// Radiosity of the carrier for a unit of radiosity that it carries: the areas' ratio.
-    pub share: f64,
 }
 
 impl Unknown {
@@ -242,36 +238,9 @@ impl System {
         }
     }
 
-    /// Lets the row of another source carry what a source without a row reflects. For the error
-    /// bound that light stays unshot: it may arrive elsewhere than it should.
-    pub fn carry(&mut self, s: usize, carrier: Carrier) {
-        self.sources[s].carrier = Some(carrier);
-        self.shoot(s);
-    }
-
-    /// Takes back what rows of other sources have carried.
-    pub fn release(&mut self) {
-        for s in 0..self.sources.len() {
-            let source = &mut self.sources[s];
-            source.carried = DVec3::ZERO;
-            let Some(carrier) = source.carrier.take() else {
-                continue;
-            };
-            let back = -carrier.share * std::mem::take(&mut source.shot);
-            if let Some(row) = &self.sources[carrier.source].row {
-                self.arrived.add(row, back);
-            }
-        }
-    }
-
     /// Whether its coupling is known.
     pub fn has_row(&self, s: usize) -> bool {
         self.sources[s].row.is_some()
-    }
-
-    /// Radiosity that the row of a source carries for others.
-    pub fn carried(&self, s: usize) -> DVec3 {
-        self.sources[s].carried
     }
 
     /// Shoots what a source has through its row, or through that of its carrier.
@@ -287,19 +256,6 @@ impl System {
         if through.source != s {
             self.sources[through.source].carried += through.share * unshot;
         }
-    }
-
-    /// Whose row a source shoots through: its own where it is no carrier's.
-    fn through(&self, s: usize) -> Carrier {
-        self.sources[s].carrier.unwrap_or(Carrier {
-            source: s,
-            share: 1.0,
-        })
-    }
-
-    /// Whether it shoots through a row.
-    fn has_way(&self, s: usize) -> bool {
-        self.sources[self.through(s).source].row.is_some()
     }
 
     /// The row of a source, which is not known any more.

@@ -392,7 +392,8 @@ fn relights_what_was_baked() {
     let [r0, g0, _] = mean(&room.picture("before.png"));
     assert!(r / g > 1.5 * r0 / g0, "{r} {g} for {r0} {g0}");
     let found = difference(&room.picture("before.png"), &room.picture("after.png"));
-    // Draft bakes leave 2.5 % of the light to neighbours of what was drawn, in an order that depends on what was kept.
+    // Draft bakes leave 2.5 % of the light to neighbours of what was drawn, in an order that
+    // depends on what was kept.
     assert!(found < 3.0, "the same light differs by {found}");
     let found = difference(&room.picture("after.png"), &room.picture("moved.png"));
     assert!(found > 1.0, "a moved light changes {found}");
