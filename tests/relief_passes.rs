@@ -290,8 +290,7 @@ fn near_parts_bring_light_as_their_twin() {
     let pass = pass.expect("relief sees near sources");
     let light = |i: u32| Vec3::new((i % 7) as f32 - 2.0, (i % 5) as f32, 0.5 * (i % 3) as f32);
     let beyond: Vec<Vec3> = (0..on.near.parts).map(light).collect();
-    pass.write(&device, Part::Reflected, &beyond)
-        .expect("it is written");
+    pass.write(Part::Reflected, &beyond).expect("it is written");
     Commands::run(&device, "near to relief", |cmd| {
         pass.record(cmd, Part::Reflected);
         Ok(())

@@ -66,11 +66,13 @@ pub fn solve_on(
 
 /// The solution that a solver of `scene` has reached.
 pub fn solution(scene: &Scene, solver: &Solver) -> Result<Solution> {
+    let light = solver.light()?;
     let mut report = solver.report().clone();
+    report.submissions = solver.submissions();
     report.skipped.degenerate_triangles = scene.dropped_degenerate as u64;
     report.notes = [scene.notes.as_slice(), &scene.warnings].concat();
     let elements = &solver.problem.elements;
-    Ok(Solution::new(scene, elements, &solver.light()?, report).with_corners(scene))
+    Ok(Solution::new(scene, elements, &light, report).with_corners(scene))
 }
 
 /// The elements of a scene, with their relief where `settings` want it.

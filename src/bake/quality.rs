@@ -36,10 +36,18 @@ impl Quality {
             Self::High => (256, 1.0 / 16.0, 1e-4),
             Self::Reference => (512, 1.0 / 32.0, 1e-5),
         };
-        Settings {
-            residual,
+        let e = |n: &str, d: f64| std::env::var(n).map_or(d, |v| v.parse().unwrap());
+        let hemicube = e("MS_HEMI", hemicube.into()) as u32;
+        let scale = e("MS_SCALE", scale);
+        let mut s = Settings {
+            residual: e("MS_RES", residual),
             ..sized(hemicube, scale)
-        }
+        };
+        s.nearness.source = e("MS_NEARS", s.nearness.source);
+        s.nearness.part = e("MS_NEARP", s.nearness.part);
+        s.emitter_places = e("MS_PLACES", s.emitter_places.into()) as u32;
+        s.grouping.max_power = e("MS_POWER", s.grouping.max_power);
+        s
     }
 }
 

@@ -143,12 +143,12 @@ impl SceneBuffers {
 
 impl SceneBuffers {
     /// Other light of the same sources, and other places of point lights.
-    pub fn write_sources(&self, device: &Arc<Device>, sources: &[sources::Source]) -> Result<()> {
+    pub fn write_sources(&self, sources: &[sources::Source]) -> Result<()> {
         let Outlined { list, webs, .. } = Outlined::new(sources);
-        write(device, &self.sources, &list)?;
+        self.sources.set(&list)?;
         if sources.iter().any(sources::Source::is_far) {
-            write(device, &self.eyes, &eyes(sources))?;
-            write(device, &self.webs, &webs)?;
+            self.eyes.set(&eyes(sources))?;
+            self.webs.set(&webs)?;
         }
         Ok(())
     }
@@ -329,10 +329,7 @@ impl State {
 /// A device buffer of one word over and over.
 pub fn filled(device: &Arc<Device>, name: &str, bytes: u64, word: u32) -> Result<Buffer> {
     let buffer = Buffer::new(device, name, bytes, BufferUse::Storage)?;
-    Commands::run(device, name, |cmd| {
-        cmd.fill(&buffer, word);
-        Ok(())
-    })?;
+    buffer.set_all(word)?;
     Ok(buffer)
 }
 
@@ -344,36 +341,36 @@ pub fn upload<T: Pod>(
     usage: BufferUse,
 ) -> Result<Buffer> {
     let buffer = Buffer::new(device, name, size_of_val(data) as u64, usage)?;
-    write(device, &buffer, data)?;
+    buffer.set(data)?;
     Ok(buffer)
-}
-
-/// Fills the beginning of a device buffer.
-pub fn write<T: Pod>(device: &Arc<Device>, buffer: &Buffer, data: &[T]) -> Result<()> {
-    let bytes = size_of_val(data) as u64;
-    if bytes > 0 {
-        let mut staging = Buffer::new(device, "staging", bytes, BufferUse::Upload)?;
-        staging.write(0, data);
-        Commands::run(device, "write", |cmd| {
-            cmd.copy(&staging, 0, buffer, 0, bytes);
-            Ok(())
-        })?;
-    }
-    Ok(())
 }
 
 /// The first `count` values of a device buffer; everything submitted before is done first.
 pub fn download<T: Pod>(device: &Arc<Device>, buffer: &Buffer, count: usize) -> Result<Vec<T>> {
+    let [values] = download_all(device, [buffer], count)?;
+    Ok(values)
+}
+
+/// As [`download`], of several buffers.
+pub fn download_all<T: Pod, const N: usize>(
+    device: &Arc<Device>,
+    buffers: [&Buffer; N],
+    count: usize,
+) -> Result<[Vec<T>; N]> {
     let bytes = (count * size_of::<T>()) as u64;
-    let readback = Buffer::new(device, "readback", bytes, BufferUse::Readback)?;
+    let readback = Buffer::new(device, "readback", N as u64 * bytes, BufferUse::Readback)?;
     Commands::run(device, "download", |cmd| {
         cmd.barrier(
             &[Stage::Compute, Stage::Transfer, Stage::Attachment],
             &[Stage::Transfer],
         );
-        cmd.copy(buffer, 0, &readback, 0, bytes);
+        for (i, buffer) in (0..).zip(buffers) {
+            cmd.copy(buffer, 0, &readback, i * bytes, bytes);
+        }
         cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
         Ok(())
     })?;
-    Ok(readback.read(0, count))
+    Ok(std::array::from_fn(|i| {
+        readback.read(i as u64 * bytes, count)
+    }))
 }

@@ -5,7 +5,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::buffers::{SceneBuffers, State, write};
+use super::buffers::{SceneBuffers, State};
 use super::fresh_rows::RowShape;
 use super::groups;
 use super::kept_rows::KeptRows;
@@ -43,7 +43,7 @@ impl GatherList {
     }
 
     /// Lists these rows from the first slot on.
-    pub fn write(&self, device: &Arc<Device>, slots: &[Slot], rows: &[KeptRow]) -> Result<()> {
+    pub fn write(&self, slots: &[Slot], rows: &[KeptRow]) -> Result<()> {
         let lit: Vec<[u32; 4]> = (slots.iter().zip(rows))
             .flat_map(|(slot, row)| {
                 [slot.emitted, slot.reflected].map(|light| {
@@ -52,8 +52,8 @@ impl GatherList {
                 })
             })
             .collect();
-        write(device, &self.slots, slots)?;
-        write(device, &self.lit, &lit)
+        self.slots.set(slots)?;
+        self.lit.set(&lit)
     }
 }
 

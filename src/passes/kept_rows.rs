@@ -4,7 +4,7 @@
 use std::cmp::Ordering;
 use std::sync::Arc;
 
-use super::buffers::{download, filled, upload, write};
+use super::buffers::{download, filled, upload};
 use super::fresh_rows::RowShape;
 use super::types::{KeptRow, KeptState};
 use crate::constants::GROUP;
@@ -133,26 +133,16 @@ impl KeptRows {
     }
 
     /// The inverse of [`Self::download`].
-    pub fn restore(
-        &self,
-        device: &Arc<Device>,
-        state: KeptState,
-        chunks: &[Vec<u32>],
-    ) -> Result<()> {
-        write(device, &self.state, &[state])?;
+    pub fn restore(&self, state: KeptState, chunks: &[Vec<u32>]) -> Result<()> {
+        self.state.set(&[state])?;
         for (buffer, words) in self.chunks[..self.lasting].iter().zip(chunks) {
-            write(device, buffer, words)?;
+            buffer.set(words)?;
         }
         Ok(())
     }
 
     /// Forgets rows that were kept, and gives back the room of those behind all others.
-    pub fn forget(
-        &self,
-        device: &Arc<Device>,
-        dropped: &[KeptRow],
-        kept: &[KeptRow],
-    ) -> Result<()> {
+    pub fn forget(&self, dropped: &[KeptRow], kept: &[KeptRow]) -> Result<()> {
         let place = |row: &KeptRow| (row.chunk, row.first);
         let last = kept.iter().map(place).max();
         let behind = |place: &(u32, u32)| last.is_none_or(|last| *place > last);
@@ -160,7 +150,7 @@ impl KeptRows {
             return Ok(());
         };
         let rows = kept.len() as u32;
-        write(device, &self.state, &[KeptState { chunk, used, rows }])
+        self.state.set(&[KeptState { chunk, used, rows }])
     }
 
     /// Whether anything can be kept.

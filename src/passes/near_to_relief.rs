@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::buffers::{State, upload, write};
+use super::buffers::{State, upload};
 use super::gather::Part;
 use super::groups;
 use super::relief_buffers::ReliefBuffers;
@@ -71,8 +71,8 @@ impl NearToRelief {
     }
 
     /// Sets the radiosity of the parts beyond their sources' means, `[part]`.
-    pub fn write(&self, device: &Arc<Device>, light: Part, beyond: &[Vec3]) -> Result<()> {
-        write(device, &self.beyond[light as usize], beyond)
+    pub fn write(&self, light: Part, beyond: &[Vec3]) -> Result<()> {
+        self.beyond[light as usize].set(beyond)
     }
 
     /// Adds what the parts send.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::Settings;
 use crate::error::Result;
 use crate::passes::batch::{Batch, BatchSize, Hemicubes};
-use crate::passes::buffers::{SceneBuffers, write};
+use crate::passes::buffers::SceneBuffers;
 use crate::passes::cull::{Cull, Culling};
 use crate::passes::item_buffer::ItemBuffer;
 use crate::passes::types::Slot;
@@ -72,7 +72,7 @@ impl Drawing {
         batch: &Batch,
         source: u32,
     ) -> Result<Vec<u32>> {
-        write(device, &batch.slots, &[Slot::of(source)])?;
+        batch.slots.set(&[Slot::of(source)])?;
         Commands::run(device, "item buffer", |cmd| {
             self.record(cmd, scene, batch, || {});
             Ok(())

@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use super::Problem;
 use super::near::ByLight;
 use crate::error::Result;
-use crate::passes::buffers::download;
+use crate::passes::buffers::{State, download, download_all};
 use crate::passes::gather::{ChunkSlots, Gather, GatherList, MOST_SLOTS, Part};
 use crate::passes::kept_rows::KeptRows;
 use crate::passes::measure::Measure;
@@ -102,7 +102,7 @@ impl Gathering {
         };
         let slots: Vec<Slot> = rows.iter().map(slot).collect();
         let places: Vec<KeptRow> = rows.iter().map(|row| row.row).collect();
-        self.list.write(&self.device, &slots, &places)?;
+        self.list.write(&slots, &places)?;
         Commands::run(&self.device, "gather", |cmd| {
             cmd.barrier(&[Stage::Compute, Stage::Transfer], &[Stage::Compute]);
             let most = self
@@ -151,7 +151,7 @@ impl Gathering {
             if light.iter().all(|&of| of == Vec3::ZERO) {
                 continue;
             }
-            near.write(&self.device, part, light)?;
+            near.write(part, light)?;
             Commands::run(&self.device, "near to relief", |cmd| {
                 cmd.barrier(&[Stage::Compute, Stage::Transfer], &[Stage::Compute]);
                 near.record(cmd, part);
@@ -164,8 +164,10 @@ impl Gathering {
     /// Irradiance of each element, direct and indirect.
     pub fn irradiance(&self, on: &Problem) -> Result<Vec<DVec3>> {
         let count = on.elements.len();
-        let direct: Vec<Vec3> = download(&self.device, &on.state.direct, count)?;
-        let indirect: Vec<Vec3> = download(&self.device, &on.state.indirect, count)?;
+        let State {
+            direct, indirect, ..
+        } = &on.state;
+        let [direct, indirect] = download_all::<Vec3, 2>(&self.device, [direct, indirect], count)?;
         let sum = |(d, i): (&Vec3, &Vec3)| d.as_dvec3() + i.as_dvec3();
         Ok(direct.iter().zip(&indirect).map(sum).collect())
     }

@@ -40,7 +40,7 @@ use glam::{DVec3, Vec3};
 
 use crate::error::{Error, Result};
 use crate::mesh::elements::Elements;
-use crate::passes::buffers::download;
+use crate::passes::buffers::{download, download_all};
 use crate::passes::types::{CouplingTarget, Reflected, Slot};
 use crate::scene::{Lights, Scene};
 use crate::vk::Device;
@@ -226,8 +226,8 @@ impl Solver {
             elements, state, ..
         } = &self.problem;
         let count = elements.len();
-        let mut direct: Vec<Vec3> = download(&self.device, &state.direct, count)?;
-        let mut indirect: Vec<Vec3> = download(&self.device, &state.indirect, count)?;
+        let parts = [&state.direct, &state.indirect];
+        let [mut direct, mut indirect] = download_all::<Vec3, 2>(&self.device, parts, count)?;
         if let Method::Rows(spine) = &self.method {
             // What rounding leaves below none is none.
             let add = |light: &mut [Vec3], near: &[DVec3]| {
@@ -310,6 +310,11 @@ impl Solver {
             Method::Rows(spine) => &spine.ledger.system.targets.list,
             Method::Shots(_) => &[],
         }
+    }
+
+    /// To the first device's queue since it was opened.
+    pub fn submissions(&self) -> u64 {
+        self.device.submissions()
     }
 
     pub fn report(&self) -> &Report {

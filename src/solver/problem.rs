@@ -169,7 +169,7 @@ impl Problem {
         let moved = moved.collect();
         self.sources = sources;
         self.sky = scene.lights.sky.clone();
-        self.scene.write_sources(device, &self.sources.list)?;
+        self.scene.write_sources(&self.sources.list)?;
         Commands::run(device, "no light", |cmd| {
             self.state.buffers().for_each(|buffer| cmd.fill(buffer, 0));
             let relief = self.relief.iter().flat_map(ReliefBuffers::light);

@@ -185,6 +185,8 @@ pub struct Report {
     pub raw_sums: Option<RawSums>,
     /// Bytes of the coupling between the sources.
     pub coupling_bytes: u64,
+    /// To the first device's queue since it was opened, until the light came to the host.
+    pub submissions: u64,
     /// Sources drawn, again or not.
     pub shots: u32,
     pub unshot_share: f64,

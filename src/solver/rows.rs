@@ -71,6 +71,8 @@ pub struct Stages {
     pub bin: f64,
     /// Coupling the sources, and keeping the form factors.
     pub keep: f64,
+    /// From the end of a batch to the beginning of the next, which was waiting.
+    pub idle: f64,
 }
 
 /// One more than the stages.
@@ -91,6 +93,7 @@ impl AddAssign for Stages {
         self.rays += other.rays;
         self.bin += other.bin;
         self.keep += other.keep;
+        self.idle += other.idle;
     }
 }
 
@@ -133,6 +136,8 @@ pub(super) struct RowMaker {
     timestamps: [Timestamps; SETS],
     /// The sources of the batches under way, oldest first.
     asked: VecDeque<Vec<u32>>,
+    /// When the batch that was taken last ended, if another one waited for it.
+    ended: Option<f64>,
     /// Which of the sets is submitted next.
     next: usize,
     layout: Layout,
@@ -249,6 +254,7 @@ impl RowMaker {
             readback,
             timestamps,
             asked: VecDeque::new(),
+            ended: None,
             next: 0,
             layout,
             device: Arc::clone(device),
@@ -284,9 +290,11 @@ impl RowMaker {
         self.commands[i].wait()?;
         let row = |(slot, &source)| self.layout.read(slot, source, &self.readback[i]);
         let rows = (0..).zip(&sources).map(row).collect();
-        let [cull, item_buffer, sort, rays, bin, keep] = self.timestamps[i].intervals()?[..] else {
-            unreachable!("a batch has {STAMPS} timestamps");
-        };
+        let stamps = self.timestamps[i].seconds()?;
+        let stage = |s: usize| (stamps[s + 1] - stamps[s]).max(0.0);
+        let [cull, item_buffer, sort, rays, bin, keep] = std::array::from_fn(stage);
+        let idle = self.ended.map_or(0.0, |ended| (stamps[0] - ended).max(0.0));
+        self.ended = (stamps.last().copied()).filter(|_| !self.asked.is_empty());
         let stages = Stages {
             cull,
             item_buffer,
@@ -294,6 +302,7 @@ impl RowMaker {
             rays,
             bin,
             keep,
+            idle,
         };
         Ok(Some(Made { rows, stages }))
     }

@@ -104,7 +104,7 @@ impl Default for Settings {
             carries: true,
             culling: Culling::default(),
             merging: true,
-            batch: 16,
+            batch: 32,
             list_room: None,
             visibility_memory: None,
             coupling_memory: COUPLING_MEMORY,

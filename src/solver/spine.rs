@@ -68,6 +68,11 @@ const MOST_SWEEPS: usize = 1000;
 /// Over what may be missing, what is missing when the importance of sources is first lowered.
 const NEAR_THE_END: f64 = 8.0;
 
+/// The sources that are best drawn next change as rows are made: the first batches are small, and
+/// all others no more than this share of what was drawn.
+const FIRST_BATCH: u32 = 16;
+const BATCH_SHARE: u32 = 4;
+
 /// Times that light is measured and corrected, at most.
 const CORRECTIONS: u32 = 50;
 
@@ -90,7 +95,7 @@ impl Spine {
         };
         let kept = KeptRows::new(device, shape, kept_size, restored.map(Visibility::size))?;
         if let Some(restored) = restored {
-            kept.restore(device, restored.state(), restored.chunks())?;
+            kept.restore(restored.state(), restored.chunks())?;
         }
         let not_lights = |s: usize| on.sources.list[s].is_surface();
         let rows = |s: usize| restored?.row(s).filter(|_| not_lights(s));
@@ -132,7 +137,7 @@ impl Spine {
         let fits = |team: &Team| team.is_alone() && kinds.iter().all(|&kind| makes(team, kind));
         self.team = team.filter(fits);
         let kept: Vec<KeptRow> = self.ledger.sources.iter().filter_map(|d| d.row).collect();
-        self.kept.forget(&self.devices[0], &dropped, &kept)
+        self.kept.forget(&dropped, &kept)
     }
 
     /// Goes on until the solution is done, which the elements have then, or the watch says stop.
@@ -263,7 +268,9 @@ impl Spine {
     fn choose(&mut self, on: &Problem, phase: Phase, report: &Report) -> Result<Option<Batch>> {
         let under_way = self.ledger.sources.iter().filter(|d| d.under_way).count() as u32;
         let limit = on.settings.shots.unwrap_or(u32::MAX);
-        let left = limit.saturating_sub(report.shots + under_way) as usize;
+        let chosen = report.shots + under_way;
+        let left = limit.saturating_sub(chosen) as usize;
+        let worth = (chosen / BATCH_SHARE).max(FIRST_BATCH) as usize;
         let candidates = match phase {
             Phase::First => self.ledger.undrawn(),
             Phase::Again => self.ledger.owing(),
@@ -279,7 +286,7 @@ impl Spine {
         // Powers that differ by rounding alone are equal.
         let power = |(_, power): &(u32, f64)| *power as f32;
         candidates.sort_by(|a, b| power(b).total_cmp(&power(a)).then(a.0.cmp(&b.0)));
-        candidates.truncate(team.slots(kind).min(left));
+        candidates.truncate(team.slots(kind).min(left).min(worth));
         let sources = candidates.into_iter().map(|(s, _)| s).collect();
         Ok(Some(Batch { sources, kind }))
     }

@@ -9,6 +9,7 @@ use gpu_allocator::vulkan::Allocation;
 
 use super::device::MemoryRequest;
 use super::held::Held;
+use super::uploads::Content;
 use super::{Device, lock};
 use crate::error::{Error, Result};
 
@@ -53,7 +54,9 @@ pub(super) struct BufferOwner {
     allocation: RwLock<Option<Allocation>>,
     /// The buffers whose addresses this one contains.
     referred: Mutex<Held>,
-    device: Arc<Device>,
+    /// What it is to hold, in this order, from the next submission on.
+    pub(super) contents: Mutex<Vec<Content>>,
+    pub(super) device: Arc<Device>,
 }
 
 /// Bytes that are allocated at least, so that an empty list still has a buffer to bind.
@@ -99,6 +102,7 @@ impl Buffer {
             usage,
             allocation: RwLock::default(),
             referred: Mutex::default(),
+            contents: Mutex::default(),
             device: Arc::clone(device),
         };
         device.set_name(raw, name);

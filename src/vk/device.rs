@@ -13,6 +13,7 @@ use gpu_allocator::vulkan::{
 
 use super::instance::{Candidate, Instance, graphics_family};
 use super::lock;
+use super::uploads::Uploads;
 use crate::error::{Error, Result};
 
 /// A device with one queue for graphics and compute.
@@ -24,6 +25,9 @@ pub struct Device {
     names: Option<ext::debug_utils::Device>,
     candidate: Candidate,
     limits: Limits,
+    pub(super) uploads: Mutex<Uploads>,
+    /// Submissions so far.
+    pub(super) submissions: AtomicU64,
     #[cfg_attr(not(feature = "window"), allow(dead_code))] // read by swapchains only
     pub(super) instance: Arc<Instance>,
 }
@@ -102,6 +106,8 @@ impl Device {
             names,
             limits: Limits::new(candidate, &properties.limits),
             candidate: candidate.clone(),
+            uploads: Mutex::default(),
+            submissions: AtomicU64::new(0),
             instance: Arc::clone(instance),
         }))
     }
@@ -113,6 +119,11 @@ impl Device {
 
     pub fn name(&self) -> &str {
         &self.candidate.name
+    }
+
+    /// Submissions to the queue since the device was made.
+    pub fn submissions(&self) -> u64 {
+        self.submissions.load(Ordering::Relaxed)
     }
 
     pub fn limits(&self) -> &Limits {

@@ -26,6 +26,7 @@ mod surface;
 #[cfg(feature = "window")]
 mod swapchain;
 mod timestamps;
+mod uploads;
 
 use std::sync::{Mutex, MutexGuard};
 

@@ -41,12 +41,12 @@ impl Timestamps {
         })
     }
 
-    /// Seconds between each timestamp and the next, `count - 1` of them; the submission must be
-    /// done.
+    /// Seconds at which each timestamp was written, since a time that is the device's own; the
+    /// submission must be done.
     ///
     /// # Errors
     /// A device that fails.
-    pub fn intervals(&self) -> Result<Vec<f64>> {
+    pub fn seconds(&self) -> Result<Vec<f64>> {
         let TimestampsOwner { raw, count, device } = &*self.owner;
         let mut ticks = vec![0u64; *count as usize];
         // SAFETY: the pool holds as many results as the slice.
@@ -60,10 +60,17 @@ impl Timestamps {
         }
         .map_err(device.error("reading timestamps"))?;
         let period = device.limits().timestamp_period * 1e-9;
-        Ok(ticks
-            .windows(2)
-            .map(|t| t[1].saturating_sub(t[0]) as f64 * period)
-            .collect())
+        Ok(ticks.iter().map(|&t| t as f64 * period).collect())
+    }
+
+    /// Seconds between each timestamp and the next, `count - 1` of them; the submission must be
+    /// done.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn intervals(&self) -> Result<Vec<f64>> {
+        let seconds = self.seconds()?;
+        Ok(seconds.windows(2).map(|t| (t[1] - t[0]).max(0.0)).collect())
     }
 }
 

@@ -6,6 +6,7 @@ mod draw;
 
 use std::cell::RefCell;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use ash::vk;
 
@@ -23,6 +24,8 @@ pub struct Commands {
     fence: vk::Fence,
     under_way: bool,
     held: RefCell<Held>,
+    /// What buffers are to hold, brought by the last submission.
+    uploads: Option<Box<Commands>>,
     device: Arc<Device>,
 }
 
@@ -46,6 +49,7 @@ impl Commands {
             fence: vk::Fence::null(),
             under_way: false,
             held: RefCell::default(),
+            uploads: None,
             device: Arc::clone(device),
         };
         let info = vk::CommandBufferAllocateInfo::default()
@@ -108,7 +112,12 @@ impl Commands {
         before: &[vk::Semaphore],
     ) -> Result<()> {
         assert!(!self.under_way, "commands are submitted once at a time");
-        let infos = [vk::CommandBufferSubmitInfo::default().command_buffer(self.raw)];
+        // The queue is locked from here on: nobody else submits what needs these uploads before
+        // they come.
+        let queue = self.device.queue();
+        let uploads = Self::of_uploads(&self.device)?;
+        let buffer = |of: &Self| vk::CommandBufferSubmitInfo::default().command_buffer(of.raw);
+        let infos: Vec<_> = uploads.iter().chain([&*self]).map(buffer).collect();
         let at = |stage| {
             move |&semaphore: &vk::Semaphore| {
                 vk::SemaphoreSubmitInfo::default()
@@ -124,11 +133,13 @@ impl Commands {
             .command_buffer_infos(&infos)
             .wait_semaphore_infos(&waits)
             .signal_semaphore_infos(&signals)];
-        let queue = self.device.queue();
         // SAFETY: the fence is unsignalled and free, the queue is locked, and the recording has
         // ended.
         unsafe { self.device.raw.queue_submit2(*queue, &submits, self.fence) }
             .map_err(self.device.error("submitting"))?;
+        drop(queue);
+        self.device.submissions.fetch_add(1, Ordering::Relaxed);
+        self.uploads = uploads.map(Box::new);
         self.under_way = true;
         Ok(())
     }
@@ -151,8 +162,10 @@ impl Commands {
         unsafe {
             raw.wait_for_fences(&[self.fence], true, u64::MAX)?;
             self.under_way = false;
-            raw.reset_fences(&[self.fence])
+            raw.reset_fences(&[self.fence])?;
         }
+        self.uploads = None;
+        Ok(())
     }
 
     /// Keeps an owner alive until these commands are dropped.
@@ -215,7 +228,8 @@ impl Drop for Commands {
         let waited = self.wait_for_fence();
         if self.under_way && waited != Err(vk::Result::ERROR_DEVICE_LOST) {
             // The device may still execute these commands: what they use is leaked, not freed.
-            std::mem::forget((self.held.take(), Arc::clone(&self.device)));
+            let device = Arc::clone(&self.device);
+            std::mem::forget((self.held.take(), self.uploads.take(), device));
             return;
         }
         // SAFETY: the device executes none of these commands, or is lost.
