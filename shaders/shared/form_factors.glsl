@@ -110,10 +110,6 @@ FLUX parts_as_points(vec3 p, vec3 n, Source s) {
     return sum * INV_PI;
 }
 
-// A part of a curved source is a point from so many of its radii off, for receivers beside others
-// of its parts.
-const float NEAR_POINT_DISTANCE = 9.0;
-
 // Of a member: nothing where it does not show p its front.
 FLUX member(vec3 p, vec3 n, uint index, bool shows) {
     Triangle t = load_triangle(index);
@@ -139,7 +135,7 @@ FLUX parts_or_members(vec3 p, vec3 n, uint element, Source s) {
         vec3 way = low.xyz - p;
         vec3 vector_area = vec3(low.w, uintBitsToFloat(high.xy));
         float square = dot(way, way);
-        float least = NEAR_POINT_DISTANCE * uintBitsToFloat(high.z);
+        float least = PART_POINT_DISTANCE * uintBitsToFloat(high.z);
         bool far = square > least * least;
         float facing = max(-dot(vector_area, way), 0.0);
         float share = far ? INV_PI * facing / (square * square) : 0.0;
@@ -212,7 +208,8 @@ const vec3 POINTS[11] = vec3[](
 
 bool visible(vec3 p, vec3 n, uint element, Source s, bool asks) {
 #ifdef ITEM_BUFFER
-    uint sight = sight_of(p, n, element, first_slot, s, asks);
+    float share;
+    uint sight = sight_of(p, n, element, first_slot, s, asks, share);
     asks = sight == DOUBTFUL;
     if (subgroupBallot(asks) == uvec4(0)) {
         return sight == SEEN;
@@ -243,7 +240,7 @@ FLUX mean_form_factor(uint element, vec4 ball, vec3 n, Source s) {
         vec3 p = KIND == RECEIVE_CUT ? before_plane(ball.xyz, n, s) : ball.xyz;
         return form_factor(p, n, element, s);
     }
-    float gap = length(ball.xyz - s.middle) - s.radius;
+    float gap = gap_to(s, ball.xyz);
     bool near = gap <= NEAR * ball.w;
     // What sees much of a curved source receives it part by part instead: within its ball, but off
     // its members, one place will do.

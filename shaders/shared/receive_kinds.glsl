@@ -57,11 +57,11 @@ uint kind_of(Source s, vec4 ball, vec3 n, out bool near) {
     vec3 d = ball.xyz - s.middle;
     float distance_middle = length(d);
     float across = dot(d, n);
-    near = distance_middle - s.radius <= NEAR * ball.w;
+    near = gap_to(s, ball.xyz) <= NEAR * ball.w;
     bool behind = across >= s.radius;
     bool above = across <= -s.radius && distance_middle * distance_middle >= ACUTE * s.radius * s.radius;
     bool whole = shows_whole_front(s, ball.xyz);
-    bool points = distance_middle - s.radius >= POINT_DISTANCE * s.part_radius;
+    bool points = distance_middle - s.radius >= (whole ? POINT_DISTANCE : PART_POINT_DISTANCE) * s.part_radius;
     bool curved = s.cone_sin != 0.0;
     float far_distance = (curved ? POINT_DISTANCE : FLAT_POINT_DISTANCE) * s.radius;
     bool far = s.kind == KIND_POINT || whole && distance_middle >= far_distance;

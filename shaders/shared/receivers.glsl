@@ -53,9 +53,12 @@ const float ACUTE = 2.1;
 // has another sign.
 const float FLAT_POINT_DISTANCE = 32.0;
 const float POINT_DISTANCE = 16.0;
+// A part of a curved source that is partly turned away, or whose ball an element lies in. At 9 the
+// error of bakes is the same.
+const float PART_POINT_DISTANCE = 5.0;
 // Step of the share of a source that a listed element sees.
 const float SHARE_STEP = 1.0 / float(1 << SHARE_BITS);
-// An element no further than so many of its radii from a source takes several samples.
+// An element no further than so many of its radii from a source (see gap_to) takes several samples.
 const float NEAR = 4.0;
 
 // A place on a source.
@@ -123,8 +126,16 @@ bool shown(vec3 p, vec3 n, uint slot, Source s) {
 }
 
 // What the four pixels about p show: it is doubtful where they do not agree. The answer of a lane
-// is the same in any company.
-uint sight_of(vec3 p, vec3 n, uint element, uint slot, Source s, bool asks) {
+// is the same in any company. `share`: of the pixels that show it.
+uint sight_of(
+    vec3 p,
+    vec3 n,
+    uint element,
+    uint slot,
+    Source s,
+    bool asks,
+    out float share
+) {
     vec3 d = p - s.eye;
     vec3 local = vec3(dot(d, s.tangent), dot(d, s.bitangent), dot(d, s.normal));
     ivec2 first = hemicube_corner(hemicube_texel(local, face_size), face_size);
@@ -151,6 +162,7 @@ uint sight_of(vec3 p, vec3 n, uint element, uint slot, Source s, bool asks) {
             looked += looks ? 1 : 0;
         }
     }
+    share = float(open) / float(max(looked, 1));
     return open == 0 ? HIDDEN_FROM : open == looked && !doubtful ? SEEN : DOUBTFUL;
 }
 #endif
@@ -166,6 +178,14 @@ Source load_source(uint index) {
                   word[3].xyz, word[3].w, word[4].xyz, floatBitsToUint(word[4].w), ranges.x,
                   ranges.y, ranges.z, ranges.w, floatBitsToUint(word[6].x), word[6].yzw, word[7].x,
                   word[7].y, parts.x, parts.y);
+}
+
+// The least distance at which a place may lie from a source: from its ball, and of a plane one from
+// its plane.
+float gap_to(Source s, vec3 p) {
+    vec3 d = p - s.middle;
+    float height = s.kind != KIND_POINT && s.cone_sin == 0.0 ? abs(dot(d, s.normal)) : 0.0;
+    return max(length(d) - s.radius, height);
 }
 
 // Whether every member shows p its front: the cone of normals and the ball bound their heights.

@@ -18,6 +18,11 @@
 layout(constant_id = 0) const uint CULL_BLOCKS = 1;
 // 1: where a silhouette may cut a source, rays find the share of it that an element sees.
 layout(constant_id = 1) const uint SILHOUETTES = 1;
+#ifdef ITEM_BUFFER
+// 1: where the four pixels about an element do not agree, it sees the share of the source that they
+// show it; no rays.
+layout(constant_id = 2) const uint PIXELS_DECIDE = 0;
+#endif
 
 // Elements that see nothing of a source, whatever stands between: it lies behind them or shows them
 // its back, [slot].
@@ -241,10 +246,14 @@ void main() {
                 bool below = SILHOUETTES == 1 && asks && eye_is_below(s, ball[j].xyz, n[j]);
                 asks = asks && !below;
                 bool wide = SILHOUETTES == 1 && asks && fills;
-                uint sight = sight_of(ball[j].xyz, n[j], e, slot, s, asks);
+                float share;
+                uint sight = sight_of(ball[j].xyz, n[j], e, slot, s, asks, share);
                 bool crossed = below || wide && sight == DOUBTFUL || around_differs(ball[j].xyz, n[j], slot, s, sight, wide);
-                append(slot, kind, mine && (near || sight == SEEN) && !crossed, with_share(i, 1.0));
-                append_one(slot, RECEIVE_DOUBTFUL, sight == DOUBTFUL && !crossed, i);
+                bool open = sight == SEEN || PIXELS_DECIDE == 1 && sight == DOUBTFUL;
+                append(slot, kind, mine && (near || open) && !crossed, with_share(i, near ? 1.0 : share));
+                if (PIXELS_DECIDE == 0) {
+                    append_one(slot, RECEIVE_DOUBTFUL, sight == DOUBTFUL && !crossed, i);
+                }
                 append_one(slot, RECEIVE_CROSSED, crossed, i);
                 of_slot += subgroupBallotBitCount(subgroupBallot(i < element_count && kind == RECEIVE_KINDS));
             }

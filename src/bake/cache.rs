@@ -32,6 +32,7 @@ impl CachedBake {
             hemicube,
             emitter_hemicube: _,
             emitter_places,
+            places,
             residual,
             // A bake that this stopped is not kept.
             budget: _,
@@ -54,7 +55,7 @@ impl CachedBake {
         let emitter_shadows = settings.emitter_shadows();
         let scene_hash = scene.hash();
         let key = format!(
-            "bake cache 8, layout {VERSION}\n{maker}\n{scene_hash}\n{estimator:?} {hemicube} {emitter_shadows:?} {emitter_places} {residual:?} {shots:?} {seed} \
+            "bake cache 9, layout {VERSION}\n{maker}\n{scene_hash}\n{estimator:?} {hemicube} {emitter_shadows:?} {emitter_places} {places} {residual:?} {shots:?} {seed} \
              {grouping:?} {nearness:?} {silhouettes} {normalise} {carries} {culling:?} {merging} {batch} {visibility_memory:?} {coupling_memory} {:?} {:?}",
             relief.transport, relief.directions
         );

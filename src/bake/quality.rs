@@ -30,46 +30,38 @@ impl Quality {
     /// The settings, all others at their defaults.
     pub fn settings(self) -> Settings {
         let (hemicube, scale, residual) = match self {
-            Self::Preview => (64, 8.0, 0.5),
+            Self::Preview => (64, 10.0, 0.5),
             Self::Draft => (64, 4.0, 2.5e-2),
             Self::Normal => (128, 1.0, 1e-3),
             Self::High => (256, 1.0 / 16.0, 1e-4),
             Self::Reference => (512, 1.0 / 32.0, 1e-5),
         };
-        let e = |n: &str, d: f64| std::env::var(n).map_or(d, |v| v.parse().unwrap());
-        let hemicube = e("MS_HEMI", hemicube.into()) as u32;
-        let scale = e("MS_SCALE", scale);
-        let mut s = Settings {
-            residual: e("MS_RES", residual),
+        Settings {
+            residual,
             ..sized(hemicube, scale)
-        };
-        s.nearness.source = e("MS_NEARS", s.nearness.source);
-        s.nearness.part = e("MS_NEARP", s.nearness.part);
-        s.emitter_places = e("MS_PLACES", s.emitter_places.into()) as u32;
-        s.grouping.max_power = e("MS_POWER", s.grouping.max_power);
-        s
+        }
     }
 }
 
 /// The settings of hemicubes of so many pixels a side and sources `scale` times the default size:
-/// where sources are large, emitters are looked at from fewer places, and fewer sources are near.
+/// where sources are large, shadows are looked at from fewer places, and fewer sources are near.
 pub fn sized(hemicube: u32, scale: f64) -> Settings {
     let plain = Settings::default();
-    let emitter_places = match scale {
-        8.0.. => 16,
-        4.0.. => 32,
-        _ => plain.emitter_places,
+    let (emitter_places, places) = match scale {
+        8.0.. => (16, 0),
+        4.0.. => (32, 2),
+        _ => (plain.emitter_places, plain.places),
     };
+    let near = |source, part| Nearness { source, part };
     let nearness = match scale {
-        8.0.. => Nearness {
-            source: 1.0 / 5.0,
-            part: 1.0 / 8.0,
-        },
+        8.0.. => near(1.0 / 2.0, 1.0 / 4.0),
+        4.0.. => near(1.0 / 10.0, 1.0 / 16.0),
         _ => plain.nearness,
     };
     Settings {
         hemicube,
         emitter_places,
+        places,
         nearness,
         grouping: scaled(scale),
         ..plain
@@ -108,6 +100,7 @@ mod tests {
             assert!(b.max_elements <= a.max_elements && b.max_area <= a.max_area);
             assert!(b.max_power <= a.max_power);
             assert!(better.emitter_places >= worse.emitter_places);
+            assert!(better.places >= worse.places);
             assert!(better.nearness.source <= worse.nearness.source);
         }
     }

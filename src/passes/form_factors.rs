@@ -33,8 +33,9 @@ pub struct Care {
     pub culls: bool,
     /// Where a silhouette may cut a source, rays find the share of it that an element sees.
     pub silhouettes: bool,
-    /// Places on a source without a hemicube from which rays find that share; divides
-    /// [`crate::constants::SOURCE_EYES`].
+    /// Places on a source from which rays find that share; divides
+    /// [`crate::constants::SOURCE_EYES`]. 0: where the pixels of a hemicube about an element do not
+    /// agree, it sees the share of the source that they show, and no rays are followed.
     pub places: u32,
 }
 
@@ -247,7 +248,12 @@ fn sort(
     care: Care,
 ) -> Result<BoundCompute> {
     let pipeline = |shader: &ComputeShader<'_>| {
-        let constants = [care.culls, care.silhouettes].map(u32::from);
+        let constants = [
+            care.culls,
+            care.silhouettes && care.places > 0,
+            care.places == 0,
+        ];
+        let constants = constants.map(u32::from);
         ComputePipeline::in_subgroups(device, "sort receivers", shader, &constants)
     };
     let (away_count, blocks) = (&on.rows.facing_away, &on.scene.receiver_blocks);
@@ -280,15 +286,14 @@ fn rays(hemicubes: &Hemicubes) -> &OccluderTree {
     tree.expect("a batch for form factors has rays")
 }
 
-/// Places on a source with a hemicube from which rays find the share of it that is seen.
-const HEMICUBE_EYES: u32 = 4;
-
 /// One a list that is left open.
 fn resolve(device: &Arc<Device>, on: &On<'_>, places: u32) -> Result<Vec<(u32, BoundCompute)>> {
-    // Those of strong emitters are the sharpest shadows.
-    let (tree, from) = match &on.batch.sight {
-        Sight::Rays(tree) => (tree, places),
-        Sight::Hemicubes(hemicubes) => (rays(hemicubes), HEMICUBE_EYES),
+    if places == 0 {
+        return Ok(Vec::new());
+    }
+    let tree = match &on.batch.sight {
+        Sight::Rays(tree) => tree,
+        Sight::Hemicubes(hemicubes) => rays(hemicubes),
     };
     let (shadow_nodes, shadow_occluders) = (&tree.nodes, &tree.occluders);
     let eyes = &on.scene.eyes;
@@ -296,7 +301,7 @@ fn resolve(device: &Arc<Device>, on: &On<'_>, places: u32) -> Result<Vec<(u32, B
     let bind = |list: u32| {
         let shader = &resolve_receivers::SHADER;
         let pipeline =
-            ComputePipeline::in_subgroups(device, "resolve receivers", shader, &[list, from])?;
+            ComputePipeline::in_subgroups(device, "resolve receivers", shader, &[list, places])?;
         Ok((list, pipeline.bind(&bindings)?))
     };
     [RECEIVE_DOUBTFUL, RECEIVE_CROSSED]

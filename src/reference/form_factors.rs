@@ -30,7 +30,7 @@ pub fn gather(
     let triangle = elements.triangle(element);
     let centroid = elements.centroid[element];
     let size = elements.radius(element);
-    let gap = centroid.distance(source.centroid) - source.radius;
+    let gap = gap_to(source, centroid);
     if gap > 4.0 * size && lies_in_plane(centroid, elements.normal[element], source) {
         return 0.0;
     }
@@ -45,6 +45,22 @@ pub fn gather(
             if f > 0.0 && seen(p) { weight * f } else { 0.0 }
         })
         .sum()
+}
+
+/// Whether an element is so near a source that several of its places are looked at one by one, as
+/// in the shader.
+pub fn is_near(elements: &Elements, source: &Source, element: usize) -> bool {
+    gap_to(source, elements.centroid[element]) <= 4.0 * elements.radius(element)
+}
+
+/// As in the shader: the least distance at which a place may lie from a source.
+fn gap_to(source: &Source, p: DVec3) -> f64 {
+    let d = p - source.centroid;
+    let height = match source.kind != KIND_POINT && source.cone == 0.0 {
+        true => d.dot(source.normal).abs(),
+        false => 0.0,
+    };
+    (d.length() - source.radius).max(height)
 }
 
 /// Cosine of the largest angle between surfaces that count as parallel, as in the shader.
@@ -113,7 +129,7 @@ fn form_factor(elements: &Elements, source: &Source, p: DVec3, element: usize) -
     let of_part = |part: &Part| {
         let way = part.centroid - p;
         let square = way.length_squared();
-        if square <= (NEAR_POINT_DISTANCE * part.radius).powi(2) {
+        if square <= (PART_POINT_DISTANCE * part.radius).powi(2) {
             return part.members.iter().map(|&m| of_member(m as usize)).sum();
         }
         let facing = (-part.vector_area.dot(way)).max(0.0);
@@ -123,7 +139,7 @@ fn form_factor(elements: &Elements, source: &Source, p: DVec3, element: usize) -
 }
 
 /// Radii of a part from which on it counts as a point, as in the shader.
-const NEAR_POINT_DISTANCE: f64 = 9.0;
+const PART_POINT_DISTANCE: f64 = 5.0;
 
 /// As in the shader: whether every member of a curved source shows a place its front.
 fn shows_whole_front(p: DVec3, source: &Source) -> bool {
@@ -170,17 +186,26 @@ impl Drawn<'_> {
 
     /// What the four pixels about a place `p` on an element show.
     pub fn sight(&self, p: DVec3, element: usize) -> Verdict {
-        let pixels = pixels_about(self.local(p), self.n);
-        let says = pixels.map(|pixel| match self.item(pixel) {
+        // In front of what they all show, a place is open whatever the pixel.
+        match self.says(p, element) {
+            [first, others @ ..] if others.iter().all(|&other| other == first) => first,
+            _ => Verdict::Doubtful,
+        }
+    }
+
+    /// Share of the four pixels about a place `p` on an element that show it.
+    pub fn share(&self, p: DVec3, element: usize) -> f64 {
+        let says = self.says(p, element);
+        let open = says.iter().filter(|&&says| says != Verdict::Hidden);
+        open.count() as f64 / says.len() as f64
+    }
+
+    fn says(&self, p: DVec3, element: usize) -> [Verdict; 4] {
+        pixels_about(self.local(p), self.n).map(|pixel| match self.item(pixel) {
             NONE => Verdict::Seen,
             item if item as usize == element => Verdict::Seen,
             item => self.leaves_open(item, pixel, p, element),
-        });
-        // In front of what they all show, a place is open whatever the pixel.
-        match says {
-            [first, ..] if says.iter().all(|&other| other == first) => first,
-            _ => Verdict::Doubtful,
-        }
+        })
     }
 
     /// Whether a place on an element is seen where a pixel shows an item.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{Estimator, Settings};
 use crate::error::Result;
-use crate::passes::batch::Batch;
+use crate::passes::batch::{Batch, Sight};
 use crate::passes::bin_pixels::BinPixels;
 use crate::passes::buffers::SceneBuffers;
 use crate::passes::cull::Culling;
@@ -43,7 +43,10 @@ impl Evaluate {
         let care = Care {
             culls: settings.culling != Culling::Off,
             silhouettes: settings.silhouettes,
-            places: settings.emitter_places,
+            places: match batch.sight {
+                Sight::Hemicubes(_) => settings.places,
+                Sight::Rays(_) => settings.emitter_places,
+            },
         };
         let normalise = || Normalise::new(device, scene, batch, fresh, settings.normalise);
         Ok(Self::Receivers {

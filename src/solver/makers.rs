@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use super::rows::{Looks, RowMaker, RowParts, emitter_looks};
 use super::{Estimator, Problem};
 use crate::constants::KIND_BEAM;
@@ -92,20 +94,27 @@ impl Makers {
             occluders: occluders.as_ref(),
             kept,
         };
-        let mut others = Vec::new();
-        for kind in [RowKind::Strong, RowKind::Far, RowKind::Beam] {
-            let looks = match kind {
-                _ if !parts.kinds.contains(&kind) => None,
-                RowKind::Strong => emitter_looks(device, settings),
-                RowKind::Far => Some(Looks::Lights { beams: false }),
-                _ => Some(Looks::Lights { beams: true }),
-            };
-            if let Some(looks) = looks {
-                others.push((kind, RowMaker::new(device, &row_parts, looks)?));
-            }
-        }
-        let all = RowMaker::new(device, &row_parts, Looks::Hemicubes(settings.hemicube))?;
-        Ok(Self { all, others })
+        let looks = |kind| match kind {
+            RowKind::Common => Some(Looks::Hemicubes(settings.hemicube)),
+            _ if !parts.kinds.contains(&kind) => None,
+            RowKind::Strong => emitter_looks(device, settings),
+            RowKind::Far => Some(Looks::Lights { beams: false }),
+            RowKind::Beam => Some(Looks::Lights { beams: true }),
+        };
+        let kinds = [
+            RowKind::Strong,
+            RowKind::Far,
+            RowKind::Beam,
+            RowKind::Common,
+        ];
+        let make = |kind| Some(RowMaker::new(device, &row_parts, looks(kind)?).map(|m| (kind, m)));
+        // Most of this is compiling pipelines, which drivers do on the thread that asks.
+        let mut makers = (kinds.into_par_iter().filter_map(make)).collect::<Result<Vec<_>>>()?;
+        let (_, all) = makers.pop().expect("common sources are always drawn");
+        Ok(Self {
+            all,
+            others: makers,
+        })
     }
 
     /// Whether it makes rows of a kind other than as those of all others.

@@ -49,6 +49,9 @@ pub struct Settings {
     /// Places on a strong emitter from which rays find the share of it that is seen where something
     /// may cut it; divides [`crate::constants::SOURCE_EYES`].
     pub emitter_places: u32,
+    /// The same of a source with a hemicube. 0: no rays are followed; where the pixels about an
+    /// element do not agree, it sees the share of the source that they show.
+    pub places: u32,
     /// Stops when the error bound is no more than this.
     pub residual: f64,
     /// Stops after this time.
@@ -93,6 +96,7 @@ impl Default for Settings {
             hemicube: 128,
             emitter_hemicube: None,
             emitter_places: SOURCE_EYES,
+            places: 4,
             residual: 1e-3,
             budget: None,
             shots: None,
@@ -163,11 +167,13 @@ impl Settings {
                 finer.end()
             )));
         }
-        let places = self.emitter_places;
-        if places == 0 || !SOURCE_EYES.is_multiple_of(places) {
-            return Err(Error::Usage(format!(
-                "places on an emitter: {places} does not divide {SOURCE_EYES}"
-            )));
+        // Places on other sources may be none.
+        for places in [self.emitter_places, self.places.max(1)] {
+            if places == 0 || !SOURCE_EYES.is_multiple_of(places) {
+                return Err(Error::Usage(format!(
+                    "places on a source: {places} does not divide {SOURCE_EYES}"
+                )));
+            }
         }
         if !(self.residual.is_finite() && self.residual > 0.0) {
             return Err(Error::Usage(format!(

@@ -87,9 +87,10 @@ fn key(scene: &Scene, settings: &Settings) -> String {
         settings.silhouettes,
         settings.normalise,
         settings.emitter_places,
+        settings.places,
     );
     hash.update(format!(
-        "9 {estimator:?} {sizes:?} {seed} {grouping:?} {near:?} {flat}"
+        "10 {estimator:?} {sizes:?} {seed} {grouping:?} {near:?} {flat}"
     ));
     hexadecimal(hash)
 }
