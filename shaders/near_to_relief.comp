@@ -7,6 +7,7 @@
 #include "shared/directions.glsl"
 #include "shared/disc.glsl"
 #include "shared/accumulate.glsl"
+#include "shared/texels.glsl"
 
 layout(local_size_x = GROUP) in;
 
@@ -17,7 +18,7 @@ layout(scalar, binding = 1) readonly buffer Parts { NearPart parts[]; };
 layout(scalar, binding = 2) readonly buffer Beyond { vec3 beyond[]; };
 layout(scalar, binding = 3) readonly buffer MesoElements { MesoElement meso_elements[]; };
 // Radiosity for each moment, [response][direction][colour].
-layout(scalar, binding = 4) readonly buffer Albedos { vec3 albedos[]; };
+layout(binding = 4) uniform usamplerBuffer albedos;
 // [meso element][direction][colour]
 layout(scalar, binding = 5) buffer Moments { vec3 moments[]; };
 layout(scalar, binding = 6) buffer MesoReflected { Reflected meso_reflected[]; };

@@ -9,6 +9,7 @@
 #extension GL_KHR_shader_subgroup_ballot : require
 #include "shared/types.glsl"
 #include "shared/directions.glsl"
+#include "shared/texels.glsl"
 
 layout(local_size_x = MOST_DIRECTIONS) in;
 
@@ -18,7 +19,7 @@ layout(scalar, binding = 2) readonly buffer Planes { vec4 planes[]; };
 layout(scalar, binding = 3) readonly buffer Areas { float element_area[]; };
 layout(scalar, binding = 4) readonly buffer MesoElements { MesoElement meso_elements[]; };
 // [response][direction in][direction out][colour]
-layout(scalar, binding = 5) readonly buffer Matrices { vec3 matrices[]; };
+layout(binding = 5) uniform usamplerBuffer matrices;
 // Sent light for a mean emitted radiosity of 1, [response][direction].
 layout(scalar, binding = 6) readonly buffer Emissions { vec3 emissions[]; };
 // Share of a uniform sender's power in each direction.
@@ -30,7 +31,7 @@ layout(scalar, binding = 10) buffer ShotExits { vec3 shot_exits[]; };
 // Of each member, [slot][member][direction].
 layout(scalar, binding = 11) coherent buffer MemberExits { vec3 member_exits[]; };
 // [slot][emitted, reflected][direction]
-layout(scalar, binding = 12) writeonly buffer Exits { vec3 exits[]; };
+layout(scalar, binding = 12) writeonly buffer Exits { vec4 exits[]; };
 
 // Slots without light that were left out so far, [relief source].
 layout(scalar, binding = 13) buffer DarkSlots { uint dark_slots[]; };
@@ -115,7 +116,7 @@ void main() {
                     continue;
                 }
                 uint row = 3 * ((meso.response * count + first + lane) * count + min(j, count - 1));
-                sent += vec3(dot(matrices[row], red), dot(matrices[row + 1], green), dot(matrices[row + 2], blue));
+                sent += vec3(dot(fetch(matrices, row).xyz, red), dot(fetch(matrices, row + 1).xyz, green), dot(fetch(matrices, row + 2).xyz, blue));
             }
         }
         if (mine) {
@@ -166,7 +167,7 @@ void main() {
     if (mine) {
         reflected = with_power(reflected, power, power_before + shot.reflected);
         shot_exits[kept] = reflected;
-        exits[2 * slot * count + j] = with_power(emitted, emitted_power, shot.emitted);
-        exits[(2 * slot + 1) * count + j] = reflected - before;
+        exits[2 * slot * count + j] = vec4(with_power(emitted, emitted_power, shot.emitted), 0.0);
+        exits[(2 * slot + 1) * count + j] = vec4(reflected - before, 0.0);
     }
 }

@@ -45,7 +45,7 @@ layout(binding = 3) uniform usamplerBuffer words;
 layout(scalar, binding = 4) readonly buffer Slots { Slot slots[]; };
 // Light that the sources with a relief send by direction,
 // [slot from first_slot on][emitted, reflected][direction].
-layout(scalar, binding = 5) readonly buffer Exits { vec3 exits[]; };
+layout(binding = 5) uniform usamplerBuffer exits;
 // SOURCE_TEXELS a source.
 layout(binding = 6) uniform usamplerBuffer sources;
 layout(scalar, binding = 7) readonly buffer Balls { vec4 balls[]; };
@@ -53,7 +53,7 @@ layout(scalar, binding = 7) readonly buffer Balls { vec4 balls[]; };
 #ifdef TO_RELIEF
 layout(scalar, binding = 8) readonly buffer MesoElements { MesoElement meso_elements[]; };
 // Radiosity for each moment, [response][direction][colour].
-layout(scalar, binding = 9) readonly buffer Albedos { vec3 albedos[]; };
+layout(binding = 9) uniform usamplerBuffer albedos;
 // Moments ∫ L ω dω of the light that arrives, in the element's frame, [meso
 // element][direction][colour].
 layout(scalar, binding = 10) buffer Moments { vec3 moments[]; };

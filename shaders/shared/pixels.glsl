@@ -8,6 +8,7 @@
 #include "shared/types.glsl"
 #include "shared/hemicube.glsl"
 #include "shared/directions.glsl"
+#include "shared/texels.glsl"
 
 layout(local_size_x = GROUP) in;
 
@@ -24,12 +25,12 @@ layout(scalar, binding = 8) buffer DirectError { vec3 direct_error[]; };
 layout(scalar, binding = 9) buffer Indirect { vec3 indirect[]; };
 layout(scalar, binding = 10) buffer IndirectError { vec3 indirect_error[]; };
 // Light that the sources with a relief send by direction, [slot][emitted, reflected][direction].
-layout(scalar, binding = 11) readonly buffer Exits { vec3 exits[]; };
+layout(binding = 11) uniform usamplerBuffer exits;
 layout(binding = 12) uniform usampler2D items;
 #ifdef TO_RELIEF
 layout(scalar, binding = 13) readonly buffer MesoElements { MesoElement meso_elements[]; };
 // Radiosity for each moment, [response][direction][colour].
-layout(scalar, binding = 14) readonly buffer Albedos { vec3 albedos[]; };
+layout(binding = 14) uniform usamplerBuffer albedos;
 // [meso element][direction][colour]
 layout(scalar, binding = 15) buffer MomentsDirect { vec3 moments_direct[]; };
 layout(scalar, binding = 16) buffer MomentsIndirect { vec3 moments_indirect[]; };
@@ -223,7 +224,7 @@ void main() {
                         }
                     } else {
                         for (uint colour = 0; colour < 3; colour++) {
-                            float albedo = dot(albedos[response + colour], moment);
+                            float albedo = dot(fetch(albedos, response + colour).xyz, moment);
                             add_reflected[colour] += albedo * meso.scale[colour] * brought[colour];
                         }
                     }

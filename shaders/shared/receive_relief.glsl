@@ -15,7 +15,7 @@ vec3 receive_by_direction(uint i, uint response, vec3 f, vec3 light) {
         uint albedo = 3 * (response * directions + k);
         for (uint c = 0; c < 3; c++) {
             moments[at + c] += light[c] * point;
-            reflected[c] += dot(albedos[albedo + c], point) * light[c];
+            reflected[c] += dot(fetch(albedos, albedo + c).xyz, point) * light[c];
         }
     }
     return reflected;

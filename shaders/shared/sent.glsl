@@ -7,7 +7,7 @@ vec3 sent_towards(uint slot, uint kind, vec3 local) {
     uint first = (2 * slot + kind) * cells.x * cells.y;
     vec3 sent = vec3(0.0);
     for (uint i = 0; i < 4; i++) {
-        sent += at.weight[i] * exits[first + at.k[i]];
+        sent += at.weight[i] * fetch(exits, first + at.k[i]).xyz;
     }
     return sent;
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bytemuck::Zeroable;
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 use super::buffers::{filled, upload};
 use super::types::{MesoElement, Reflected};
@@ -12,7 +12,7 @@ use crate::math::directions::Directions;
 use crate::mesh::elements::Elements;
 use crate::mesh::sources::Sources;
 use crate::meso::{Relief, slot_shares};
-use crate::vk::{Buffer, BufferUse, Device};
+use crate::vk::{Buffer, BufferUse, Device, TEXEL_BYTES};
 
 /// The elements with a relief, in their order.
 pub fn meso_elements(elements: &Elements, relief: &Relief) -> Vec<MesoElement> {
@@ -39,9 +39,9 @@ pub struct ReliefBuffers {
     /// Sources that send by direction at once, at most.
     pub slots: u32,
     pub elements: Buffer,
-    /// R, `[response][in][out][colour]`, vectors.
+    /// R, `[response][in][out][colour]`, vectors in texels.
     pub matrices: Buffer,
-    /// `[response][in][colour]`, vectors.
+    /// `[response][in][colour]`, vectors in texels.
     pub albedos: Buffer,
     /// H over its mean, `[response][out]`.
     pub emissions: Buffer,
@@ -54,7 +54,7 @@ pub struct ReliefBuffers {
     pub shot_exits: Buffer,
     /// `[slot][member][direction]`.
     pub member_exits: Buffer,
-    /// `[slot][emitted, reflected][direction]`.
+    /// `[slot][emitted, reflected][direction]`, a texel each.
     pub exits: Buffer,
     /// Slots without light that were left out, `[relief source]`.
     pub dark_slots: Buffer,
@@ -107,7 +107,7 @@ impl ReliefBuffers {
         let responses = Responses::new(relief);
         let shares = slot_shares(&relief.directions);
         let shares: Vec<f32> = shares.iter().map(|&s| s as f32).collect();
-        let uses = BufferUse::Storage;
+        let (uses, texels_use) = (BufferUse::Storage, BufferUse::Texels);
         let zeroed = |name, bytes| filled(device, name, bytes, 0);
         let slots = u64::from(batch_slots);
         let reflected_bytes = (size_of::<Reflected>() * meso.len()) as u64;
@@ -120,8 +120,8 @@ impl ReliefBuffers {
             most_members,
             slots: batch_slots,
             elements: upload(device, "meso elements", &gpu_elements, uses)?,
-            matrices: upload(device, "relief matrices", &responses.matrices, uses)?,
-            albedos: upload(device, "relief albedos", &responses.albedos, uses)?,
+            matrices: upload(device, "relief matrices", &responses.matrices, texels_use)?,
+            albedos: upload(device, "relief albedos", &responses.albedos, texels_use)?,
             emissions: upload(device, "relief emissions", &responses.emissions, uses)?,
             shares: upload(device, "direction shares", &shares, uses)?,
             moments_direct: zeroed("moments direct", moment_bytes)?,
@@ -134,7 +134,7 @@ impl ReliefBuffers {
                 12 * k * slots * u64::from(most_members),
                 uses,
             )?,
-            exits: Buffer::new(device, "exits", 24 * k * slots, uses)?,
+            exits: Buffer::new(device, "exits", 2 * TEXEL_BYTES * k * slots, texels_use)?,
             dark_slots: zeroed("dark slots", 4 * of_relief.len() as u64)?,
             by_pixel,
             texels: upload(device, "meso texels", &texels, uses)?,
@@ -180,8 +180,8 @@ fn check_room(device: &Device, elements: usize, directions: u64, bytes: u64) -> 
 
 /// All responses, one after another; see [`ReliefBuffers`].
 struct Responses {
-    matrices: Vec<Vec3>,
-    albedos: Vec<Vec3>,
+    matrices: Vec<Vec4>,
+    albedos: Vec<Vec4>,
     emissions: Vec<Vec3>,
 }
 
@@ -191,11 +191,11 @@ impl Responses {
         Self {
             matrices: responses()
                 .flat_map(|r| r.matrix.iter().flatten())
-                .copied()
+                .map(|row| row.extend(0.0))
                 .collect(),
             albedos: responses()
                 .flat_map(|r| r.albedo.iter().flatten())
-                .copied()
+                .map(|albedo| albedo.extend(0.0))
                 .collect(),
             emissions: responses()
                 .flat_map(|r| r.emission.iter().map(|h| *h / r.mean_emission))

@@ -34,6 +34,12 @@ pub(super) struct Candidates {
     pub kind: RowKind,
 }
 
+/// The order of sources with their powers: those that differ by rounding alone are equal.
+pub(super) fn strongest_first(a: &(u32, f64), b: &(u32, f64)) -> std::cmp::Ordering {
+    let power = |(_, power): &(u32, f64)| *power as f32;
+    power(b).total_cmp(&power(a)).then(a.0.cmp(&b.0))
+}
+
 /// What has been done with a source.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Drawn {
@@ -64,6 +70,9 @@ const UNGATHERED: f64 = 0.02;
 
 /// Of [`UNDRAWN`] what drawing aims at first: carried light bounces, which adds to what is unshot.
 const AIM: f64 = 0.95;
+
+/// Sources of a batch, at least, where so many are left.
+const FEWEST: usize = 4;
 
 /// About the share of a relief's light that leaves in other directions than if it left evenly.
 const UNEVEN: f64 = 0.1;
@@ -130,7 +139,6 @@ impl Ledger {
     /// then other lights; after them all others, until little is left; then what still emits.
     pub fn undrawn(&self) -> Option<Candidates> {
         let (mut first, mut emitting, mut others) = (Vec::new(), Vec::new(), Vec::new());
-        let (mut missing, mut squared) = (0.0, 0.0);
         for (s, drawn) in self.sources.iter().enumerate() {
             if self.system.is_drawn(s) || drawn.under_way {
                 continue;
@@ -145,8 +153,6 @@ impl Ledger {
             } else if emitted > 0.0 {
                 emitting.push(candidate);
             } else {
-                missing += self.system.missing(s);
-                squared += self.system.unshot_squared(s);
                 others.push(candidate);
             }
         }
@@ -157,16 +163,36 @@ impl Ledger {
                 kind,
             });
         }
-        let bound = self.bound;
-        let little = missing <= self.aim * bound.most_missing() && squared <= bound.most_squared();
         let mut powers = emitting;
-        if !little {
-            powers.extend(others);
-        }
+        others.sort_by(strongest_first);
+        others.truncate(self.until_little(&others));
+        powers.extend(others);
         (!powers.is_empty()).then_some(Candidates {
             powers,
             kind: RowKind::Common,
         })
+    }
+
+    /// How many of these, in this order, are to be drawn until little is left; none if it is.
+    fn until_little(&self, sources: &[(u32, f64)]) -> usize {
+        let missing = |s: &(u32, f64)| self.system.missing(s.0 as usize);
+        let squared = |s: &(u32, f64)| self.system.unshot_squared(s.0 as usize);
+        let (mut missed, mut squares) = (
+            self.aim * self.bound.most_missing(),
+            self.bound.most_squared(),
+        );
+        // From the weakest on, those that may be left.
+        let left = sources.iter().rev().take_while(|s| {
+            missed -= missing(s);
+            squares -= squared(s);
+            missed >= 0.0 && squares >= 0.0
+        });
+        let many = sources.len() - left.count();
+        // What they reflect makes others strong: no batch is of very few.
+        match many {
+            0 => 0,
+            many => many.max(FEWEST).min(sources.len()),
+        }
     }
 
     /// Sources without rows that owe the elements light, with its power, unless little is left.

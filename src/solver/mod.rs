@@ -36,7 +36,7 @@ mod visibility;
 use std::sync::Arc;
 use std::time::Instant;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec4};
 
 use crate::error::{Error, Result};
 use crate::mesh::elements::Elements;
@@ -334,7 +334,10 @@ impl Solver {
         };
         Ok(Some(ReliefExits {
             slots,
-            exits: download(&self.device, &relief.exits, 2 * k * count)?,
+            exits: download::<Vec4>(&self.device, &relief.exits, 2 * k * count)?
+                .into_iter()
+                .map(Vec4::truncate)
+                .collect(),
             kept: download(
                 &self.device,
                 &relief.shot_exits,

@@ -14,7 +14,7 @@ use settling::MOST_TURNS;
 
 use super::coupling::CouplingRow;
 use super::gather::{Gathering, LitRow};
-use super::ledger::{Candidates, Drawn, Ledger};
+use super::ledger::{Candidates, Drawn, Ledger, strongest_first};
 use super::makers::{Batch, RowKind, TeamParts};
 use super::near::NearLight;
 use super::progress::{Bound, Watch};
@@ -283,9 +283,7 @@ impl Spine {
         if !team.has_room(kind) {
             return Ok(None);
         }
-        // Powers that differ by rounding alone are equal.
-        let power = |(_, power): &(u32, f64)| *power as f32;
-        candidates.sort_by(|a, b| power(b).total_cmp(&power(a)).then(a.0.cmp(&b.0)));
+        candidates.sort_by(strongest_first);
         candidates.truncate(team.slots(kind).min(left).min(worth));
         let sources = candidates.into_iter().map(|(s, _)| s).collect();
         Ok(Some(Batch { sources, kind }))

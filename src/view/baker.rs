@@ -14,11 +14,12 @@ use super::orders::{Given, Latest, Order, Stage};
 use super::snapshot::{Progress, Snapshot, is_done};
 use super::{DeviceChoice, Wake};
 use crate::bake;
+use crate::bake::quality::Quality;
 use crate::error::{Error, Result};
 use crate::mesh::elements::Elements;
 use crate::meso::Transport;
 use crate::scene::{Material, Scene};
-use crate::solver::{Settings, Solver, Update, Visibility};
+use crate::solver::{Estimator, Settings, Solver, Update, Visibility};
 
 /// The window's end of the thread.
 pub struct Baker {
@@ -94,8 +95,12 @@ const SLICES: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(2
 /// wait too long.
 const SHARE: u32 = 8;
 
-/// How long a scene is lit as if its relief were flat before that is prepared.
-const FLAT: Duration = Duration::from_secs(2);
+/// How long a scene has a first light, coarse and as if its relief were flat, before the bake that
+/// was asked for begins.
+const FIRST: Duration = Duration::from_secs(2);
+
+/// Triangles of a scene from which on a coarse bake comes first.
+const MANY: usize = 1 << 13;
 
 /// Between two frames that show nothing new but how far the bake is.
 const TELLING: Duration = Duration::from_millis(100);
@@ -122,15 +127,15 @@ struct Solving {
     slice: Duration,
     budget: Duration,
     done: bool,
-    /// Without the scene's relief, which is prepared when this has some light.
-    flat: bool,
+    /// A first light, after which the bake begins that was asked for.
+    first: bool,
     /// Share of unshot light from which on there is more to be seen than before this was begun.
     shown_from: f64,
 }
 
 impl Solving {
     fn is_busy(&self) -> bool {
-        self.flat || !self.done
+        self.first || !self.done
     }
 }
 
@@ -219,16 +224,16 @@ impl Work {
         let device = self.choice.open_baking()?;
         self.tell(epoch, Some(Stage::Scene));
         let lights = &scene.lights;
-        let raised = settings.relief.transport != Transport::Lambert;
-        if raised && scene.materials.iter().any(Material::has_relief) {
+        if let Some(quick) = first_light(&scene, settings) {
             // What takes longest comes after the first light.
             let elements = Elements::new(&scene);
-            let solver = Solver::new(&device, elements, lights, &flat(settings))?;
+            let solver = Solver::new(&device, elements, lights, &quick)?;
+            let stage = first_stage(&scene, settings);
             self.start(scene, solver, epoch);
             if let Some(solving) = &mut self.solving {
-                solving.flat = true;
+                solving.first = true;
             }
-            self.tell(epoch, Some(Stage::Flat));
+            self.tell(epoch, Some(stage));
             return Ok(());
         }
         let elements = bake::elements(&device, &scene, settings)?;
@@ -237,16 +242,22 @@ impl Work {
         Ok(())
     }
 
-    /// Begins the bake by direction of what has been lit as if it were flat.
+    /// Begins the bake that was asked for, of what has its first light.
     fn raise(&mut self) -> Result<()> {
-        let Some(flat) = self.solving.take() else {
+        let Some(first) = self.solving.take() else {
             return Ok(());
         };
-        let unshot = flat.solver.report().unshot_share;
-        let Solving { scene, epoch, .. } = flat;
-        self.tell(epoch, Some(Stage::Relief));
-        let device = self.choice.open_baking()?;
+        let unshot = first.solver.report().unshot_share;
+        let Solving { scene, epoch, .. } = first;
         let settings = self.given.settings.clone();
+        self.tell(
+            epoch,
+            Some(match raises(&scene, &settings) {
+                true => Stage::Relief,
+                false => Stage::Scene,
+            }),
+        );
+        let device = self.choice.open_baking()?;
         let elements = bake::elements(&device, &scene, &settings)?;
         let lights = &scene.lights;
         let solver = Solver::new(&device, elements, lights, &settings)?;
@@ -263,7 +274,7 @@ impl Work {
         self.looked_at = None;
         self.solving = Some(Solving {
             budget: self.given.settings.budget.unwrap_or(Duration::MAX),
-            flat: false,
+            first: false,
             shown_from: f64::INFINITY,
             scene,
             solver,
@@ -280,10 +291,11 @@ impl Work {
         if let Some(mut before) = self.solving.take() {
             match before.solver.relight(&scene) {
                 Ok(()) => {
+                    let stage = first_stage(&scene, &self.given.settings);
                     self.start(scene, before.solver, epoch);
-                    if let Some(solving) = self.solving.as_mut().filter(|_| before.flat) {
-                        solving.flat = true;
-                        self.tell(epoch, Some(Stage::Flat));
+                    if let Some(solving) = self.solving.as_mut().filter(|_| before.first) {
+                        solving.first = true;
+                        self.tell(epoch, Some(stage));
                     }
                     return Ok(());
                 }
@@ -312,7 +324,7 @@ impl Work {
         let Some(solving) = &mut self.solving else {
             return Ok(());
         };
-        if solving.flat && (solving.done || solving.start.elapsed() >= FLAT) {
+        if solving.first && (solving.done || solving.start.elapsed() >= FIRST) {
             return self.raise();
         }
         let begin = Instant::now();
@@ -348,7 +360,7 @@ impl Work {
                 elapsed: start.elapsed(),
                 ..last
             },
-            done: solving.done && !solving.flat,
+            done: solving.done && !solving.first,
         };
         if !solving.done && report.unshot_share > solving.shown_from {
             solving.slice = SLICES[0];
@@ -373,6 +385,37 @@ impl Work {
         (self.wake)();
         Ok(())
     }
+}
+
+/// Whether a scene has relief that takes part.
+fn raises(scene: &Scene, settings: &Settings) -> bool {
+    let raised = settings.relief.transport != Transport::Lambert;
+    raised && scene.materials.iter().any(Material::has_relief)
+}
+
+fn first_stage(scene: &Scene, settings: &Settings) -> Stage {
+    match raises(scene, settings) {
+        true => Stage::Flat,
+        false => Stage::First,
+    }
+}
+
+/// What a scene is lit by first; none where the bake itself is as quick.
+fn first_light(scene: &Scene, settings: &Settings) -> Option<Settings> {
+    let preview = Quality::Preview.settings();
+    let coarser = preview.grouping.max_area > settings.grouping.max_area
+        && settings.estimator == Estimator::Receiver
+        && scene.triangles.len() >= MANY;
+    if coarser {
+        return Some(Settings {
+            residual: preview.residual.max(settings.residual),
+            budget: settings.budget,
+            shots: settings.shots,
+            seed: settings.seed,
+            ..flat(&preview)
+        });
+    }
+    raises(scene, settings).then(|| flat(settings))
 }
 
 /// The same without relief.

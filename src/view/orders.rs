@@ -30,6 +30,8 @@ pub enum Stage {
     Device,
     /// Groups elements, and brings the scene to the device.
     Scene,
+    /// Lights the scene coarsely, before it is baked as was asked.
+    First,
     /// Lights the scene as if it were flat, before its relief is prepared.
     Flat,
     /// Finds what reliefs see of themselves and how they answer light; the scene is lit as if it
@@ -43,6 +45,7 @@ impl Stage {
         match self {
             Self::Device => "opening the device",
             Self::Scene => "preparing the scene",
+            Self::First => "a first light; the bake comes next",
             Self::Flat => "lit as if flat; relief comes next",
             Self::Relief => "preparing the relief; lit as if flat",
         }
