@@ -158,7 +158,12 @@ impl Spine {
             if report.shots < limit && self.ledger.lacks() {
                 continue;
             }
-            self.settle(on, corrections > 0, report)?;
+            // With relief the first light is measured next, which tells more than another turn.
+            let first = on.relief.is_some() && corrections == 0;
+            match first {
+                true => drop(self.bring(on, false, report)?),
+                false => self.settle(on, corrections > 0, report)?,
+            }
             // Without what is carried less may be unshot, so that nothing more is drawn.
             let drew = drawn_before.replace(report.shots) != Some(report.shots);
             if drew && report.shots < limit && self.ledger.undrawn().is_some() {
@@ -168,7 +173,7 @@ impl Spine {
                 break;
             }
             // What rows without room have brought moves near light once more.
-            if !self.is_settled(on, false, report)? && turns < MOST_TURNS {
+            if !first && !self.is_settled(on, false, report)? && turns < MOST_TURNS {
                 turns += 1;
                 continue;
             }
