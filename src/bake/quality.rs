@@ -30,8 +30,8 @@ impl Quality {
     /// The settings, all others at their defaults.
     pub fn settings(self) -> Settings {
         let (hemicube, scale, residual) = match self {
-            Self::Preview => (64, 10.0, 0.5),
-            Self::Draft => (64, 4.0, 2.5e-2),
+            Self::Preview => (64, 10.0, 0.35),
+            Self::Draft => (64, 4.0, 2e-2),
             Self::Normal => (128, 1.0, 1e-3),
             Self::High => (256, 1.0 / 16.0, 1e-4),
             Self::Reference => (512, 1.0 / 32.0, 1e-5),
