@@ -53,9 +53,9 @@ const float ACUTE = 2.1;
 // has another sign.
 const float FLAT_POINT_DISTANCE = 32.0;
 const float POINT_DISTANCE = 16.0;
-// A part of a curved source that is partly turned away, or whose ball an element lies in. At 9 the
-// error of bakes is the same.
-const float PART_POINT_DISTANCE = 7.0;
+// A part of a curved source that is partly turned away, or whose ball an element lies in. The rms of
+// tests/furnace.rs, where all emit, is 0.102 %; at 7 it is 0.117 %, at 5 0.137 %.
+const float PART_POINT_DISTANCE = 9.0;
 // Step of the share of a source that a listed element sees.
 const float SHARE_STEP = 1.0 / float(1 << SHARE_BITS);
 // An element no further than so many of its radii from a source (see gap_to) takes several samples.

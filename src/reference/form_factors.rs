@@ -139,7 +139,7 @@ fn form_factor(elements: &Elements, source: &Source, p: DVec3, element: usize) -
 }
 
 /// Radii of a part from which on it counts as a point, as in the shader.
-const PART_POINT_DISTANCE: f64 = 7.0;
+const PART_POINT_DISTANCE: f64 = 9.0;
 
 /// As in the shader: whether every member of a curved source shows a place its front.
 fn shows_whole_front(p: DVec3, source: &Source) -> bool {
