@@ -14,6 +14,7 @@ pub enum Quality {
     Draft,
     #[default]
     Normal,
+    /// Below 0.3 % in the Cornell box.
     High,
     Reference,
 }
@@ -33,7 +34,7 @@ impl Quality {
             Self::Preview => (64, 10.0, 0.35),
             Self::Draft => (64, 4.0, 2e-2),
             Self::Normal => (128, 1.0, 1e-3),
-            Self::High => (256, 1.0 / 16.0, 1e-4),
+            Self::High => (128, 1.0 / 4.0, 1e-3),
             Self::Reference => (512, 1.0 / 32.0, 1e-5),
         };
         Settings {
@@ -41,10 +42,22 @@ impl Quality {
             ..sized(hemicube, scale)
         }
     }
+
+    /// How much finer than by default a scene is cut, see [`Refinement::fineness`]; built-in scenes
+    /// are cut from above 1 on.
+    ///
+    /// [`Refinement::fineness`]: crate::scene::Refinement::fineness
+    pub fn fineness(self) -> f64 {
+        match self {
+            Self::Preview | Self::Draft | Self::Normal => 1.0,
+            Self::High | Self::Reference => 2.0,
+        }
+    }
 }
 
 /// The settings of hemicubes of so many pixels a side and sources `scale` times the default size:
-/// where sources are large, shadows are looked at from fewer places, and fewer sources are near.
+/// where sources are large, shadows are looked at from fewer places, and fewer sources are near;
+/// where they are small, more are.
 pub fn sized(hemicube: u32, scale: f64) -> Settings {
     let plain = Settings::default();
     let (emitter_places, places) = match scale {
@@ -56,6 +69,7 @@ pub fn sized(hemicube: u32, scale: f64) -> Settings {
     let nearness = match scale {
         8.0.. => near(1.0 / 2.0, 1.0 / 4.0),
         4.0.. => near(1.0 / 10.0, 1.0 / 16.0),
+        ..=0.25 => near(1.0 / 40.0, 1.0 / 96.0),
         _ => plain.nearness,
     };
     Settings {
@@ -102,6 +116,7 @@ mod tests {
             assert!(better.emitter_places >= worse.emitter_places);
             assert!(better.places >= worse.places);
             assert!(better.nearness.source <= worse.nearness.source);
+            assert!(better.nearness.part <= worse.nearness.part);
         }
     }
 }

@@ -64,7 +64,7 @@ pub struct SolveOptions {
     estimator: EstimatorName,
     /// Sets --hemicube, --residual and the sizes of the sources where they are not given, and how
     /// closely shadows of emitters and light beside surfaces are looked at; `bench pareto` measures
-    /// what each gains
+    /// what each gains. From high on it sets --fineness too
     #[arg(long, value_enum, default_value = "normal")]
     quality: QualityName,
     /// Pixels a side of a hemicube face [default: that of --quality, 128 for normal]
@@ -210,15 +210,18 @@ impl SolveOptions {
         })
     }
 
-    pub fn settings(&self) -> Result<Settings> {
-        let preset = match self.quality {
+    pub fn quality(&self) -> Quality {
+        match self.quality {
             QualityName::Preview => Quality::Preview,
             QualityName::Draft => Quality::Draft,
             QualityName::Normal => Quality::Normal,
             QualityName::High => Quality::High,
             QualityName::Reference => Quality::Reference,
         }
-        .settings();
+    }
+
+    pub fn settings(&self) -> Result<Settings> {
+        let preset = self.quality().settings();
         Ok(Settings {
             estimator: match self.estimator {
                 EstimatorName::Receiver => Estimator::Receiver,
@@ -295,7 +298,8 @@ pub fn run(options: &Options) -> Result<()> {
         ));
     }
     writable(&options.output)?;
-    let scene = options.builtin.load(&options.scene)?;
+    let quality = options.solve.quality();
+    let scene = options.builtin.load_for(quality, &options.scene)?;
     let read_seconds = start.elapsed().as_secs_f64();
     let kept = options
         .relight

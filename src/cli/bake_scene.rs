@@ -78,6 +78,7 @@ fn scene(path: &Path, bake: &Bake, origin: &Origin) -> Result<Scene> {
         patches: origin.patches,
         statue: origin.statue.clone(),
         element_size: None,
+        fineness: None,
         max_elements: 0,
         no_refine: true,
         no_heights_from_normals: !origin.import.heights_from_normals,

@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use super::render::refuse_baking;
 use super::{Builtin, devices, inside};
+use mesolux::bake::quality::Quality;
 use mesolux::bake::solution::{About, Origin};
 use mesolux::error::{Error, Result};
 use mesolux::scene::contents::{Contents, ElementCounts};
@@ -91,7 +92,7 @@ fn of_bake(input: &str, about: About) -> Inside {
 }
 
 fn of_scene(input: &str, builtin: &Builtin) -> Result<Inside> {
-    let scene = builtin.refined(input, builtin.read(input)?);
+    let scene = builtin.refined(input, builtin.read(input)?, Quality::default());
     let contents = Contents::of(&scene);
     let on_input = scene.on_input();
     let of = on_input.iter().zip(&scene.triangles);

@@ -25,6 +25,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
+use mesolux::bake::quality::Quality;
 use mesolux::error::{Error, Result};
 use mesolux::scene::{ImportOptions, LoadOptions, Refinement, Scene};
 use tracing_subscriber::filter::{LevelFilter, Targets};
@@ -92,21 +93,26 @@ enum Command {
 /// How a scene is read: options of built-in scenes, and how finely others are cut.
 #[derive(Args, Clone)]
 struct Builtin {
-    /// Built-in scenes: exactly this many elements
+    /// Built-in scenes: exactly this many elements, before they are cut
     #[arg(long, value_name = "N")]
     patches: Option<usize>,
     /// Built-in scenes: this mesh as the statue
     #[arg(long, value_name = "MESH.obj")]
     statue: Option<PathBuf>,
     /// Cut triangles whose edges are longer than this, in scene units, and shorter ones where
-    /// surfaces are close or shadows end [default: by the scene's area; built-in scenes are not cut]
+    /// surfaces are close or shadows end [default: by the scene's area; built-in scenes are cut only
+    /// where this or --fineness asks for it]
     #[arg(long, value_name = "X")]
     element_size: Option<f64>,
+    /// Cut to triangles this much smaller than by default, 1 to 16, and built-in scenes too from
+    /// above 1 on [default: that of --quality, 1 for normal, 2 for high]
+    #[arg(long, value_name = "X")]
+    fineness: Option<f64>,
     /// Cut to no more triangles than this
     #[arg(long, value_name = "N", default_value_t = Refinement::default().max_elements)]
     max_elements: usize,
     /// Light every triangle as it is
-    #[arg(long, conflicts_with = "element_size")]
+    #[arg(long, conflicts_with_all = ["element_size", "fineness"])]
     no_refine: bool,
     /// Leave a normal map without a height map out, instead of integrating heights from it
     #[arg(long)]
@@ -130,6 +136,11 @@ impl Builtin {
 
     /// The scene as it is read, with what there is to say of it, and cut.
     fn load(&self, name: &str) -> Result<Scene> {
+        self.load_for(Quality::default(), name)
+    }
+
+    /// The same, cut as finely as a bake of that quality wants it.
+    fn load_for(&self, quality: Quality, name: &str) -> Result<Scene> {
         let scene = self.read(name)?;
         for note in &scene.notes {
             tracing::info!("{note}");
@@ -143,7 +154,7 @@ impl Builtin {
                 scene.dropped_degenerate
             );
         }
-        Ok(self.refined(name, scene))
+        Ok(self.refined(name, scene, quality))
     }
 
     fn read(&self, name: &str) -> Result<Scene> {
@@ -152,6 +163,13 @@ impl Builtin {
         {
             return Err(Error::Usage(format!(
                 "--element-size {size}: must be above 0"
+            )));
+        }
+        if let Some(fineness) = self.fineness
+            && !(1.0..=16.0).contains(&fineness)
+        {
+            return Err(Error::Usage(format!(
+                "--fineness {fineness}: must be in 1 to 16"
             )));
         }
         mesolux::scene::load(
@@ -164,14 +182,16 @@ impl Builtin {
         )
     }
 
-    fn refined(&self, name: &str, scene: Scene) -> Scene {
+    fn refined(&self, name: &str, scene: Scene, quality: Quality) -> Scene {
         let named = mesolux::scene::builtin::NAMES.contains(&name);
-        if self.no_refine || named && self.element_size.is_none() {
+        let fineness = self.fineness.unwrap_or(quality.fineness());
+        if self.no_refine || named && self.element_size.is_none() && fineness <= 1.0 {
             return scene;
         }
         let before = scene.triangles.len();
         let scene = scene.refined(&Refinement {
             element_size: self.element_size,
+            fineness,
             max_elements: self.max_elements,
         });
         let now = scene.triangles.len();

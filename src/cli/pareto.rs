@@ -41,7 +41,7 @@ pub struct Options {
     #[arg(long, value_name = "N,...", value_delimiter = ',', default_value = "0")]
     emitter_scale: Vec<u32>,
     /// Sizes of the sources over the default one; from 4 on with fewer places on emitters, as
-    /// `draft`, from 8 on with fewer near sources, as `preview`
+    /// `draft`, from 8 on with fewer near sources, as `preview`, up to 0.25 with more, as `high`
     #[arg(
         long,
         value_name = "X,...",

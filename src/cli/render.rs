@@ -125,7 +125,8 @@ pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
         (options.bake_scene.of(path, &bake)?, Some(bake))
     } else {
         settings.check()?;
-        (options.builtin.load(&options.input)?, None)
+        let quality = options.solve.quality();
+        (options.builtin.load_for(quality, &options.input)?, None)
     };
     // Errors in the views are reported before the bake.
     let camera = options.camera.of(&scene)?;

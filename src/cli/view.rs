@@ -108,7 +108,9 @@ pub fn run(options: &Options, start: Instant) -> Result<()> {
         (scene, Some(bake), kept)
     } else {
         options.bake_scene.refuse(&options.input)?;
-        (options.builtin.load(&options.input)?, None, None)
+        let quality = options.solve.quality();
+        let scene = options.builtin.load_for(quality, &options.input)?;
+        (scene, None, None)
     };
     let camera = options.camera.of(&scene)?;
     let lines = view::run(view::Options {

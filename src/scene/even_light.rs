@@ -93,6 +93,14 @@ impl EvenLight {
     }
 }
 
+impl EvenLight {
+    /// Irradiance at a place without what stands before it.
+    pub fn at(&self, at: DVec3, normal: DVec3) -> f64 {
+        let places = self.places.iter();
+        places.map(|place| place.irradiance(at, normal)).sum()
+    }
+}
+
 impl LightPlace {
     /// Irradiance at a place without what stands before it.
     pub fn irradiance(&self, at: DVec3, normal: DVec3) -> f64 {

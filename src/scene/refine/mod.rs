@@ -24,8 +24,11 @@ use surroundings::Surroundings;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Refinement {
     /// Longest edge of a triangle, scene units; where other surfaces are close, less. None: as if all
-    /// were cut to 6,000 triangles of one size.
+    /// were cut to 6,000 triangles of one size, over `fineness`.
     pub element_size: Option<f64>,
+    /// By which the sizes beside other surfaces, and the error that is left where shadows end, are
+    /// divided; 1 or more.
+    pub fineness: f64,
     /// Most triangles.
     pub max_elements: usize,
 }
@@ -39,6 +42,7 @@ impl Default for Refinement {
     fn default() -> Self {
         Self {
             element_size: None,
+            fineness: 1.0,
             max_elements: 200_000,
         }
     }
@@ -73,7 +77,8 @@ pub struct RefinedFrom {
     pub on_input: Vec<OnInput>,
 }
 
-/// Of the size that is asked for: the least that close surfaces of the same shell lead to.
+/// Of the size that is asked for: the least that close surfaces of the same shell lead to, times
+/// the fineness.
 const LEAST: f64 = 0.5;
 
 /// Of the size that is asked for: the least that close surfaces of other shells lead to, which
@@ -127,8 +132,11 @@ impl Scene {
     /// Cuts triangles as `refinement` says. The result has [`Scene::refined_from`].
     pub fn refined(&self, refinement: &Refinement) -> Self {
         let area: f64 = self.triangles.iter().map(|t| area(self.corners(t))).sum();
-        let even = 2.0 * (area / Refinement::EVEN).sqrt();
+        let Refinement { fineness, .. } = *refinement;
+        let even = 2.0 * (area / Refinement::EVEN).sqrt() / fineness;
         let mut size = refinement.element_size.unwrap_or(even);
+        let least = Least::new(fineness);
+        let shadow = SHADOW / (fineness * fineness);
         let most = refinement.max_elements.max(self.triangles.len());
         let surroundings = Surroundings::new(self);
         let wanted = size;
@@ -137,6 +145,7 @@ impl Scene {
                 input: self,
                 surroundings: &surroundings,
                 size,
+                least,
                 of_shell: OF_SHELL * size / wanted,
             };
             let mut cutting = Cutting::new(self);
@@ -161,7 +170,7 @@ impl Scene {
                 cut_errors(
                     &mut cutting,
                     |cut, t| shadows.error(cut, t),
-                    SHADOW,
+                    shadow,
                     size,
                     most,
                 );
@@ -304,8 +313,25 @@ struct Wish<'a> {
     input: &'a Scene,
     surroundings: &'a Surroundings,
     size: f64,
+    least: Least,
     /// Of the diagonal of a shell.
     of_shell: f64,
+}
+
+/// Of the size that is asked for: the least that close surfaces lead to.
+#[derive(Debug, Clone, Copy)]
+struct Least {
+    /// Those of the same shell, and of others.
+    same: f64,
+    apart: f64,
+}
+
+impl Least {
+    fn new(fineness: f64) -> Self {
+        let same = LEAST / fineness;
+        let apart = LEAST_APART.min(same);
+        Self { same, apart }
+    }
 }
 
 impl Wish<'_> {
@@ -319,7 +345,15 @@ impl Wish<'_> {
         if longest > size {
             return false;
         }
-        let close = || self.surroundings.size_at(self.input, input, corners, size);
-        longest <= LEAST_APART * size || longest <= close()
+        let close = || {
+            let Self {
+                input: scene,
+                least,
+                ..
+            } = *self;
+            self.surroundings
+                .size_at(scene, input, corners, size, least)
+        };
+        longest <= self.least.apart * size || longest <= close()
     }
 }

@@ -8,18 +8,26 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::{Boundable, BvhBuildParams};
 
-use super::{LEAST, LEAST_APART, Scene};
+use super::{Least, Scene};
 use crate::math::groups::Groups;
 
 /// Surfaces about a place.
 pub(super) struct Surroundings {
     pub bvh: Bvh2,
+    /// Corners and unit normal of each triangle of the input.
+    pub facets: Vec<Facet>,
     /// Of each triangle of the input: its shell, which holds all that it is joined to.
     shell: Vec<u32>,
     /// Diagonal of the box of each shell.
     diagonals: Vec<f64>,
     /// Height above a plane below which a place lies in it.
     pub flat: f64,
+}
+
+/// A triangle and its unit normal.
+pub(super) struct Facet {
+    pub corners: [DVec3; 3],
+    pub normal: DVec3,
 }
 
 struct Bounds([DVec3; 3]);
@@ -51,7 +59,13 @@ impl Surroundings {
             }
         }
         let (_, unit) = scene.local_frame();
+        let facet = |&Bounds(corners): &Bounds| {
+            let [a, b, c] = corners;
+            let normal = (b - a).cross(c - a).normalize_or_zero();
+            Facet { corners, normal }
+        };
         Self {
+            facets: bounds.iter().map(facet).collect(),
             bvh: build_bvh2(
                 &bounds,
                 BvhBuildParams::fast_build(),
@@ -94,7 +108,14 @@ impl Surroundings {
 
     /// The size of a piece of triangle `input` that what lies in front of it asks for, `size` at
     /// most: no longer than other surfaces are off.
-    pub fn size_at(&self, scene: &Scene, input: usize, [a, b, c]: [DVec3; 3], size: f64) -> f64 {
+    pub fn size_at(
+        &self,
+        scene: &Scene,
+        input: usize,
+        [a, b, c]: [DVec3; 3],
+        size: f64,
+        least: Least,
+    ) -> f64 {
         let middle = (a + b + c) / 3.0;
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let mut found = size;
@@ -119,8 +140,8 @@ impl Surroundings {
                 if self.faces(middle, normal, other) {
                     let distance = middle.distance(nearest(middle, other));
                     let least = match self.shell[o] == self.shell[input] {
-                        true => LEAST,
-                        false => LEAST_APART,
+                        true => least.same,
+                        false => least.apart,
                     };
                     found = found.min(distance.max(least * size));
                 }
