@@ -211,7 +211,23 @@ fn a_preset_gives_way_to_what_is_given() {
     // What the file says of its settings has no gaps.
     let file = std::fs::read(folder.path().join("o.safetensors")).expect("there");
     assert!(text(&file).contains(r#"\"source_elements\":48"#));
+    // A better one cuts built-in scenes too, unless it is told not to.
+    let elements = |more: &[&str]| {
+        let mut args = vec!["bake", "cornell", "-o", "c.safetensors", "--json"];
+        args.extend(["--patches", "3000", "--shots", "1"]);
+        args.extend(more);
+        let run = mesolux(&args, folder.path());
+        assert!(run.status.success(), "{}", text(&run.stderr));
+        let report: serde_json::Value = serde_json::from_slice(&run.stdout).expect("JSON");
+        report["elements"].as_u64().expect("a number")
+    };
+    assert_eq!(elements(&["--quality", "normal"]), 3000);
+    assert_eq!(elements(&["--quality", "high", "--no-refine"]), 3000);
+    let high = elements(&["--quality", "high"]);
+    assert!(high > 20_000);
+    assert_eq!(elements(&["--fineness", "2"]), high);
     for (option, value) in [
+        ("--fineness", "0.5"),
         ("--source-elements", "0"),
         ("--source-area", "2"),
         ("--source-power", "nan"),

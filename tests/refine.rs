@@ -155,6 +155,45 @@ fn cuts_are_finer_where_shadows_end() {
     assert!(kept.triangles.len() < cut.triangles.len());
 }
 
+/// Twice as fine: edges half as long, and along the edges of the room a quarter.
+#[test]
+fn fineness_divides_sizes() {
+    let scene = room();
+    let corner = DVec3::new(4.0, 2.5, 3.0);
+    let sizes = |fineness: f64| {
+        let cut = scene.refined(&Refinement {
+            fineness,
+            ..Refinement::default()
+        });
+        let (mut longest, mut at_edges) = (0.0_f64, 0.0_f64);
+        for triangle in &cut.triangles {
+            let corners @ [a, b, c] = cut.corners(triangle);
+            let length = a.distance(b).max(b.distance(c)).max(c.distance(a));
+            longest = longest.max(length);
+            let at_edge = |p: DVec3| {
+                let off = p.min(corner - p).to_array();
+                off.into_iter().filter(|&off| off < 1e-9).count() > 1
+            };
+            if corners.into_iter().filter(|&p| at_edge(p)).count() == 2 {
+                at_edges = at_edges.max(length);
+            }
+        }
+        println!(
+            "fineness {fineness}: {} triangles, edges to {longest:.3}, in corners to {at_edges:.3}",
+            cut.triangles.len()
+        );
+        (longest, at_edges)
+    };
+    let area: f64 = areas(&scene).iter().sum();
+    let even = 2.0 * (area / 6000.0).sqrt();
+    let (normal, fine) = (sizes(1.0), sizes(2.0));
+    // A cut halves an edge, so that sizes fall in steps.
+    assert!(normal.0 <= even && normal.0 > 0.5 * even);
+    assert!(fine.0 <= 0.5 * even && fine.0 > 0.25 * even);
+    assert!(normal.1 <= 0.5 * even && normal.1 > 0.25 * even);
+    assert!(fine.1 <= 0.125 * even && fine.1 > 0.0625 * even);
+}
+
 /// Light that is linear over a plane comes back at all corners but those of its border, and bent
 /// surfaces keep the light of each facet.
 #[test]

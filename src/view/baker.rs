@@ -73,6 +73,11 @@ impl Baker {
         }
     }
 
+    /// Whether there is a snapshot that has not been taken.
+    pub fn has_light(&self) -> bool {
+        self.shared.latest().snapshot.is_some()
+    }
+
     /// What is new.
     pub fn take(&self) -> Latest {
         std::mem::take(&mut self.shared.latest())

@@ -9,7 +9,7 @@ mod update;
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use glam::Vec3;
 use winit::window::Window;
@@ -91,6 +91,9 @@ pub struct Viewer {
     pub(super) closing: bool,
 }
 
+/// Shortest time between frames while there is no light to show: a software device draws them with
+/// the cores that the bake needs.
+const DARK: Duration = Duration::from_millis(300);
 /// Most messages that the panel keeps.
 const MOST_MESSAGES: usize = 4;
 /// Name of pictures that are saved by a key, in the working directory.
@@ -231,13 +234,21 @@ impl Viewer {
         if self.size.0 == 0 || self.size.1 == 0 {
             return None;
         }
-        if self.dirty || self.stale || self.input.flies() {
-            return Some(now);
-        }
+        let changed = (self.dirty || self.stale || self.input.flies()).then_some(now);
         let Pictures { seen, wanted, .. } = &self.pictures;
         let paused = seen.as_ref().map(|seen| seen.since + PAUSE);
         let paused = paused.filter(|_| self.switches.detail && wanted.is_none() && self.is_lit());
-        [self.repaint, paused].into_iter().flatten().min()
+        let next = [changed, self.repaint, paused].into_iter().flatten().min();
+        match self.awaits_light() {
+            true => next.map(|at| at.max(self.last_frame + DARK)),
+            false => next,
+        }
+    }
+
+    /// Whether nothing but the progress of the bake would be new in a frame.
+    fn awaits_light(&self) -> bool {
+        let is_dark = !self.is_lit() && self.is_baking() && !self.baker.has_light();
+        is_dark && self.timing.has_begun() && self.unanswered.is_none() && !self.stale
     }
 
     pub fn handle(&mut self, event: Event) {
