@@ -7,7 +7,11 @@ use glam::DVec3;
 use mesolux::solver::{Estimator, Settings};
 use std::f32::consts::PI;
 
-const PERMITTED: f64 = 3e-3;
+/// Of means over surfaces; measured: 3.1e-4.
+const PERMITTED: f64 = 6e-4;
+
+/// Of single points of CIE 171:2006; measured: 1.4e-4.
+const OF_POINTS: f64 = 3e-4;
 
 /// Cuts a sphere into halves of the same area: no triangle of the test's spheres has its centroid
 /// in the plane.
@@ -183,7 +187,7 @@ fn cie_171_case_5_3() {
                 &format!("CIE 171 5.3 {}", name as char),
                 f64::from(solved.irradiance[element].x),
                 lux,
-                1e-2,
+                OF_POINTS,
             );
         }
     }
@@ -241,9 +245,11 @@ fn point_light() {
             "point light, {estimator:?}: largest error {:.2} %",
             100.0 * worst
         );
-        // The centroid stands for the element (0.125 wide at a distance of 1 or more): some 0.3 %.
-        if estimator == Estimator::Receiver {
-            assert!(worst <= 5e-3, "{worst}");
-        }
+        // Measured: 0.04 and 5.3 %.
+        let most = match estimator {
+            Estimator::Receiver => 8e-4,
+            Estimator::Pixel => 0.1,
+        };
+        assert!(worst <= most, "{worst}");
     }
 }

@@ -29,6 +29,14 @@ fn c11(x: f64, y: f64, cells: (u32, u32)) -> [f64; 2] {
     [Estimator::Receiver, Estimator::Pixel].map(|e| form_factor(&build, low.clone(), e))
 }
 
+/// Of the `receiver` estimator; measured: 1.5e-3.
+const RECEIVER: f64 = 2.5e-3;
+
+/// Of the `pixel` estimator; measured: 4.5e-3, and 1.9 % of a rectangle that the other is ten times
+/// as long as.
+const PARALLEL: f64 = 9e-3;
+const TOUCHING: f64 = 4e-2;
+
 #[test]
 fn parallel_rectangles() {
     for (x, y, cells, exact) in [
@@ -46,7 +54,12 @@ fn parallel_rectangles() {
             100.0 * error,
             100.0 * (pixel / exact - 1.0)
         );
-        assert!(error.abs() <= 2e-3, "C-11 {x} {y}: {receiver} for {exact}");
+        assert!(
+            error.abs() <= RECEIVER,
+            "C-11 {x} {y}: {receiver} for {exact}"
+        );
+        let error = pixel / exact - 1.0;
+        assert!(error.abs() <= PARALLEL, "C-11 {x} {y}: {pixel} for {exact}");
     }
 }
 
@@ -73,6 +86,11 @@ fn perpendicular_rectangles_that_touch() {
             100.0 * error,
             100.0 * (pixel / exact - 1.0)
         );
-        assert!(error.abs() <= 2e-3, "C-14 {h} {w}: {receiver} for {exact}");
+        assert!(
+            error.abs() <= RECEIVER,
+            "C-14 {h} {w}: {receiver} for {exact}"
+        );
+        let error = pixel / exact - 1.0;
+        assert!(error.abs() <= TOUCHING, "C-14 {h} {w}: {pixel} for {exact}");
     }
 }

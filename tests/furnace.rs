@@ -46,7 +46,12 @@ fn radiosity_is_one_everywhere() {
         100.0 * pixel_rms,
         100.0 * pixel_max
     );
-    assert!(rms <= 2e-3 && max <= 2e-2, "rms {rms}, max {max}");
+    // Measured: 1.1e-3 and 0.91 %; of pixels 3.0 and 26 %.
+    assert!(rms <= 2e-3 && max <= 1.8e-2, "rms {rms}, max {max}");
+    assert!(
+        pixel_rms <= 0.06 && pixel_max <= 0.5,
+        "pixel: rms {pixel_rms}, max {pixel_max}"
+    );
 }
 
 /// Black surfaces that all emit one radiosity receive it everywhere. Each source is a strong emitter,

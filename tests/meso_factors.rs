@@ -51,7 +51,8 @@ fn corners_take_light_by_their_own_slope() {
             "K = {k}: rank {}, left out {:.2e}",
             factors.rank, factors.error
         );
-        assert!(factors.error <= 0.02);
+        // Measured: 7.9e-4; what is asked for is 1e-3.
+        assert!(factors.error <= 1e-3);
         let (mut worst, mut swapped) = (0.0_f64, 0.0_f64);
         for slot in 0..directions.count() {
             let towards = directions.centre(slot);

@@ -22,31 +22,20 @@ const SIDE: u32 = 48;
 /// Paths of each pixel. Their noise is known and taken off.
 const PATHS: u32 = 96;
 
-/// What was promised of the program's pictures of relief: relMSE less the reference's noise, and
-/// bias.
-const PROMISED_REL_MSE: f64 = 5e-3;
-const PROMISED_BIAS: f64 = 0.01;
-
-/// What one beam for each slot adds to relMSE where light comes from everywhere. A slot that the
-/// relief's horizon cuts is seen whole or not at all, which is wrong by 1/√12 of it rms; of K slots
-/// in a square the horizon cuts as many as lie along the square's border, and one brings at most 2
-/// / K of the irradiance, the greatest cosine over the mean one.
-fn beams(k: u32) -> f64 {
-    let k = f64::from(k);
-    4.0 * (k.sqrt() - 1.0) * (2.0 / k).powi(2) / 12.0
+/// relMSE less the reference's noise, by K = 16 and 64; measured: 6.3e-4, 4.0e-4 of all light, 5.5e-3,
+/// 4.2e-3 of direct and 1.4e-3, 7.2e-4 of indirect light. A slot that the relief's horizon cuts is
+/// seen whole or not at all, and a penumbra of the lamp is one edge.
+fn most_rel_mse(part: Light, k: u32) -> f64 {
+    let [few, many] = match part {
+        Light::Global => [1.2e-3, 8e-4],
+        Light::Direct => [1e-2, 8e-3],
+        Light::Indirect => [3e-3, 1.5e-3],
+    };
+    if k == 16 { few } else { many }
 }
 
-/// The same where all light comes from the lamp and is one beam at worst. A penumbra's light falls
-/// from 1 to 0 and the beam's from 1 to 0 in its middle: ∫ (beam − b)² / b² = 1.5 − 2 ln 2 + 0.5 =
-/// 0.61 of the penumbra's area. A bump 0.14 repeats high, under a lamp 0.4 radians high at 38°, has
-/// one 0.14 · 0.4 / sin² 38° = 0.15 repeats wide, and two bumps are 0.6 repeats across.
-const PENUMBRA: f64 = 0.61 * 0.15 * 0.6;
-
-/// And to the bias: a beam's cosine for the mean over a slot, s² / 24 with s² = 2π / K the slot's
-/// solid angle.
-fn beam_bias(k: u32) -> f64 {
-    2.0 * std::f64::consts::PI / f64::from(k) / 24.0
-}
+/// Measured: −0.59 %.
+const MOST_BIAS: f64 = 0.012;
 
 /// A room with bumps as its floor, lit from aside; one wall is red.
 fn room() -> Scene {
@@ -123,14 +112,7 @@ fn pictures_are_those_of_the_displaced_scene_within_a_slot() {
                     100.0 * found.rms
                 );
                 show(&at, &picture, truth);
-                let added = if part == Light::Direct {
-                    PENUMBRA
-                } else {
-                    beams(*k)
-                };
-                if rel_mse > PROMISED_REL_MSE + added
-                    || found.bias.abs() > PROMISED_BIAS + beam_bias(*k)
-                {
+                if rel_mse > most_rel_mse(part, *k) || found.bias.abs() > MOST_BIAS {
                     failures.push(at);
                 }
             }

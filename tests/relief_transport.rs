@@ -96,7 +96,8 @@ fn furnace_with_relief() {
             100.0 * slot_rms,
             100.0 * slot_max
         );
-        assert!(max <= 0.02);
+        // Measured: 0.94 %; by slot 0.70 %.
+        assert!(max <= 0.018 && slot_max <= 0.014);
     }
     // What the paper's transport loses.
     let solved = build.solve(&settings(Transport::Paper, 64));
@@ -105,7 +106,8 @@ fn furnace_with_relief() {
         "furnace with relief, paper transport: mean radiosity {mean:.4}, {:.2} % of the light is lost",
         100.0 * (1.0 - mean)
     );
-    assert!(mean < 0.998);
+    // Measured: 0.67 %.
+    assert!((0.9870..0.9965).contains(&mean), "{mean}");
 }
 
 /// A room lit from above, with a relief on a block in its middle: irradiance of the plain walls,
@@ -187,7 +189,8 @@ fn walls_about_a_relief_are_lit_as_by_its_geometry() {
         100.0 * flat_rms,
         100.0 * flat_bias
     );
-    assert!(bias.abs() <= 0.01 && rms <= 0.03);
+    // Measured: −0.28 and 0.78 %.
+    assert!(bias.abs() <= 0.006 && rms <= 0.015, "{bias}, {rms}");
 }
 
 /// A flat height map is no relief; a scene without relief is solved to the same bytes whatever the
