@@ -14,7 +14,7 @@ layout(constant_id = 0) const uint LIST = RECEIVE_DOUBTFUL;
 layout(constant_id = 1) const uint EYES = SOURCE_EYES;
 const uint STRIDE = SOURCE_EYES / EYES;
 
-// SOURCE_EYES a source.
+// SOURCE_EYES a source on a surface; a point light has none, and nothing crosses it.
 layout(binding = 8) uniform usamplerBuffer eyes;
 
 // Less than the weight of any place, which is finite in a scene of size 1.

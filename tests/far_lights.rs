@@ -52,6 +52,50 @@ fn a_plane_receives_what_it_sees_of_an_even_sky() {
     }
 }
 
+/// Light of a lamp, a sun and a sky together is the sum of theirs, with a plate between: what one has
+/// on the device is not taken for another's.
+#[test]
+fn lights_of_all_kinds_add_up() {
+    let lit = |[point, sun, sky]: [bool; 3]| {
+        let mut build = Build::new();
+        let black = build.material(0.0, 0.0);
+        build.quad(DVec3::ZERO, DVec3::Z, DVec3::X, (6, 6), black);
+        let corner = DVec3::new(0.3, 0.4, 0.3);
+        build.quad(corner, 0.3 * DVec3::Z, 0.3 * DVec3::X, (1, 1), black);
+        // A plate that emits has places of its own.
+        let lamp = build.material(0.0, 1.0);
+        let corner = DVec3::new(0.7, 0.6, 0.7);
+        build.quad(corner, 0.2 * DVec3::X, 0.2 * DVec3::Z, (1, 1), lamp);
+        if point {
+            build.point_light(DVec3::new(0.2, 0.8, 0.6), 0.5);
+            build.point_light(DVec3::new(0.9, 0.5, 0.1), 0.25);
+        }
+        if sun {
+            build.scene.lights.suns.push(Sun {
+                towards: DVec3::new(0.3, 1.0, 0.2).normalize(),
+                angle: 5.0,
+                irradiance: [1.5; 3],
+                name: "sun".into(),
+            });
+        }
+        if sky {
+            build.scene.lights.sky = Some(uniform(0.4));
+        }
+        build.solve(&Settings::default()).irradiance
+    };
+    let all = lit([true; 3]);
+    let none = lit([false; 3]);
+    let each = [0, 1, 2].map(|of| lit([0, 1, 2].map(|k| k == of)));
+    let mut most = 0.0_f32;
+    for e in 0..all.len() {
+        let sum: glam::Vec3 = each.iter().map(|light| light[e] - none[e]).sum();
+        most = most.max((all[e] - none[e] - sum).abs().max_element());
+    }
+    println!("largest difference {most:.1e}");
+    assert!(most <= 1e-5, "{most}");
+    assert!(each.iter().all(|light| light[3].x > none[3].x));
+}
+
 /// What triangles of the scene receive of an even sky of radiance 1 through an opening, by Lambert's
 /// formula at 64 places of each.
 fn through(build: &Build, opening: &[DVec3]) -> Vec<f64> {

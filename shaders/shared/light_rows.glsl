@@ -23,7 +23,7 @@ layout(scalar, binding = 0) readonly buffer Slots { Slot slots[]; };
 layout(binding = 1) uniform usamplerBuffer sources;
 // TRIANGLE_TEXELS an element.
 layout(binding = 2) uniform usamplerBuffer triangles;
-// SOURCE_EYES a source: of a far light its directions, unit, by even shares of its light.
+// SOURCE_EYES a far light: its directions, unit, by even shares of its light.
 layout(binding = 3) uniform usamplerBuffer eyes;
 layout(binding = 4) uniform usamplerBuffer shadow_nodes;
 // OCCLUDER_TEXELS an occluder.
@@ -79,7 +79,7 @@ Light load_light(uint source) {
     uint at = SOURCE_TEXELS * source;
     vec4 middle = fetch(sources, at + 6);
     uvec4 ranges = fetch_words(sources, at + 5);
-    return Light(SOURCE_EYES * source, fetch(sources, at + 7).x, middle.yzw,
+    return Light(ranges.x, fetch(sources, at + 7).x, middle.yzw,
                  fetch(sources, at + 1).xyz, fetch(sources, at + 2).xyz, fetch(sources, at + 3).xyz,
                  ranges.z, ranges.w, floatBitsToUint(fetch(sources, at + 7).w));
 }

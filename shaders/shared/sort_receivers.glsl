@@ -30,7 +30,7 @@ layout(scalar, binding = 7) buffer FacingAway { uint away_count[]; };
 // Those without relief, then those with it.
 layout(scalar, binding = 8) readonly buffer Blocks { ReceiverBlock blocks[]; };
 #ifdef SHADOW_RAYS
-// SOURCE_EYES a source.
+// SOURCE_EYES a source on a surface; a point light has none.
 layout(binding = 10) uniform usamplerBuffer eyes;
 #define NEAR_MARKS 11
 #else

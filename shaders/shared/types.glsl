@@ -15,7 +15,7 @@ struct Source {
     float cone_cos;
     vec3 emitted;      // radiosity from emission; a point light's intensity
     uint kind;
-    uint first_element;
+    uint first_element; // of a far light, its first eye
     uint element_count;
     uint first_contour;
     uint contour_count;

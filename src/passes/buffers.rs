@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 
 use super::receiver_blocks::receiver_blocks;
 use super::types::{Component, Meshlet, Source, Triangle, contour_corners};
-use crate::constants::SOURCE_EYES;
+use crate::constants::{KIND_POINT, SOURCE_EYES};
 use crate::error::Result;
 use crate::mesh::charts::Connections;
 use crate::mesh::elements::Elements;
@@ -49,7 +49,7 @@ pub struct SceneBuffers {
     /// Of an element with a relief: that of even light.
     pub reflectance: Buffer,
     pub sources: Buffer,
-    /// Places on each source, `[source][SOURCE_EYES]`.
+    /// Places on each source but point lights, `[source][SOURCE_EYES]`.
     pub eyes: Buffer,
     pub contours: Buffer,
     /// Shares of the intensity of beams by angle.
@@ -154,11 +154,12 @@ impl SceneBuffers {
     }
 }
 
-/// Places on each source, with the packed normals of curved ones, `[source][SOURCE_EYES]`.
+/// Places on each source but point lights, which follow those on surfaces, with the packed normals of
+/// curved ones, `[source][SOURCE_EYES]`.
 fn eyes(sources: &[sources::Source]) -> Vec<[f32; 4]> {
     let of_source = |source: &sources::Source| {
         let texel = |k| {
-            // A point light sees from one place, and so does a source whose light is not cut.
+            // A source whose light is not cut sees from one place.
             let place: Option<&SourcePlace> = source.places.get(k);
             let at = place.map_or(source.eye, |place| place.at).as_vec3();
             let normal = place
@@ -168,7 +169,8 @@ fn eyes(sources: &[sources::Source]) -> Vec<[f32; 4]> {
         };
         (0..SOURCE_EYES as usize).map(texel).collect::<Vec<_>>()
     };
-    sources.iter().flat_map(of_source).collect()
+    let seeing = sources.iter().filter(|source| source.kind != KIND_POINT);
+    seeing.flat_map(of_source).collect()
 }
 
 /// The bits of a vector with components from -1 to 1, as `unpackSnorm4x8` reads them.
@@ -238,19 +240,28 @@ impl Outlined {
             parts: Vec::new(),
             webs: Vec::new(),
         };
+        // Lights have no elements; of a far one the first eye stands there.
+        let mut sees = 0;
+        let mut with_eyes = |mut row: Source, source: &sources::Source| {
+            if source.is_far() {
+                row.first_element = SOURCE_EYES * sees;
+            }
+            sees += u32::from(source.kind != KIND_POINT);
+            row
+        };
         for source in sources {
             if let Some(web) = &source.web {
                 let (first, rows) = (outlined.webs.len() as u32, web.rows);
-                outlined
-                    .list
-                    .push(Source::beam(source, (first, web.columns), rows));
+                let beam = Source::beam(source, (first, web.columns), rows);
+                outlined.list.push(with_eyes(beam, source));
                 outlined.webs.extend(&web.shares);
                 continue;
             }
             let corners = contour_corners(source);
             let outline = (outlined.contours.len() as u32, corners.len() as u32);
             let first_part = outlined.parts.len() as u32;
-            outlined.list.push(Source::new(source, outline, first_part));
+            let row = Source::new(source, outline, first_part);
+            outlined.list.push(with_eyes(row, source));
             outlined.contours.extend(corners);
             outlined.parts.extend(source.parts.iter().map(|part| {
                 let mut words = [0.0; PART_WORDS];

@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 
 use glam::DVec3;
 
-use super::{Case, Check, Context, ROWS, Size, settings, through_files};
+use super::{Case, Check, Context, Size, settings, through_files};
 use crate::error::Result;
 use crate::scene::Scene;
 use crate::scene::shapes::Shapes;
@@ -48,12 +48,10 @@ pub(super) const MANY_SHOTS: Case = Case {
 
 /// Light of two solutions with another order of their last shots differs by their unshot light.
 const REORDERED: f64 = 1e-5;
-/// A sphere of 1,280 flat triangles approximates the sphere: its form factors differ by about 0.3
-/// %.
-const SPHERE: f64 = 3e-3;
-/// Energy on the lid: one of six sides absorbs light, so that light passes about six times, and the
-/// residual is 1e-3.
-const ENERGY: f64 = 6.0 * ROWS + 1e-3;
+/// All that is sent arrives: 9.7e-8.
+const SPHERE: f64 = 1e-6;
+/// Energy on the lid: 1.9e-7.
+const ENERGY: f64 = 1e-6;
 /// Limit set for this case.
 const DRIFT: f64 = 1e-6;
 

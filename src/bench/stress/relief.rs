@@ -18,8 +18,8 @@ pub(super) const EXTREME_HEIGHTS: Case = Case {
     run: extreme_heights,
 };
 
-/// Limit of tests/relief_transport.rs for a furnace with relief.
-const RELIEF_MOST: f64 = 2e-2;
+/// Measured: 3.1e-3.
+const RELIEF_MOST: f64 = 6e-3;
 
 /// A closed furnace whose floor has that relief, four repeats a side.
 fn room(relief: impl FnOnce(&mut Shapes, u32)) -> Shapes {
