@@ -1,4 +1,4 @@
 // Irradiance of every element from the sources of a batch, in scenes without relief.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "shared/gather.glsl"
+#include "shared/gather_even.glsl"

@@ -3,4 +3,4 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #define FROM_RELIEF
-#include "shared/gather.glsl"
+#include "shared/gather_even.glsl"

@@ -79,6 +79,10 @@ shared! {
     /// A side of the grid of rays from each facet of a relief to the facets that it sees;
     /// RAY_STRATA² rays.
     RAY_STRATA = 8;
+    /// Functions of the direction of incoming light by which a relief responds to it.
+    RELIEF_RANK = 16;
+    /// A side of the square of cells between which they are bilinear.
+    FINE_DIRECTIONS = 32;
     /// Most factors of the light on a relief.
     MOST_RANK = 16;
     /// Light points of the emitters for one pixel where their light is drawn sharply, and the

@@ -67,22 +67,29 @@ fn parts(build: &Build, directions: &Directions, most: usize) -> Parts {
     }
 }
 
+/// Light that a response sends for light from some directions, `[in][out]`.
+fn sent(response: &Response) -> Vec<Vec3> {
+    let from = Directions::new(64).expect("a number of the paper");
+    (0..from.count())
+        .flat_map(|slot| response.sent_from(from.centre(slot)))
+        .collect()
+}
+
 /// Largest difference of two responses as a share of the largest entry.
-fn difference(a: &[[Vec3; 3]], b: &[[Vec3; 3]]) -> f32 {
-    let all = |m: &[[Vec3; 3]]| m.iter().flatten().copied().collect::<Vec<Vec3>>();
-    let (a, b) = (all(a), all(b));
+fn difference(a: &[Vec3], b: &[Vec3]) -> f32 {
     let largest = a.iter().map(|v| v.abs().max_element()).fold(0.0, f32::max);
-    let apart = a.iter().zip(&b).map(|(a, b)| (*a - *b).abs().max_element());
+    let apart = a.iter().zip(b).map(|(a, b)| (*a - *b).abs().max_element());
     apart.fold(0.0, f32::max) / largest
 }
 
-/// Sum of the footprints' responses by the area of their elements in the texture.
-fn by_area(of: &Parts) -> Vec<[Vec3; 3]> {
-    let mut sum = vec![[Vec3::ZERO; 3]; of.whole.matrix.len()];
+/// Sum of what the footprints send by the area of their elements in the texture.
+fn by_area(of: &Parts) -> Vec<Vec3> {
+    let parts: Vec<Vec<Vec3>> = of.parts.iter().map(sent).collect();
+    let mut sum = vec![Vec3::ZERO; parts[0].len()];
     for (uv, &footprint) in of.uv.iter().zip(&of.footprints.of) {
         let area = 0.5 * (uv[1] - uv[0]).perp_dot(uv[2] - uv[0]).abs() as f32;
-        for (sum, block) in sum.iter_mut().zip(&of.parts[footprint as usize].matrix) {
-            (0..3).for_each(|c| sum[c] += area * block[c]);
+        for (sum, of) in sum.iter_mut().zip(&parts[footprint as usize]) {
+            *sum += area * *of;
         }
     }
     sum
@@ -127,11 +134,11 @@ fn footprints_sum_to_their_tile() {
             MOST_FOOTPRINTS,
         );
         assert_eq!((of.uv.len(), of.footprints.count()), (72, 72));
-        let apart = difference(&of.whole.matrix, &by_area(&of));
+        let apart = difference(&sent(&of.whole), &by_area(&of));
         let spread = of
             .parts
             .iter()
-            .map(|part| difference(&of.whole.matrix, &part.matrix))
+            .map(|part| difference(&sent(&of.whole), &sent(part)))
             .fold(0.0, f32::max);
         println!(
             "{name}: the parts' mean differs from the tile by {apart:.1e}, a part by up to {spread:.1e}"
@@ -143,8 +150,7 @@ fn footprints_sum_to_their_tile() {
         // every slot.
         for part in of.parts.iter().chain([&of.whole]) {
             for slot in 0..directions.count() {
-                let uniform: Vec<[Vec3; 3]> = uniform_sky(&directions);
-                let sent = part.send(&uniform)[slot];
+                let sent = part.send(&[Vec3::ONE])[slot];
                 let kept = Vec3::new(0.9, 0.6, 0.2);
                 let emitted = (Vec3::ONE - kept) * part.emission[slot];
                 let whole = sent + emitted;
@@ -163,19 +169,6 @@ const FURNACE: f32 = 1e-4;
 /// Rims of triangles two texels wide are sampled twice a texel: densities of the cells there are
 /// off by some percent, up or down by chance.
 const RIMS: f32 = 3e-3;
-
-/// Moments of a sky of radiosity 1.
-fn uniform_sky(directions: &Directions) -> Vec<[Vec3; 3]> {
-    let mut moments = vec![DVec3::ZERO; directions.count()];
-    for (cell, slot) in directions.fine() {
-        moments[slot] += cell.direction;
-    }
-    let whole: f64 = moments.iter().map(|m| m.z).sum();
-    moments
-        .iter()
-        .map(|m| [(*m / whole).as_vec3(); 3])
-        .collect()
-}
 
 /// Triangles that show the same texels share a footprint, in whatever repeat they lie; too many are
 /// joined by place.
@@ -197,7 +190,7 @@ fn footprints_are_shared_and_bounded() {
     // One alone is the whole plate, and the whole tile.
     let one = parts(&plate(12, 1.0, bumps), &directions, 1);
     assert_eq!(one.footprints.count(), 1);
-    let apart = difference(&one.whole.matrix, &one.parts[0].matrix);
+    let apart = difference(&sent(&one.whole), &sent(&one.parts[0]));
     println!("a footprint of the whole tile differs from the tile by {apart:.1e}");
     assert!(apart < RIMS);
     assert_silent();

@@ -3,11 +3,11 @@
 mod common;
 
 use common::{Build, assert_silent, device};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec4};
 use mesolux::constants::{KIND_POINT, NONE};
 use mesolux::math::directions::Directions;
 use mesolux::mesh::sources::Grouping;
-use mesolux::meso::{Options, Transport};
+use mesolux::meso::{Options, RANK, Transport};
 use mesolux::passes::buffers::{SceneBuffers, State, download};
 use mesolux::passes::gather::Part;
 use mesolux::passes::near_to_relief::NearToRelief;
@@ -138,8 +138,7 @@ fn sources_send_as_their_twin() {
                 }
                 let source = &before.problem.sources.list[slot.source as usize];
                 let first = (source.first_element - light.elements[0]) as usize;
-                let members =
-                    first * directions..(first + source.element_count as usize) * directions;
+                let members = first * RANK..(first + source.element_count as usize) * RANK;
                 let own = (slot.source as usize - of_relief.start) * directions;
                 let earlier: Vec<DVec3> = kept[own..own + directions]
                     .iter()
@@ -149,7 +148,7 @@ fn sources_send_as_their_twin() {
                     &before.problem.elements,
                     relief,
                     source,
-                    &light.moments[members],
+                    &light.coefficients[members],
                     &earlier,
                     slot.emitted.as_dvec3(),
                     slot.reflected.as_dvec3(),
@@ -244,6 +243,9 @@ fn wide_sources_fill_slots_as_their_twin() {
 
 /// Measured: 2.0e-7 and 2.3e-7. A device may round a point at the border of two slots to the other.
 const APART: f64 = 1e-6;
+/// Measured: 6.3e-6. The functions of a response are steep between some directions, and f32 knows
+/// a place in their square to 1e-6 of a cell.
+const HELD_APART: f64 = 1.3e-5;
 const ELSEWHERE: f64 = 1e-3;
 
 /// Light of near parts, of some size and of either sign.
@@ -299,10 +301,12 @@ fn near_parts_bring_light_as_their_twin() {
     let count = buffers.element_count as usize;
     let moments: Vec<[Vec3; 3]> =
         download(&device, &buffers.moments_indirect, count * k as usize).expect("it comes");
+    let coefficients: Vec<Vec4> =
+        download(&device, &buffers.coefficients, count * RANK).expect("it comes");
     let reflected: Vec<Reflected> = download(&device, &buffers.reflected, count).expect("it comes");
     let irradiance: Vec<Vec3> =
         download(&device, &state.indirect, on.elements.len()).expect("it comes");
-    let (mut lit, mut worst, mut elsewhere) = (0, 0.0_f64, 0.0_f64);
+    let (mut lit, mut worst, mut held_apart, mut elsewhere) = (0, 0.0_f64, 0.0_f64, 0.0_f64);
     for m in 0..count {
         let e = on.elements.plain_count() + m;
         let parts = on.near.relief_entries.of(m);
@@ -313,6 +317,11 @@ fn near_parts_bring_light_as_their_twin() {
             found.into_iter(),
             [twin.irradiance, twin.reflected].iter(),
         ));
+        let held = coefficients[m * RANK..][..RANK].iter();
+        held_apart = held_apart.max(apart(
+            held.map(|c| c.truncate().as_dvec3()),
+            twin.coefficients.iter(),
+        ));
         // Rounding decides for points on the border of two slots.
         let of = moments[m * k as usize..][..k as usize].iter();
         let off = of
@@ -321,23 +330,10 @@ fn near_parts_bring_light_as_their_twin() {
         let whole: f64 = twin.moments.iter().flatten().map(|v| v.length()).sum();
         elsewhere = elsewhere.max(off.sum::<f64>() / whole.max(1e-9));
     }
-    println!("{lit} elements: {worst:.1e} apart, {elsewhere:.1e} of the moments in other slots");
-    assert!(lit > 100 && worst < APART && elsewhere < ELSEWHERE);
-    assert_silent();
-}
-
-/// Slots that no light has reached are left out and counted.
-#[test]
-fn dark_slots_are_counted() {
-    let mut solver = solver(Transport::Physical, 64, Some(40));
-    solver.run(|_| true).expect("it runs");
-    assert!(solver.report().skipped.dark_slots > 0);
-    let shots_of_relief = solver
-        .relief_exits(1)
-        .expect("they come back")
-        .expect("it has relief")
-        .kept;
-    assert!(shots_of_relief.iter().any(|v| *v != Vec3::ZERO));
+    println!(
+        "{lit} elements: {worst:.1e} apart, coefficients {held_apart:.1e}, {elsewhere:.1e} of the moments in other slots"
+    );
+    assert!(lit > 100 && worst < APART && held_apart < HELD_APART && elsewhere < ELSEWHERE);
     assert_silent();
 }
 

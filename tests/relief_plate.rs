@@ -163,8 +163,8 @@ fn lights() -> Vec<DVec3> {
         .collect()
 }
 
-/// What each element of a baked plate of `side` repeats, cut into `cells`² squares, sends into each
-/// slot for an irradiance of 1, with its corners, `[element][slot]`.
+/// What each element of a baked plate of `side` repeats, cut into `cells`² squares, sends about the
+/// middle of each slot for an irradiance of 1, with its corners, `[element][slot]`.
 fn baked(
     directions: Directions,
     light: DVec3,
@@ -203,8 +203,8 @@ fn baked(
             let e = e as usize;
             let irradiance = solved.irradiance[e].x;
             let corners = of.triangle(e).map(|p| p * of.unit + of.origin);
-            let sent = sent.iter().map(|x| f64::from(x.x / irradiance));
-            (corners, sent.collect())
+            let sent: Vec<f64> = (sent.iter().map(|x| f64::from(x.x / irradiance))).collect();
+            (corners, looked_up(directions, &sent))
         })
         .collect()
 }
@@ -214,6 +214,21 @@ fn mean_of_elements(plate: &[([DVec3; 3], Vec<f64>)]) -> Vec<f64> {
     (0..k)
         .map(|slot| plate.iter().map(|(_, sent)| sent[slot]).sum::<f64>() / plate.len() as f64)
         .collect()
+}
+
+/// The mean of the light about the middle of each slot, by the weight of its look-up and its cosine,
+/// of light that is looked up between what is sent into each.
+fn looked_up(directions: Directions, sent: &[f64]) -> Vec<f64> {
+    let (mut sums, mut weights) = (vec![0.0; sent.len()], vec![0.0; sent.len()]);
+    for cell in FineCell::all() {
+        let look = directions.bilinear(cell.direction);
+        let light: f64 = look.iter().map(|&(slot, weight)| sent[slot] * weight).sum();
+        for (slot, weight) in look {
+            sums[slot] += weight * cell.direction.z * light;
+            weights[slot] += weight * cell.direction.z;
+        }
+    }
+    sums.iter().zip(weights).map(|(sum, w)| sum / w).collect()
 }
 
 /// The same by paths on the displaced mesh from places of the plane z = 0, with the standard error

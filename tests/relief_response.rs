@@ -123,8 +123,7 @@ fn spherical_dimples() {
                                 .sin_cos();
                                 let from =
                                     DVec3::new(angle.sin() * c, angle.sin() * s, angle.cos());
-                                let tile =
-                                    f64::from(response.directional_albedo(&directions, from).x);
+                                let tile = f64::from(response.directional_albedo(from).x);
                                 (tile - (1.0 - opening) * rho) / opening
                             })
                             .sum::<f64>()

@@ -1,5 +1,5 @@
 // Directions of the hemisphere about z in cells of equal solid angle, columns × rows of the
-// concentric map's square: src/directions.rs is the same in f64.
+// concentric map's square: src/math/directions.rs is the same in f64.
 
 // From the hemisphere to the square −1..1; a direction below the horizon is taken to the nearest on
 // it.
@@ -30,9 +30,9 @@ vec3 from_square(vec2 square) {
     return vec3(flat_part * cos(angle), flat_part * sin(angle), 1.0 - r * r);
 }
 
-// The direction whose cell holds this one.
-uint direction_of(vec3 direction, uvec2 cells) {
-    uvec2 cell = min(uvec2((to_square(direction) * 0.5 + 0.5) * vec2(cells)), cells - 1);
+// The cell that holds a place of the square.
+uint cell_of(vec2 square, uvec2 cells) {
+    uvec2 cell = min(uvec2((square * 0.5 + 0.5) * vec2(cells)), cells - 1);
     return cell.y * cells.x + cell.x;
 }
 
@@ -48,11 +48,16 @@ struct Look {
     vec4 weight;
 };
 
-Look look(vec3 direction, uvec2 cells) {
-    vec2 at = clamp((to_square(direction) * 0.5 + 0.5) * vec2(cells) - 0.5, vec2(0.0), vec2(cells - 1));
+// For a place of the square.
+Look look_at(vec2 square, uvec2 cells) {
+    vec2 at = clamp((square * 0.5 + 0.5) * vec2(cells) - 0.5, vec2(0.0), vec2(cells - 1));
     uvec2 low = min(uvec2(at), cells - 2);
     vec2 f = at - vec2(low);
     uint first = low.y * cells.x + low.x;
     return Look(uvec4(first, first + 1, first + cells.x, first + cells.x + 1),
                 vec4((1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y));
+}
+
+Look look(vec3 direction, uvec2 cells) {
+    return look_at(to_square(direction), cells);
 }

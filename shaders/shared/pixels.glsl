@@ -29,19 +29,21 @@ layout(binding = 11) uniform usamplerBuffer exits;
 layout(binding = 12) uniform usampler2D items;
 #ifdef TO_RELIEF
 layout(scalar, binding = 13) readonly buffer MesoElements { MesoElement meso_elements[]; };
-// Radiosity for each moment, [response][direction][colour].
+// Radiosity for each coefficient, [response][rank].
 layout(binding = 14) uniform usamplerBuffer albedos;
 // [meso element][direction][colour]
 layout(scalar, binding = 15) buffer MomentsDirect { vec3 moments_direct[]; };
 layout(scalar, binding = 16) buffer MomentsIndirect { vec3 moments_indirect[]; };
 layout(scalar, binding = 17) buffer MesoReflected { Reflected meso_reflected[]; };
-// Share of a uniform sender's power in each direction.
-layout(scalar, binding = 18) readonly buffer Shares { float shares[]; };
+// Of each direction, and in w its share of a uniform sender's power.
+layout(scalar, binding = 18) readonly buffer DirectionList { vec4 direction_list[]; };
 // With `by_pixel` alone: where each meso element lies in its texture, the facets of all textures,
 // and the light sent by direction, [meso element][direction].
 layout(scalar, binding = 19) readonly buffer MesoTexels { MesoTexel meso_texels[]; };
 layout(scalar, binding = 20) readonly buffer TextureFacets { TextureFacet texture_facets[]; };
 layout(scalar, binding = 21) buffer Outgoing { vec3 outgoing[]; };
+layout(binding = 22) uniform usamplerBuffer bases;
+layout(scalar, binding = 23) buffer Coefficients { vec4 coefficients[]; };
 #endif
 
 layout(push_constant, scalar) uniform Parameters {
@@ -59,6 +61,10 @@ layout(push_constant, scalar) uniform Parameters {
 
 #include "shared/accumulate.glsl"
 #include "shared/sent.glsl"
+#ifdef TO_RELIEF
+#include "shared/relief_basis.glsl"
+#include "shared/keep_coefficients.glsl"
+#endif
 
 // A triangle is cut off where it comes this near to the plane of the eye that a face looks along.
 const float NEAR = 1e-6;
@@ -162,6 +168,10 @@ void main() {
     uint m = gl_GlobalInvocationID.x;
     MesoElement meso = meso_elements[m];
     vec3 add_reflected = vec3(0.0);
+    vec3 sums[RELIEF_RANK];
+    for (uint r = 0; r < RELIEF_RANK; r++) {
+        sums[r] = vec3(0.0);
+    }
 #endif
     Slot shot = slots[slot];
     if (shot.source == NONE) {
@@ -204,9 +214,8 @@ void main() {
                     vec3 from = -vec3(dot(meso.tangent, world), dot(meso.bitangent, world), dot(plane.xyz, world));
                     // The moment whose height is the irradiance.
                     vec3 moment = vec3(from.xy / max(from.z, LEAST_HEIGHT), 1.0);
-                    uint k = direction_of(from, cells);
-                    uint at_moment = 3 * (m * directions + k);
-                    uint response = 3 * (meso.response * directions + k);
+                    vec2 square = to_square(from);
+                    uint at_moment = 3 * (m * directions + cell_of(square, cells));
                     for (uint colour = 0; colour < 3; colour++) {
                         moments_direct[at_moment + colour] += emitted[colour] * moment;
                         moments_indirect[at_moment + colour] += reflected[colour] * moment;
@@ -215,18 +224,17 @@ void main() {
                     if (by_pixel == 1) {
                         TextureFacet facet = texture_facets[texture_facet(m, s.eye, world, a, b, c, plane.xyz)];
                         vec3 sent = facet.reflectance * brought;
-                        [[unroll]] for (uint j = 0; j < MOST_DIRECTIONS; j++) {
-                            uint above = j < 32 ? facet.above_low >> j : facet.above_high >> (j - 32);
-                            if ((above & 1) == 1) {
+                        for (uint j = 0; j < directions; j++) {
+                            vec4 of = direction_list[j];
+                            if (dot(facet.normal, of.xyz) > 0.0) {
                                 outgoing[m * directions + j] += sent;
-                                add_reflected += shares[j] * sent;
+                                add_reflected += of.w * sent;
                             }
                         }
                     } else {
-                        for (uint colour = 0; colour < 3; colour++) {
-                            float albedo = dot(fetch(albedos, response + colour).xyz, moment);
-                            add_reflected[colour] += albedo * meso.scale[colour] * brought[colour];
-                        }
+                        Functions functions = no_functions();
+                        add_functions(functions, meso.response, square, 1.0);
+                        add_light(sums, functions, brought);
                     }
 #endif
                 }
@@ -236,6 +244,10 @@ void main() {
     accumulate(direct[e], direct_error[e], add_direct);
     accumulate(indirect[e], indirect_error[e], add_indirect);
 #ifdef TO_RELIEF
-    accumulate(meso_reflected[m].sum, meso_reflected[m].error, add_reflected);
+    if (by_pixel == 1) {
+        accumulate(meso_reflected[m].sum, meso_reflected[m].error, add_reflected);
+    } else {
+        keep_coefficients(m, meso, sums);
+    }
 #endif
 }

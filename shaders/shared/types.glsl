@@ -163,8 +163,7 @@ struct MesoTexel {
 // A facet of a texture, as the pixel estimator looks it up.
 struct TextureFacet {
     vec3 reflectance;
-    uint above_low;     // a bit for each of the first 32 directions less than 90° from its normal
-    uint above_high;    // of the others
+    vec3 normal;        // in the frame of the element
 };
 
 // Reflected radiosity of an element with a relief, with the rounding error of its last sum.

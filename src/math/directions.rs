@@ -3,12 +3,13 @@
 //!
 //! The square −1..1 × −1..1 is laid over the hemisphere by the concentric map (Shirley and Chiu
 //! 1997), which preserves areas: its cells are the slots. The K of the paper are 4 × 4, 4 × 8 and 8
-//! × 8. Slot index: `row · columns + column`.
+//! × 8; 8 × 16 and 16 × 16 are finer. Slot index: `row · columns + column`.
 
 use std::f64::consts::{FRAC_PI_4, PI};
 
 use glam::{DVec2, DVec3};
 
+use crate::constants::FINE_DIRECTIONS;
 use crate::error::{Error, Result};
 
 /// The division of the hemisphere into slots.
@@ -20,11 +21,11 @@ pub struct Directions {
 
 /// Cells along a side of the square for integrals over slots: the cells of every K are unions of
 /// whole ones.
-pub const FINE: u32 = 32;
+pub const FINE: u32 = FINE_DIRECTIONS;
 
 impl Directions {
     /// # Errors
-    /// A number of slots other than 16, 32 and 64.
+    /// A number of slots other than 16, 32, 64, 128 and 256.
     pub fn new(slots: u32) -> Result<Self> {
         match slots {
             16 => Ok(Self {
@@ -39,8 +40,16 @@ impl Directions {
                 columns: 8,
                 rows: 8,
             }),
+            128 => Ok(Self {
+                columns: 8,
+                rows: 16,
+            }),
+            256 => Ok(Self {
+                columns: 16,
+                rows: 16,
+            }),
             other => Err(Error::Usage(format!(
-                "--directions {other}: must be 16, 32 or 64"
+                "--directions {other}: must be 16, 32, 64, 128 or 256"
             ))),
         }
     }
@@ -199,7 +208,7 @@ pub fn to_square(direction: DVec3) -> DVec2 {
 mod tests {
     use super::*;
 
-    const ALL: [u32; 3] = [16, 32, 64];
+    const ALL: [u32; 5] = [16, 32, 64, 128, 256];
 
     #[test]
     fn round_trips() {

@@ -279,9 +279,7 @@ impl Elements {
             return self.reflectance.clone();
         };
         let responses = relief.responses.iter();
-        let even: Vec<Vec3> = responses
-            .map(|response| response.mean_albedo(&relief.directions))
-            .collect();
+        let even: Vec<Vec3> = responses.map(|response| response.mean_albedo()).collect();
         (0..self.len())
             .map(|e| match relief.is_meso(e) {
                 true => even[relief.class[e] as usize] * relief.scale[e],

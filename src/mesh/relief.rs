@@ -9,8 +9,8 @@ use crate::constants::NONE;
 use crate::error::Result;
 use crate::math::directions::Directions;
 use crate::meso::{
-    Block, Class, Footprints, March, MesoTexel, Options, Relief, Response, Scattering, Shading,
-    Texels, TextureFacet, Transport, visibility,
+    Basis, Class, Footprints, March, MesoTexel, Options, RANK, Relief, Response, Scattering,
+    Shading, Texels, TextureFacet, Transport, visibility,
 };
 use crate::scene::Scene;
 
@@ -21,20 +21,15 @@ pub const MOST_FOOTPRINTS: usize = 256;
 
 impl Texels {
     /// Adds a tile; `coordinates` are its members' texture coordinates, `[member][corner]`.
-    fn add(&mut self, directions: &Directions, tile: &Tile, coordinates: &[[DVec2; 3]]) {
+    fn add(&mut self, tile: &Tile, coordinates: &[[DVec2; 3]]) {
         let first = self.facets.len() as u32;
         let shading = &tile.shading;
         let facets = shading.normals.iter().zip(&shading.reflectance);
-        self.facets.extend(facets.map(|(normal, &reflectance)| {
-            let above = (0..directions.count())
-                .filter(|&k| normal.dot(directions.centre(k)) > 0.0)
-                .fold(0_u64, |bits, k| bits | 1 << k);
-            TextureFacet {
+        self.facets
+            .extend(facets.map(|(normal, &reflectance)| TextureFacet {
                 reflectance,
-                above_low: above as u32,
-                above_high: (above >> 32) as u32,
-            }
-        }));
+                normal: normal.as_vec3(),
+            }));
         for (&e, uv) in tile.members.iter().zip(coordinates) {
             // Shifted towards the origin, where f32 is most precise.
             let home = uv[0].floor();
@@ -120,7 +115,9 @@ impl Relief {
         let (tiles, frames) = tiles(scene, elements)?;
         let mut relief = Self::empty(elements.len(), options);
         let k = options.directions.count();
-        let most_responses = MOST_RESPONSES / (size_of::<Block>() * k * k);
+        let matrix = RANK * k * size_of::<Vec3>();
+        let basis = Basis::even().values.len() * size_of::<f32>();
+        let most_responses = MOST_RESPONSES / (matrix + basis);
         let members_of_all: usize = tiles.iter().map(|tile| tile.members.len()).sum();
         for tile in &tiles {
             let coordinates: Vec<[DVec2; 3]> = tile
@@ -137,7 +134,7 @@ impl Relief {
                 _ => TileResponses::paper(tile, &footprints, &options.directions),
             };
             if let Some(texels) = &mut relief.texels {
-                texels.add(&options.directions, tile, &coordinates);
+                texels.add(tile, &coordinates);
             }
             let material = &scene.materials[tile.material as usize].name;
             relief.add(material, tile, elements, &frames, &footprints, responses);
@@ -198,7 +195,7 @@ impl Relief {
                 (first + footprint, over(own, mean))
             };
         }
-        let albedo = whole.highest_albedo(&self.directions);
+        let albedo = whole.highest_albedo();
         self.highest_albedo = self.highest_albedo.max(highest * albedo);
         self.classes.push(Class {
             material: material.to_owned(),
@@ -208,7 +205,7 @@ impl Relief {
             facets: tile.field.facet_count(),
             rms_slope: tile.field.rms_slope(),
             reflectance: mean.to_array(),
-            albedo: whole.mean_albedo(&self.directions).to_array(),
+            albedo: whole.mean_albedo().to_array(),
             visibility_from_cache: responses.visibility_from_cache,
         });
         self.responses.extend(parts);

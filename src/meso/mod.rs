@@ -5,6 +5,7 @@
 //! light by direction ─► vertices ─► clusters
 //! ```
 
+mod basis;
 mod exchange;
 mod factors;
 mod footprints;
@@ -18,12 +19,13 @@ mod transfer;
 mod visibility;
 
 pub use crate::structs::{MesoTexel, TextureFacet};
+pub use basis::{Basis, RANK};
 pub use factors::{CORNERS, Factors, RANK_STEP};
 pub use footprints::Footprints;
 pub use height_field::{Facet, HeightField};
 pub use height_pyramid::HeightPyramid;
 pub use relief::{Class, March, Options, Relief, Texels, Transport, visibility};
-pub use response::{Block, Response, slot_shares};
+pub use response::{Response, slot_shares};
 pub use scattering::Scattering;
 pub use shading::Shading;
 pub use visibility::Visibility;

@@ -1,30 +1,32 @@
-//! The response of a relief to light: from the vector moments of the slots to the light sent into
-//! each slot.
+//! The response of a relief to light: from what arrives, by direction, to what is sent into each
+//! slot.
 //!
-//! A facet q of the tile receives E_q = Σ_k a_qk · m_k, where a_qk is the linear fit, over slot k,
-//! of V_q(ω)(n_q·ω)⁺: the facet's response to light from ω, with V the relief's visibility. Light
-//! bounces inside, B = ρ(E + G B) + e, and slot j receives the mean Σ_q W_jq B_q of the facets seen
-//! from its directions. The response is thus one matrix, R_jk = W (1 − ρG)⁻¹ ρ a, and H = W (1 −
-//! ρG)⁻¹ 1 for light that the relief emits.
+//! A facet q of the tile receives E_q = V_q(ω)(n_q·ω)⁺ / ω_z for light from ω that brings the tile
+//! an irradiance of 1, with V the relief's visibility. Light bounces inside, B = ρ(E + G B) + e, and
+//! towards ω' leaves the mean Σ_q W_q(ω') B_q of the facets seen from there. What is sent is kept
+//! by slot, bilinear between the slots' centres and fitted so that the sum over all directions
+//! stays (W_jq); what arrives, by the functions u_r of a [`Basis`]. The response is thus one small
+//! matrix, R_jr, the coefficients of W (1 − ρG)⁻¹ ρ E(ω), and H = W (1 − ρG)⁻¹ 1 for light that the
+//! relief emits.
 //!
 //! Energy is conserved up to rounding: for every direction the facets together receive exactly the
-//! light that falls on the tile; the fit is exact for linear functions and for the sum over a slot;
-//! the rows of W, and those of G with the sky, sum to 1.
+//! light that falls on the tile; the first of the functions is constant and the others have no part
+//! of it; the rows of W, and those of G with the sky, sum to 1.
 
 use glam::{DVec3, Vec3};
 
-use crate::math::directions::Directions;
-
-/// A slot's block: `[colour]` rows, each of which multiplies the moment of that colour.
-pub type Block = [Vec3; 3];
+use super::basis::{Basis, RANK};
+use crate::math::directions::{Directions, FineCell};
 
 /// The response of one relief, sent light as radiosity πL.
 #[derive(Debug, Clone)]
 pub struct Response {
-    /// R, `[in][out]`.
-    pub matrix: Vec<Block>,
-    /// Radiosity of the tile for the moment of each slot, `[in]`: Σ_j c_j R_j.
-    pub albedo: Vec<Block>,
+    /// u_r.
+    pub basis: Basis,
+    /// R, `[rank][out]`, RGB.
+    pub matrix: Vec<Vec3>,
+    /// Radiosity of the tile for each coefficient, `[rank]`, RGB: Σ_j c_j R_j.
+    pub albedo: [Vec3; RANK],
     /// H, light sent for an emitted radiosity of 1, `[out]`, RGB.
     pub emission: Vec<Vec3>,
     /// Σ_j c_j H_j: emitted radiosity of the tile for one of 1 on its facets.
@@ -58,97 +60,81 @@ impl Response {
         let k = directions.count();
         let alike = 1.0 / normals.len() as f32;
         let share = |q: usize| shares.map_or(alike, |shares| shares[q]);
-        let (columns, emission): (Vec<Vec<Block>>, Vec<Vec3>) = (0..k)
+        let (mut matrix, emission): (Vec<Vec3>, Vec<Vec3>) = (0..k)
             .map(|out| {
                 let direction = directions.centre(out);
                 let above = || (0..normals.len()).filter(|&q| normals[q].dot(direction) > 0.0);
                 let sent: Vec3 = above().map(|q| reflectance[q] * share(q)).sum();
-                let emission = Vec3::splat(above().map(share).sum());
-                let block = [sent.x, sent.y, sent.z].map(|s| Vec3::new(0.0, 0.0, s));
-                (vec![block; k], emission)
+                (sent, Vec3::splat(above().map(share).sum()))
             })
             .unzip();
-        Self::new(directions, &columns, emission)
+        matrix.resize(RANK * k, Vec3::ZERO);
+        Self::new(directions, Basis::even(), matrix, emission)
     }
 
-    /// From columns `[in][out]` and the emission, `[out]`.
+    /// From R, `[rank][out]`, and the emission, `[out]`.
     pub(super) fn new(
         directions: &Directions,
-        columns: &[Vec<Block>],
+        basis: Basis,
+        matrix: Vec<Vec3>,
         emission: Vec<Vec3>,
     ) -> Self {
-        let k = directions.count();
         let shares = slot_shares(directions);
-        let mut matrix = Vec::with_capacity(k * k);
-        let mut albedo = vec![[Vec3::ZERO; 3]; k];
-        for (slot, total) in albedo.iter_mut().enumerate() {
-            for (out, column) in columns.iter().enumerate() {
-                matrix.push(column[slot]);
-                for c in 0..3 {
-                    total[c] += shares[out] as f32 * column[slot][c];
-                }
-            }
+        let mean = |sent: &[Vec3]| -> Vec3 {
+            let shared = sent.iter().zip(&shares);
+            shared.map(|(sent, &share)| *sent * share as f32).sum()
+        };
+        let mut albedo = [Vec3::ZERO; RANK];
+        for (albedo, sent) in albedo
+            .iter_mut()
+            .zip(matrix.chunks_exact(directions.count()))
+        {
+            *albedo = mean(sent);
         }
-        let mean_emission = emission
-            .iter()
-            .zip(&shares)
-            .map(|(e, &s)| *e * s as f32)
-            .sum();
         Self {
+            basis,
             matrix,
             albedo,
+            mean_emission: mean(&emission),
             emission,
-            mean_emission,
         }
     }
 
-    /// Sent light, `[out]`, for the moments of one element, `[in][colour]`.
-    pub fn send(&self, moments: &[[Vec3; 3]]) -> Vec<Vec3> {
-        let k = moments.len();
+    /// Sent light, `[out]`, for the coefficients of one element, `[rank]`, RGB.
+    pub fn send(&self, coefficients: &[Vec3]) -> Vec<Vec3> {
+        let k = self.emission.len();
         let mut sent = vec![Vec3::ZERO; k];
-        for (row, m) in self.matrix.chunks_exact(k).zip(moments) {
-            if m.iter().all(|v| *v == Vec3::ZERO) {
-                continue;
-            }
-            for (sum, block) in sent.iter_mut().zip(row) {
-                *sum += Vec3::new(block[0].dot(m[0]), block[1].dot(m[1]), block[2].dot(m[2]));
+        for (row, coefficient) in self.matrix.chunks_exact(k).zip(coefficients) {
+            for (sum, of) in sent.iter_mut().zip(row) {
+                *sum += *of * *coefficient;
             }
         }
         sent
     }
 
+    /// Sent light, `[out]`, under parallel light from a direction (z up), for an irradiance of 1 on
+    /// the element.
+    pub fn sent_from(&self, from: DVec3) -> Vec<Vec3> {
+        let coefficients = self.basis.at(from).map(|u| Vec3::splat(u as f32));
+        self.send(&coefficients)
+    }
+
     /// Radiosity under parallel light from a direction (z up), for an irradiance of 1 on the
     /// element.
-    pub fn directional_albedo(&self, directions: &Directions, from: DVec3) -> Vec3 {
-        let moment = (from / from.z).as_vec3();
-        let block = self.albedo[directions.slot_of(from)];
-        Vec3::new(
-            block[0].dot(moment),
-            block[1].dot(moment),
-            block[2].dot(moment),
-        )
+    pub fn directional_albedo(&self, from: DVec3) -> Vec3 {
+        let terms = self.basis.at(from).into_iter().zip(&self.albedo);
+        terms.map(|(u, albedo)| *albedo * u as f32).sum()
     }
 
     /// Share of a uniform sky's light that leaves the relief again.
-    pub fn mean_albedo(&self, directions: &Directions) -> Vec3 {
-        let cells: Vec<_> = directions.fine().collect();
-        let total: f64 = cells.iter().map(|(cell, _)| cell.direction.z).sum();
-        cells
-            .iter()
-            .map(|(cell, slot)| {
-                let (block, w) = (self.albedo[*slot], (cell.direction / total).as_vec3());
-                Vec3::new(block[0].dot(w), block[1].dot(w), block[2].dot(w))
-            })
-            .sum()
+    pub fn mean_albedo(&self) -> Vec3 {
+        self.albedo[0]
     }
 
-    /// The largest albedo in the middle of any slot.
-    pub fn highest_albedo(&self, directions: &Directions) -> f32 {
-        (0..directions.count())
-            .map(|slot| {
-                self.directional_albedo(directions, directions.centre(slot))
-                    .max_element()
-            })
+    /// The largest albedo for light from any direction.
+    pub fn highest_albedo(&self) -> f32 {
+        FineCell::all()
+            .map(|cell| self.directional_albedo(cell.direction).max_element())
             .fold(0.0, f32::max)
     }
 }

@@ -3,19 +3,24 @@
 //!
 //! Light that leaves a part of the mesh's plane towards ω comes from the facets seen through it:
 //! facet q at height h is seen through the place shifted by h tan θ. A footprint's response is
-//! therefore W' (1 − ρG)⁻¹ ρ a, where the rows of W are restricted to the facets seen through the
+//! therefore W' (1 − ρG)⁻¹ ρ E(ω), where the rows of W are restricted to the facets seen through the
 //! footprint and normalised to sum to 1. Light enters at all facets, as if the footprint's
 //! neighbours were lit as it is: light that falls on one footprint may leave through another. Under
 //! even light the power of the tile is conserved, but not that of each footprint.
+//!
+//! Few facets are seen through a footprint, so that its response depends on the direction of the
+//! light in its own way: each has a basis of its own. Only light that has bounced inside the relief
+//! is found by the basis of the tile.
 
 use glam::{DVec2, DVec3, Vec3};
 use nalgebra::{DMatrix, DMatrixView, DVectorView};
 use rayon::prelude::*;
 
+use super::basis::{Basis, RANK};
 use super::exchange::Exchange;
 use super::footprints::Footprints;
-use super::response::{Block, Response};
-use super::transfer::{CELLS, Facets, Fit};
+use super::response::Response;
+use super::transfer::{CELLS, Facets};
 use super::{HeightField, Visibility};
 use crate::math::directions::{Directions, FineCell};
 
@@ -25,19 +30,32 @@ const MOST_BOUNCES: usize = 2_000;
 /// Weight of the whole tile that is mixed into the view of a footprint. Where no facet is seen
 /// through the footprint, the view is that of the whole tile.
 const OF_TILE: f64 = 1e-3;
+/// Slots that a basis is found from: how light leaves need not be known finely to know which
+/// directions it comes from differ.
+const COARSE: Directions = Directions {
+    columns: 8,
+    rows: 8,
+};
+/// Columns of the three colours, `[rank][colour]`.
+const COLOURS: usize = 3 * RANK;
 
 /// A tile with its internal light solved.
 pub struct Scattering<'a> {
     directions: Directions,
     field: &'a HeightField,
+    reflectance: &'a [Vec3],
     facets: Facets,
-    /// (1 − ρG)⁻¹ ρ a: radiosity of the facets for the moment of each slot, one column
-    /// `[in][axis][colour]` for each facet.
-    lit: DMatrix<f32>,
+    /// Of the tile.
+    basis: Basis,
+    /// Radiosity of the facets for each coefficient, straight and after bounces inside the relief:
+    /// one column `[rank][colour]` for each facet.
+    straight: DMatrix<f32>,
+    bounced: DMatrix<f32>,
     /// (1 − ρG)⁻¹ 1: for light that each facet emits, `[facet]`.
     glowing: Vec<Vec3>,
-    /// See [`slots_of_cells`].
-    looks: DMatrix<f32>,
+    /// See [`fits`].
+    fits: DMatrix<f32>,
+    coarse_fits: DMatrix<f32>,
 }
 
 impl Response {
@@ -61,114 +79,142 @@ impl<'a> Scattering<'a> {
         field: &'a HeightField,
         visibility: &Visibility,
         normals: &[DVec3],
-        reflectance: &[Vec3],
+        reflectance: &'a [Vec3],
     ) -> Self {
         let facets = Facets::new(field, normals, visibility);
         let exchange = Exchange::new(visibility, &facets.sky);
-        let fit = Fit::new(directions);
-        // a, `[facet][in]`.
-        let vectors: Vec<Vec3> = facets
-            .transfer
-            .par_chunks(CELLS)
-            .flat_map_iter(|row| fit.apply(row))
-            .collect();
-        let k = directions.count();
-        // `[in][axis]` of `[facet]`
-        let columns: Vec<Vec<Vec3>> = (0..3 * k)
+        let coarse_fits = fits(&COARSE);
+        let seen = seen(&facets, &coarse_fits);
+        let sent: Vec<f32> = reflectance.iter().map(|r| r.element_sum() / 3.0).collect();
+        let basis = Basis::of(sent_from_cells(&facets, &seen, &sent));
+        let straight = straight(&facets.transfer, &basis, reflectance);
+        let mut bounces = straight.clone();
+        // `[rank]` of `[facet]`
+        let columns: Vec<Vec<Vec3>> = (0..RANK)
             .into_par_iter()
-            .map(|column| {
-                let vectors = vectors[column / 3..].iter().step_by(k);
-                let sent = vectors.zip(reflectance).map(|(v, r)| v[column % 3] * *r);
-                bounced(&exchange, sent.collect(), reflectance)
+            .map(|r| {
+                let colours = straight.rows(3 * r, 3);
+                let first: Vec<Vec3> = (colours.column_iter())
+                    .map(|c| Vec3::new(c[0], c[1], c[2]))
+                    .collect();
+                bounced(&exchange, first, reflectance)
             })
             .collect();
-        let mut lit = DMatrix::zeros(9 * k, field.facet_count());
-        (lit.as_mut_slice().par_chunks_mut(9 * k).enumerate()).for_each(|(q, facet)| {
-            for (at, column) in facet.chunks_exact_mut(3).zip(&columns) {
-                at.copy_from_slice(&column[q].to_array());
+        for (r, column) in columns.iter().enumerate() {
+            for (q, all) in column.iter().enumerate() {
+                for c in 0..3 {
+                    bounces[(3 * r + c, q)] = all[c] - straight[(3 * r + c, q)];
+                }
             }
-        });
+        }
         let glowing = bounced(&exchange, vec![Vec3::ONE; field.facet_count()], reflectance);
         Self {
             directions: *directions,
             field,
+            reflectance,
             facets,
-            lit,
+            basis,
+            straight,
+            bounced: bounces,
             glowing,
-            looks: slots_of_cells(directions),
+            fits: fits(directions),
+            coarse_fits,
         }
     }
 
     /// The response of the whole tile.
     pub fn whole(&self) -> Response {
-        let transfer = DMatrixView::from_slice(&self.facets.transfer, CELLS, self.glowing.len());
-        let mut seen = transfer.tr_mul(&self.looks);
-        for (mut facet, &area) in seen.row_iter_mut().zip(&self.facets.area) {
-            facet *= area as f32;
-        }
-        for mut out in seen.column_iter_mut() {
-            let whole: f64 = out.iter().map(|&s| f64::from(s)).sum();
-            out /= whole as f32;
-        }
+        let seen = seen(&self.facets, &self.fits);
+        let matrix = (&self.straight + &self.bounced) * &seen;
         let emission = self.emission(&seen, 0..self.glowing.len());
-        Response::new(&self.directions, &blocks(&(&self.lit * seen)), emission)
+        Response::new(
+            &self.directions,
+            self.basis.clone(),
+            rows(&matrix),
+            emission,
+        )
     }
 
     /// The responses of the footprints, `[footprint]`; `tile` is that of the whole tile.
     pub fn of_footprints(&self, footprints: &Footprints, tile: &Response) -> Vec<Response> {
-        let k = self.directions.count();
         let seen = self.seen_through(footprints);
-        // The facets seen fill the view of a tile, and equally that of a footprint: their densities
-        // have the same mean.
-        let plane = 0.5 * self.field.aspect * self.field.facet_count() as f64;
-        let rest: Vec<f64> = (self.looks.column_iter())
-            .map(|looks| {
-                let heights = looks.iter().zip(FineCell::all());
-                let height: f64 = heights
-                    .map(|(&l, cell)| f64::from(l) * cell.direction.z)
-                    .sum();
-                OF_TILE * plane * height
-            })
-            .collect();
-        let respond = |footprint: usize| {
-            let seen = || seen.iter().flat_map(|facets| &facets[footprint]);
-            let mut facets: Vec<u32> = seen().map(|s| s.facet).collect();
-            facets.dedup();
-            let mut lit = DMatrix::zeros(9 * k, facets.len());
-            for (mut to, &q) in lit.column_iter_mut().zip(&facets) {
-                to.copy_from(&self.lit.column(q as usize));
-            }
-            // Projected areas, `[fine cell][facet]`.
-            let mut areas = DMatrix::zeros(CELLS, facets.len());
-            let mut column = 0;
-            for s in seen() {
-                column += usize::from(facets[column] != s.facet);
-                areas[(s.cell as usize, column)] += s.area;
-            }
-            let mut shares = areas.tr_mul(&self.looks);
-            let mut of_tile = vec![0.0; k];
-            for (out, mut shares) in shares.column_iter_mut().enumerate() {
-                let whole = rest[out] + shares.iter().map(|&s| f64::from(s)).sum::<f64>();
-                shares /= whole as f32;
-                of_tile[out] = (rest[out] / whole) as f32;
-            }
-            let facets = facets.iter().map(|&q| q as usize);
-            let mut emission = self.emission(&shares, facets);
-            let mut columns = blocks(&(lit * shares));
-            for (out, column) in columns.iter_mut().enumerate() {
-                emission[out] += tile.emission[out] * of_tile[out];
-                for (slot, block) in column.iter_mut().enumerate() {
-                    for (rows, of_whole) in block.iter_mut().zip(&tile.matrix[slot * k + out]) {
-                        *rows += *of_whole * of_tile[out];
-                    }
-                }
-            }
-            Response::new(&self.directions, &columns, emission)
-        };
         (0..footprints.count())
             .into_par_iter()
-            .map(respond)
+            .map(|footprint| self.of_footprint(&seen, footprint, tile))
             .collect()
+    }
+
+    /// `seen` are the facets that each part of them lists for the footprints, see
+    /// [`Self::seen_through`].
+    fn of_footprint(&self, seen: &[Vec<Vec<Seen>>], footprint: usize, tile: &Response) -> Response {
+        let k = self.directions.count();
+        let seen = || seen.iter().flat_map(|facets| &facets[footprint]);
+        let mut facets: Vec<usize> = seen().map(|s| s.facet as usize).collect();
+        facets.dedup();
+        if facets.is_empty() {
+            return tile.clone();
+        }
+        // Projected areas, `[fine cell][facet]`, and their sums with the share of the whole tile.
+        let mut areas = DMatrix::zeros(CELLS, facets.len());
+        let plane = 0.5 * self.field.aspect * self.field.facet_count() as f64;
+        let of_tile: Vec<f64> = FineCell::all()
+            .map(|cell| OF_TILE * plane * cell.direction.z)
+            .collect();
+        let mut whole = of_tile.clone();
+        let mut column = 0;
+        for s in seen() {
+            column += usize::from(facets[column] != s.facet as usize);
+            areas[(s.cell as usize, column)] += s.area;
+            whole[s.cell as usize] += f64::from(s.area);
+        }
+        let scales = || (FineCell::all().zip(&whole)).map(|(cell, whole)| cell.direction.z / whole);
+        for (mut row, scale) in areas.row_iter_mut().zip(scales()) {
+            row *= scale as f32;
+        }
+        let of_tile: Vec<f32> = (of_tile.iter().zip(scales()))
+            .map(|(of_tile, scale)| (of_tile * scale) as f32)
+            .collect();
+        let of_tile = DMatrix::from_row_slice(1, CELLS, &of_tile);
+        let through = |fits: &DMatrix<f32>| (areas.tr_mul(fits), &of_tile * fits);
+
+        // Of these facets: what they receive from each fine cell, and their light by the basis.
+        let transfer = DMatrixView::from_slice(&self.facets.transfer, CELLS, self.glowing.len());
+        let transfer = transfer.select_columns(&facets);
+        let bounced = self.bounced.select_columns(&facets);
+
+        let (seen, _) = through(&self.coarse_fits);
+        let mut straight_seen = seen.clone();
+        for (mut row, &q) in straight_seen.row_iter_mut().zip(&facets) {
+            row *= self.reflectance[q].element_sum() / 3.0;
+        }
+        let mut sent = (&transfer * straight_seen).transpose();
+        for (mut column, cell) in sent.column_iter_mut().zip(FineCell::all()) {
+            column /= cell.direction.z as f32;
+        }
+        let grey = DMatrix::from_fn(RANK, facets.len(), |r, i| {
+            (0..3).map(|c| bounced[(3 * r + c, i)]).sum::<f32>() / 3.0
+        });
+        sent += (grey * &seen).tr_mul(&self.basis.matrix());
+        let basis = Basis::of(sent.cast());
+
+        let reflectance: Vec<Vec3> = facets.iter().map(|&q| self.reflectance[q]).collect();
+        let from_tile = self.basis.product(&basis);
+        let lit =
+            straight(transfer.as_slice(), &basis, &reflectance) + turned(&bounced, &from_tile);
+        let (seen, of_tile_seen) = through(&self.fits);
+        let mut matrix = lit * &seen;
+        let mut whole = DMatrix::zeros(COLOURS, k);
+        for (i, sent) in tile.matrix.iter().enumerate() {
+            (0..3).for_each(|c| whole[(3 * (i / k) + c, i % k)] = sent[c]);
+        }
+        let whole = turned(&whole, &from_tile);
+        let mut emission = self.emission(&seen, facets.iter().copied());
+        for out in 0..k {
+            let share = of_tile_seen[(0, out)];
+            emission[out] += tile.emission[out] * share;
+            (0..COLOURS).for_each(|row| matrix[(row, out)] += whole[(row, out)] * share);
+        }
+        Response::new(&self.directions, basis, rows(&matrix), emission)
     }
 
     /// H of facets with their shares in the view, `[facet][out]`.
@@ -229,25 +275,116 @@ struct Seen {
     area: f32,
 }
 
-/// Weight of each slot in a bilinear look-up at each fine cell, `[fine cell][slot]`.
-fn slots_of_cells(directions: &Directions) -> DMatrix<f32> {
-    let mut looks = DMatrix::zeros(CELLS, directions.count());
+/// Weights of the fine cells by which each slot is fitted, `[fine cell][slot]`: light f(ω) is
+/// Σ_j f_j h_j(ω) with h_j the weights of the bilinear look-up, and f_j = Σ_i fits_ij z_i f(ω_i) are
+/// the values closest to it under the weights z. The power Σ_i z_i f(ω_i) stays. A mean over the
+/// directions that look a slot up would blur f by as much as the look-up does again.
+fn fits(directions: &Directions) -> DMatrix<f32> {
+    let k = directions.count();
+    let mut looks = DMatrix::<f64>::zeros(CELLS, k);
     for (i, cell) in FineCell::all().enumerate() {
         for (slot, weight) in directions.bilinear(cell.direction) {
-            looks[(i, slot)] += weight as f32;
+            looks[(i, slot)] += weight;
         }
     }
-    looks
+    let mut weighted = looks.clone();
+    for (mut row, cell) in weighted.row_iter_mut().zip(FineCell::all()) {
+        row *= cell.direction.z;
+    }
+    let normal = looks.tr_mul(&weighted);
+    let inverse = normal.cholesky().map(|of| of.inverse());
+    (looks * inverse.expect("every slot is looked up by directions of its own")).cast()
 }
 
-/// Turns columns `[in][axis][colour]` into blocks, `[in][out]`.
-fn blocks(sums: &DMatrix<f32>) -> Vec<Vec<Block>> {
-    let column = |sums: DVectorView<'_, f32>| -> Vec<Block> {
-        (sums.as_slice().chunks_exact(9))
-            .map(|by_axis| [0, 1, 2].map(|c| Vec3::new(by_axis[c], by_axis[3 + c], by_axis[6 + c])))
-            .collect()
-    };
-    sums.column_iter().map(column).collect()
+/// Shares W of the facets in each slot, `[facet][slot]`; those of a slot sum to 1.
+fn seen(facets: &Facets, fits: &DMatrix<f32>) -> DMatrix<f32> {
+    let transfer = DMatrixView::from_slice(&facets.transfer, CELLS, facets.area.len());
+    let mut seen = DMatrix::zeros(facets.area.len(), fits.ncols());
+    let parts: Vec<DMatrix<f32>> = (0..facets.area.len())
+        .into_par_iter()
+        .step_by(PART)
+        .map(|first| {
+            let count = PART.min(facets.area.len() - first);
+            transfer.columns(first, count).tr_mul(fits)
+        })
+        .collect();
+    for (part, of) in parts.iter().enumerate() {
+        seen.rows_mut(part * PART, of.nrows()).copy_from(of);
+    }
+    for (mut facet, &area) in seen.row_iter_mut().zip(&facets.area) {
+        facet *= area as f32;
+    }
+    for mut out in seen.column_iter_mut() {
+        let whole: f64 = out.iter().map(|&s| f64::from(s)).sum();
+        out /= whole as f32;
+    }
+    seen
+}
+
+/// Light that leaves for an irradiance of 1 from each fine cell, without bounces inside the relief,
+/// `[slot][fine cell]`. `seen` is `[facet][slot]` and `reflectance` `[facet]`.
+fn sent_from_cells(facets: &Facets, seen: &DMatrix<f32>, reflectance: &[f32]) -> DMatrix<f64> {
+    let transfer = DMatrixView::from_slice(&facets.transfer, CELLS, reflectance.len());
+    let parts: Vec<DMatrix<f32>> = (0..reflectance.len())
+        .into_par_iter()
+        .step_by(PART)
+        .map(|first| {
+            let count = PART.min(reflectance.len() - first);
+            let mut seen = seen.rows(first, count).into_owned();
+            for (mut row, &r) in seen.row_iter_mut().zip(&reflectance[first..]) {
+                row *= r;
+            }
+            transfer.columns(first, count) * seen
+        })
+        .collect();
+    let mut sent: DMatrix<f64> = DMatrix::zeros(CELLS, seen.ncols());
+    for part in parts {
+        sent += part.cast::<f64>();
+    }
+    for (mut row, cell) in sent.row_iter_mut().zip(FineCell::all()) {
+        row /= cell.direction.z;
+    }
+    sent.transpose()
+}
+
+/// Radiosity of facets that reflect what they receive straight, one column `[rank][colour]` for
+/// each facet. `transfer` is `[facet][fine cell]`.
+fn straight(transfer: &[f32], basis: &Basis, reflectance: &[Vec3]) -> DMatrix<f32> {
+    let heights: f64 = FineCell::all().map(|cell| cell.direction.z).sum();
+    let basis = basis.matrix() / heights as f32;
+    let mut lit = DMatrix::zeros(COLOURS, reflectance.len());
+    (lit.as_mut_slice().par_chunks_mut(COLOURS))
+        .zip(transfer.par_chunks(CELLS))
+        .zip(reflectance)
+        .for_each(|((lit, transfer), reflectance)| {
+            let received = &basis * DMatrixView::from_slice(transfer, CELLS, 1);
+            for (lit, &of) in lit.chunks_exact_mut(3).zip(received.iter()) {
+                lit.copy_from_slice(&(*reflectance * of).to_array());
+            }
+        });
+    lit
+}
+
+/// Columns `[rank][colour]` by the functions of another basis; `product` is
+/// [`Basis::product`] with it.
+fn turned(columns: &DMatrix<f32>, product: &DMatrix<f32>) -> DMatrix<f32> {
+    let mut turned = DMatrix::zeros(COLOURS, columns.ncols());
+    for c in 0..3 {
+        let of_colour = columns.rows_with_step(c, RANK, 2);
+        let product = product.tr_mul(&of_colour);
+        turned.rows_with_step_mut(c, RANK, 2).copy_from(&product);
+    }
+    turned
+}
+
+/// R, `[rank][out]`, from columns `[rank][colour]` for each direction out.
+fn rows(matrix: &DMatrix<f32>) -> Vec<Vec3> {
+    (0..RANK)
+        .flat_map(|r| {
+            (matrix.column_iter())
+                .map(move |out| Vec3::new(out[3 * r], out[3 * r + 1], out[3 * r + 2]))
+        })
+        .collect()
 }
 
 /// Radiosity B of the facets with all bounces inside the relief, for their initial radiosity b: B =

@@ -1,5 +1,5 @@
 //! Gathers light from kept rows: irradiance of every element, and of elements with a relief the
-//! moments of their light. Shaders: `gather.comp`, and where a scene has relief
+//! moments and coefficients of their light. Shaders: `gather.comp`, and where a scene has relief
 //! `gather_from_relief.comp` and `gather_to_relief.comp`.
 
 use std::ops::Range;
@@ -12,6 +12,7 @@ use super::kept_rows::KeptRows;
 use super::relief_buffers::ReliefBuffers;
 use super::shaders::{gather, gather_from_relief, gather_to_relief};
 use super::types::{KeptRow, Slot};
+use crate::constants::GROUP;
 use crate::error::Result;
 use crate::vk::{
     BoundCompute, Buffer, BufferUse, Commands, ComputePipeline, Device, Stage, TEXEL_BYTES,
@@ -67,6 +68,8 @@ pub enum Part {
 /// Gathering to the elements without relief, and to those with one.
 pub struct Gather {
     shape: RowShape,
+    /// Of a subgroup.
+    lanes: u32,
     /// For the elements without relief, and what is the same for all.
     parameters: gather::Parameters,
     /// For each chunk of rows.
@@ -151,6 +154,7 @@ impl Gather {
         let shape = kept.shape;
         Ok(Self {
             shape,
+            lanes: lanes[0],
             parameters: gather::Parameters {
                 first_element: 0,
                 element_count: shape.plain_count,
@@ -192,7 +196,9 @@ impl Gather {
                     first_block: shape.plain_blocks(),
                     ..plain
                 };
-                cmd.dispatch(&bound[light], &meso, [groups(shape.meso_count), 1, 1]);
+                let parts = GROUP.div_ceil(self.lanes);
+                let size = [groups(shape.meso_count), parts, 1];
+                cmd.dispatch(&bound[light], &meso, size);
             }
             cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         }
@@ -245,6 +251,8 @@ fn bind_meso(
         albedos: &relief.albedos,
         moments,
         meso_reflected: &relief.reflected,
+        bases: &relief.bases,
+        coefficients: &relief.coefficients,
     };
     pipeline.bind(&bindings)
 }

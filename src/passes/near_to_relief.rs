@@ -50,6 +50,8 @@ impl NearToRelief {
             meso_reflected: &relief.reflected,
             irradiance: &state.direct,
             irradiance_error: &state.direct_error,
+            bases: &relief.bases,
+            coefficients: &relief.coefficients,
         };
         let of_emitted = pipeline.bind(&bindings)?;
         let of_reflected = pipeline.bind(&Bindings {

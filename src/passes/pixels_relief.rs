@@ -68,10 +68,12 @@ impl PixelsRelief {
             moments_direct: &relief.moments_direct,
             moments_indirect: &relief.moments_indirect,
             meso_reflected: &relief.reflected,
-            shares: &relief.shares,
+            direction_list: &relief.directions_list,
             meso_texels: &relief.texels,
             texture_facets: &relief.facets,
             outgoing: &relief.outgoing,
+            bases: &relief.bases,
+            coefficients: &relief.coefficients,
         };
         let shaders = (&pixels_from_relief::SHADER, &pixels_to_relief::SHADER);
         Ok(Self {
@@ -85,7 +87,12 @@ impl PixelsRelief {
     pub fn record(&self, cmd: &Commands, relief: &ReliefBuffers, batch: &Batch) {
         let hemicubes = batch.hemicubes();
         let rows = 3 * hemicubes.face_size;
-        let band = (MOST_PIXELS / hemicubes.face_size).max(1);
+        // Turns for a pixel: itself, and each direction that its light leaves in.
+        let turns = match relief.by_pixel {
+            true => 1 + relief.directions.count() as u32,
+            false => 1,
+        };
+        let band = (MOST_PIXELS / (turns * hemicubes.face_size)).max(1);
         for slot in 0..batch.slot_count {
             for first_row in (0..rows).step_by(band as usize) {
                 for (bound, first_element, element_count) in [

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::math::directions::Directions;
 use crate::mesh::elements::Elements;
 use crate::mesh::sources::Sources;
-use crate::meso::{Relief, slot_shares};
+use crate::meso::{RANK, Relief, slot_shares};
 use crate::vk::{Buffer, BufferUse, Device, TEXEL_BYTES};
 
 /// The elements with a relief, in their order.
@@ -39,13 +39,18 @@ pub struct ReliefBuffers {
     /// Sources that send by direction at once, at most.
     pub slots: u32,
     pub elements: Buffer,
-    /// R, `[response][in][out][colour]`, vectors in texels.
+    /// u_r, `[response][fine cell][rank]`, four in a texel.
+    pub bases: Buffer,
+    /// R, `[response][rank][out]`, a texel each.
     pub matrices: Buffer,
-    /// `[response][in][colour]`, vectors in texels.
+    /// `[response][rank]`, a texel each.
     pub albedos: Buffer,
     /// H over its mean, `[response][out]`.
     pub emissions: Buffer,
-    pub shares: Buffer,
+    /// Of each slot the middle, and its share of a uniform sender's power, `[slot]`.
+    pub directions_list: Buffer,
+    /// Of all light, `[meso element][rank]`, a texel each.
+    pub coefficients: Buffer,
     /// `[meso element][direction][colour]`, vectors.
     pub moments_direct: Buffer,
     pub moments_indirect: Buffer,
@@ -56,8 +61,6 @@ pub struct ReliefBuffers {
     pub member_exits: Buffer,
     /// `[slot][emitted, reflected][direction]`, a texel each.
     pub exits: Buffer,
-    /// Slots without light that were left out, `[relief source]`.
-    pub dark_slots: Buffer,
     /// Whether elements reflect by the normal and albedo of each pixel; the rest is for that alone.
     pub by_pixel: bool,
     pub texels: Buffer,
@@ -105,8 +108,9 @@ impl ReliefBuffers {
             _ => (vec![Zeroable::zeroed()], vec![Zeroable::zeroed()]),
         };
         let responses = Responses::new(relief);
-        let shares = slot_shares(&relief.directions);
-        let shares: Vec<f32> = shares.iter().map(|&s| s as f32).collect();
+        let directions_list: Vec<Vec4> = (slot_shares(&relief.directions).iter().enumerate())
+            .map(|(slot, &share)| relief.directions.centre(slot).extend(share).as_vec4())
+            .collect();
         let (uses, texels_use) = (BufferUse::Storage, BufferUse::Texels);
         let zeroed = |name, bytes| filled(device, name, bytes, 0);
         let slots = u64::from(batch_slots);
@@ -120,10 +124,17 @@ impl ReliefBuffers {
             most_members,
             slots: batch_slots,
             elements: upload(device, "meso elements", &gpu_elements, uses)?,
+            bases: upload(device, "relief bases", &responses.bases, texels_use)?,
             matrices: upload(device, "relief matrices", &responses.matrices, texels_use)?,
             albedos: upload(device, "relief albedos", &responses.albedos, texels_use)?,
             emissions: upload(device, "relief emissions", &responses.emissions, uses)?,
-            shares: upload(device, "direction shares", &shares, uses)?,
+            directions_list: upload(device, "directions", &directions_list, uses)?,
+            coefficients: {
+                let bytes = RANK as u64 * TEXEL_BYTES * meso.len() as u64;
+                let buffer = Buffer::new(device, "relief coefficients", bytes, texels_use)?;
+                buffer.set_all(0)?;
+                buffer
+            },
             moments_direct: zeroed("moments direct", moment_bytes)?,
             moments_indirect: zeroed("moments indirect", moment_bytes)?,
             reflected: zeroed("meso reflected", reflected_bytes)?,
@@ -135,7 +146,6 @@ impl ReliefBuffers {
                 uses,
             )?,
             exits: Buffer::new(device, "exits", 2 * TEXEL_BYTES * k * slots, texels_use)?,
-            dark_slots: zeroed("dark slots", 4 * of_relief.len() as u64)?,
             by_pixel,
             texels: upload(device, "meso texels", &texels, uses)?,
             facets: upload(device, "texture facets", &facets, uses)?,
@@ -146,14 +156,15 @@ impl ReliefBuffers {
         })
     }
 
-    /// What holds light, and the count of what was left out of it.
+    /// What holds light.
     pub fn light(&self) -> impl Iterator<Item = &Buffer> {
         let moments = [
             &self.moments_direct,
             &self.moments_indirect,
+            &self.coefficients,
             &self.reflected,
         ];
-        let sent = [&self.shot_exits, &self.dark_slots, &self.outgoing];
+        let sent = [&self.shot_exits, &self.outgoing];
         moments.into_iter().chain(sent)
     }
 
@@ -180,6 +191,7 @@ fn check_room(device: &Device, elements: usize, directions: u64, bytes: u64) -> 
 
 /// All responses, one after another; see [`ReliefBuffers`].
 struct Responses {
+    bases: Vec<f32>,
     matrices: Vec<Vec4>,
     albedos: Vec<Vec4>,
     emissions: Vec<Vec3>,
@@ -189,12 +201,16 @@ impl Responses {
     fn new(relief: &Relief) -> Self {
         let responses = || relief.responses.iter();
         Self {
+            bases: responses()
+                .flat_map(|r| r.basis.values.iter())
+                .copied()
+                .collect(),
             matrices: responses()
-                .flat_map(|r| r.matrix.iter().flatten())
-                .map(|row| row.extend(0.0))
+                .flat_map(|r| &r.matrix)
+                .map(|sent| sent.extend(0.0))
                 .collect(),
             albedos: responses()
-                .flat_map(|r| r.albedo.iter().flatten())
+                .flat_map(|r| r.albedo)
                 .map(|albedo| albedo.extend(0.0))
                 .collect(),
             emissions: responses()

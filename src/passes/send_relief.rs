@@ -30,17 +30,17 @@ impl SendRelief {
             meso_elements: &relief.elements,
             matrices: &relief.matrices,
             emissions: &relief.emissions,
-            shares: &relief.shares,
-            moments_direct: &relief.moments_direct,
-            moments_indirect: &relief.moments_indirect,
+            direction_list: &relief.directions_list,
+            coefficients: &relief.coefficients,
             shot_exits: &relief.shot_exits,
             member_exits: &relief.member_exits,
             exits: &relief.exits,
-            dark_slots: &relief.dark_slots,
             outgoing: &relief.outgoing,
         };
+        let directions = [relief.directions.count() as u32];
         Ok(Self {
-            bound: ComputePipeline::new(device, "send relief", &SHADER)?.bind(&bindings)?,
+            bound: ComputePipeline::with_constants(device, "send relief", &SHADER, &directions)?
+                .bind(&bindings)?,
             parameters: Parameters {
                 first_source: relief.first_source,
                 source_count: relief.source_count,

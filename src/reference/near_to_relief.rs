@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::disc::points;
-use crate::meso::Relief;
+use crate::meso::{RANK, Relief};
 use crate::structs::NearPart;
 
 /// What one element with a relief receives, W·m⁻², RGB.
@@ -12,6 +12,8 @@ pub struct Received {
     pub irradiance: DVec3,
     /// Moments in the element's frame, `[direction][colour]`.
     pub moments: Vec<[DVec3; 3]>,
+    /// Σ E u_r(ω), `[rank]`, RGB.
+    pub coefficients: [DVec3; RANK],
     /// Radiosity.
     pub reflected: DVec3,
 }
@@ -22,6 +24,7 @@ pub fn receive(relief: &Relief, element: usize, parts: &[NearPart], beyond: &[Ve
     let mut received = Received {
         irradiance: DVec3::ZERO,
         moments: vec![[DVec3::ZERO; 3]; relief.directions.count()],
+        coefficients: [DVec3::ZERO; RANK],
         reflected: DVec3::ZERO,
     };
     for part in parts {
@@ -32,10 +35,15 @@ pub fn receive(relief: &Relief, element: usize, parts: &[NearPart], beyond: &[Ve
             let slot = relief.directions.slot_of(point.normalize());
             for c in 0..3 {
                 received.moments[slot][c] += light[c] * point;
-                let albedo = response.albedo[slot][c].as_dvec3();
-                received.reflected[c] += albedo.dot(point) * light[c];
+            }
+            let functions = response.basis.at(point.normalize());
+            for (sum, u) in received.coefficients.iter_mut().zip(functions) {
+                *sum += u * point.z * light;
             }
         }
+    }
+    for (coefficient, albedo) in received.coefficients.iter().zip(&response.albedo) {
+        received.reflected += *coefficient * albedo.as_dvec3();
     }
     received.reflected *= relief.scale[element].as_dvec3();
     received

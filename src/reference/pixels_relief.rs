@@ -122,9 +122,10 @@ impl Received {
             self.moments[m * k + slot][c] += moment * brought[c];
         }
         let Some(texels) = &relief.texels else {
-            let block = relief.response(e).albedo[slot];
-            let albedo = block.map(|row| row.as_dvec3().dot(moment));
-            self.reflected[m] += DVec3::from_array(albedo) * relief.scale[e].as_dvec3() * brought;
+            let response = relief.response(e);
+            let terms = response.basis.at(from).into_iter().zip(&response.albedo);
+            let albedo: DVec3 = terms.map(|(u, albedo)| u * albedo.as_dvec3()).sum();
+            self.reflected[m] += albedo * relief.scale[e].as_dvec3() * brought;
             return;
         };
         // The place in the texture that the pixel shows, by barycentric areas.
@@ -146,8 +147,7 @@ impl Received {
         let facet = texels.facets[(on.first + facet) as usize];
         let sent = facet.reflectance.as_dvec3() * brought;
         for (j, share) in slot_shares(&relief.directions).into_iter().enumerate() {
-            let above = u64::from(facet.above_high) << 32 | u64::from(facet.above_low);
-            if above >> j & 1 == 1 {
+            if facet.normal.as_dvec3().dot(relief.directions.centre(j)) > 0.0 {
                 self.outgoing[m * k + j] += sent;
                 self.reflected[m] += sent * share;
             }

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use crate::mesh::elements::Elements;
 use crate::mesh::sources::Source;
-use crate::meso::{Relief, slot_shares};
+use crate::meso::{RANK, Relief, slot_shares};
 
 /// Light by direction of the hemicube's frame, `[direction]`, as radiosity πL.
 pub struct Sent {
@@ -14,14 +14,14 @@ pub struct Sent {
     pub kept: Vec<DVec3>,
 }
 
-/// What `source` sends of its unshot emitted and reflected radiosity, W·m⁻². `moments` are those of
-/// its members, `[member][slot][colour]`; `before` is [`Sent::kept`] of its last turn,
+/// What `source` sends of its unshot emitted and reflected radiosity, W·m⁻². `coefficients` are those of
+/// its members, `[member][rank]`; `before` is [`Sent::kept`] of its last turn,
 /// `[direction]`.
 pub fn send_relief(
     elements: &Elements,
     relief: &Relief,
     source: &Source,
-    moments: &[[Vec3; 3]],
+    coefficients: &[Vec3],
     before: &[DVec3],
     emitted: DVec3,
     reflected: DVec3,
@@ -29,21 +29,16 @@ pub fn send_relief(
     let directions = &relief.directions;
     let k = directions.count();
     let members = source.members();
-    // Respond: Σ_k R_jk m_k of each member.
+    // Respond: Σ_r R_jr c_r of each member.
     let responded: Vec<Vec<DVec3>> = members
         .clone()
-        .zip(moments.chunks_exact(k))
-        .map(|(e, moments)| {
+        .zip(coefficients.chunks_exact(RANK))
+        .map(|(e, coefficients)| {
             let response = relief.response(e);
             (0..k)
                 .map(|out| {
-                    let sum: DVec3 = (0..k)
-                        .map(|slot| {
-                            let block = response.matrix[slot * k + out];
-                            let m = moments[slot];
-                            let colour = |c: usize| block[c].as_dvec3().dot(m[c].as_dvec3());
-                            DVec3::new(colour(0), colour(1), colour(2))
-                        })
+                    let sum: DVec3 = (coefficients.iter().enumerate())
+                        .map(|(r, c)| c.as_dvec3() * response.matrix[r * k + out].as_dvec3())
                         .sum();
                     sum * relief.scale[e].as_dvec3()
                 })

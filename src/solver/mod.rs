@@ -212,11 +212,6 @@ impl Solver {
         report.unshot_share = self.bound.share(unshot);
         report.error_bound = self.bound.of(missing);
         report.seconds.solve_wall += start.elapsed().as_secs_f64();
-        if let Some(relief) = &on.relief {
-            let sources = relief.source_count as usize;
-            let dark: Vec<u32> = download(&self.device, &relief.dark_slots, sources)?;
-            report.skipped.dark_slots = dark.iter().map(|&d| u64::from(d)).sum();
-        }
         Ok(())
     }
 

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
 use crate::error::Result;
 use crate::mesh::elements::Elements;
-use crate::meso::Relief;
+use crate::meso::{RANK, Relief};
 use crate::passes::buffers::download;
 use crate::passes::relief_buffers::ReliefBuffers;
 use crate::vk::Device;
@@ -21,6 +21,9 @@ pub struct ReliefLight {
     pub moments: Vec<[Vec3; 3]>,
     /// Of this what comes straight from emitters and point lights.
     pub moments_direct: Vec<[Vec3; 3]>,
+    /// Of the functions by which each element responds, Σ E u_r(ω), `[meso element][rank]`, RGB,
+    /// W·m⁻²: see [`crate::meso::Basis`].
+    pub coefficients: Vec<Vec3>,
     /// What is sent into a slot's directions as radiosity πL, emission included, `[meso
     /// element][slot]`, RGB, W·m⁻².
     pub exitant: Vec<Vec3>,
@@ -40,23 +43,30 @@ impl ReliefLight {
         for (sum, direct) in moments.iter_mut().zip(&direct) {
             (0..3).for_each(|c| sum[c] += direct[c]);
         }
+        let held = RANK * buffers.element_count as usize;
+        let coefficients: Vec<Vec4> = download(device, &buffers.coefficients, held)?;
+        let coefficients: Vec<Vec3> = coefficients.into_iter().map(Vec4::truncate).collect();
         let outgoing: Vec<Vec3> = if buffers.by_pixel {
             download(device, &buffers.outgoing, count)?
         } else {
             Vec::new()
         };
         let first = buffers.first_element;
-        let exitant = moments
-            .par_chunks(k)
+        let exitant = coefficients
+            .par_chunks(RANK)
             .enumerate()
-            .flat_map_iter(|(m, moments)| {
+            .flat_map_iter(|(m, coefficients)| {
                 let e = first as usize + m;
                 let response = relief.response(e);
                 let scale = relief.scale[e];
                 let emitted = elements.emitted[e] / response.mean_emission;
                 let sent = match outgoing.get(m * k..(m + 1) * k) {
                     Some(sent) => sent.to_vec(),
-                    None => response.send(moments).iter().map(|s| *s * scale).collect(),
+                    None => response
+                        .send(coefficients)
+                        .iter()
+                        .map(|s| *s * scale)
+                        .collect(),
                 };
                 sent.into_iter()
                     .zip(&response.emission)
@@ -68,6 +78,7 @@ impl ReliefLight {
             elements: (first..first + buffers.element_count).collect(),
             moments,
             moments_direct: direct,
+            coefficients,
             exitant,
         })
     }

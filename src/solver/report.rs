@@ -60,8 +60,6 @@ pub struct Skipped {
     pub triangles_culled: u64,
     /// Pairs of shot and element that faced away from one another.
     pub receivers_facing_away: u64,
-    /// Directions without light that were left out when their element was to send.
-    pub dark_slots: u64,
 }
 
 /// Pairs of source and element whose form factor the device has found, by how.

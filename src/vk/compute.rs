@@ -24,6 +24,19 @@ impl ComputePipeline {
         Self::create(device, name, shader, &[], false)
     }
 
+    /// With these specialisation constants.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn with_constants(
+        device: &Arc<Device>,
+        name: &str,
+        shader: &ComputeShader<'_>,
+        constants: &[u32],
+    ) -> Result<Self> {
+        Self::create(device, name, shader, constants, false)
+    }
+
     /// A pipeline whose workgroup (its size must be a multiple of the subgroup size) consists of
     /// full subgroups of the device's own size.
     ///
