@@ -167,15 +167,21 @@ impl<'a> Scattering<'a> {
             areas[(s.cell as usize, column)] += s.area;
             whole[s.cell as usize] += f64::from(s.area);
         }
-        let scales = || (FineCell::all().zip(&whole)).map(|(cell, whole)| cell.direction.z / whole);
-        for (mut row, scale) in areas.row_iter_mut().zip(scales()) {
-            row *= scale as f32;
+        let scales: Vec<f32> = (FineCell::all().zip(&whole))
+            .map(|(cell, whole)| (cell.direction.z / whole) as f32)
+            .collect();
+        for column in areas.as_mut_slice().chunks_exact_mut(CELLS) {
+            column
+                .iter_mut()
+                .zip(&scales)
+                .for_each(|(area, scale)| *area *= scale);
         }
-        let of_tile: Vec<f32> = (of_tile.iter().zip(scales()))
-            .map(|(of_tile, scale)| (of_tile * scale) as f32)
+        let of_tile: Vec<f32> = (of_tile.iter().zip(&scales))
+            .map(|(&of_tile, scale)| of_tile as f32 * scale)
             .collect();
         let of_tile = DMatrix::from_row_slice(1, CELLS, &of_tile);
-        let through = |fits: &DMatrix<f32>| (areas.tr_mul(fits), &of_tile * fits);
+        let areas = areas.transpose();
+        let through = |fits: &DMatrix<f32>| (&areas * fits, &of_tile * fits);
 
         // Of these facets: what they receive from each fine cell, and their light by the basis.
         let transfer = DMatrixView::from_slice(&self.facets.transfer, CELLS, self.glowing.len());
@@ -183,18 +189,20 @@ impl<'a> Scattering<'a> {
         let bounced = self.bounced.select_columns(&facets);
 
         let (seen, _) = through(&self.coarse_fits);
-        let mut straight_seen = seen.clone();
-        for (mut row, &q) in straight_seen.row_iter_mut().zip(&facets) {
-            row *= self.reflectance[q].element_sum() / 3.0;
+        let mut reflected = seen.clone();
+        for mut column in reflected.column_iter_mut() {
+            for (share, &q) in column.iter_mut().zip(&facets) {
+                *share *= self.reflectance[q].element_sum() / 3.0;
+            }
         }
-        let mut sent = (&transfer * straight_seen).transpose();
+        let mut sent = (&transfer * reflected).transpose();
         for (mut column, cell) in sent.column_iter_mut().zip(FineCell::all()) {
             column /= cell.direction.z as f32;
         }
         let grey = DMatrix::from_fn(RANK, facets.len(), |r, i| {
             (0..3).map(|c| bounced[(3 * r + c, i)]).sum::<f32>() / 3.0
         });
-        sent += (grey * &seen).tr_mul(&self.basis.matrix());
+        sent += (grey * &seen).transpose() * self.basis.matrix();
         let basis = Basis::of(sent.cast());
 
         let reflectance: Vec<Vec3> = facets.iter().map(|&q| self.reflectance[q]).collect();
@@ -305,17 +313,18 @@ fn seen(facets: &Facets, fits: &DMatrix<f32>) -> DMatrix<f32> {
         .step_by(PART)
         .map(|first| {
             let count = PART.min(facets.area.len() - first);
-            transfer.columns(first, count).tr_mul(fits)
+            transfer.columns(first, count).transpose() * fits
         })
         .collect();
     for (part, of) in parts.iter().enumerate() {
         seen.rows_mut(part * PART, of.nrows()).copy_from(of);
     }
-    for (mut facet, &area) in seen.row_iter_mut().zip(&facets.area) {
-        facet *= area as f32;
-    }
     for mut out in seen.column_iter_mut() {
-        let whole: f64 = out.iter().map(|&s| f64::from(s)).sum();
+        let mut whole = 0.0;
+        for (share, &area) in out.iter_mut().zip(&facets.area) {
+            *share *= area as f32;
+            whole += f64::from(*share);
+        }
         out /= whole as f32;
     }
     seen
@@ -331,8 +340,9 @@ fn sent_from_cells(facets: &Facets, seen: &DMatrix<f32>, reflectance: &[f32]) ->
         .map(|first| {
             let count = PART.min(reflectance.len() - first);
             let mut seen = seen.rows(first, count).into_owned();
-            for (mut row, &r) in seen.row_iter_mut().zip(&reflectance[first..]) {
-                row *= r;
+            for mut column in seen.column_iter_mut() {
+                let shares = column.iter_mut().zip(&reflectance[first..]);
+                shares.for_each(|(share, reflectance)| *share *= reflectance);
             }
             transfer.columns(first, count) * seen
         })
@@ -353,13 +363,16 @@ fn straight(transfer: &[f32], basis: &Basis, reflectance: &[Vec3]) -> DMatrix<f3
     let heights: f64 = FineCell::all().map(|cell| cell.direction.z).sum();
     let basis = basis.matrix() / heights as f32;
     let mut lit = DMatrix::zeros(COLOURS, reflectance.len());
-    (lit.as_mut_slice().par_chunks_mut(COLOURS))
-        .zip(transfer.par_chunks(CELLS))
-        .zip(reflectance)
+    (lit.as_mut_slice().par_chunks_mut(COLOURS * PART))
+        .zip(transfer.par_chunks(CELLS * PART))
+        .zip(reflectance.par_chunks(PART))
         .for_each(|((lit, transfer), reflectance)| {
-            let received = &basis * DMatrixView::from_slice(transfer, CELLS, 1);
-            for (lit, &of) in lit.chunks_exact_mut(3).zip(received.iter()) {
-                lit.copy_from_slice(&(*reflectance * of).to_array());
+            let received = &basis * DMatrixView::from_slice(transfer, CELLS, reflectance.len());
+            let facets = lit.chunks_exact_mut(COLOURS).zip(received.column_iter());
+            for ((lit, received), reflectance) in facets.zip(reflectance) {
+                for (lit, &of) in lit.chunks_exact_mut(3).zip(received.iter()) {
+                    lit.copy_from_slice(&(*reflectance * of).to_array());
+                }
             }
         });
     lit
@@ -371,7 +384,7 @@ fn turned(columns: &DMatrix<f32>, product: &DMatrix<f32>) -> DMatrix<f32> {
     let mut turned = DMatrix::zeros(COLOURS, columns.ncols());
     for c in 0..3 {
         let of_colour = columns.rows_with_step(c, RANK, 2);
-        let product = product.tr_mul(&of_colour);
+        let product = product.transpose() * of_colour;
         turned.rows_with_step_mut(c, RANK, 2).copy_from(&product);
     }
     turned
