@@ -31,7 +31,7 @@ layout(scalar, binding = 10) buffer Coefficients { vec4 coefficients[]; };
 layout(push_constant, scalar) uniform Parameters {
     uint first_element;
     uint element_count;
-    uvec2 cells;              // of the directions' square
+    uvec2 kept_cells;         // of the square of the slots
 };
 
 #include "shared/receive_relief.glsl"

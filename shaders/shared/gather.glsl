@@ -69,6 +69,7 @@ layout(push_constant, scalar) uniform Parameters {
     uint first_relief_source;
     uint relief_source_count;
     uvec2 cells;              // of the directions' square
+    uvec2 kept_cells;         // of the square of the slots that elements with a relief keep
 };
 
 #include "shared/accumulate.glsl"

@@ -54,6 +54,7 @@ layout(push_constant, scalar) uniform Parameters {
     uint first_relief_source;
     uint relief_source_count;
     uvec2 cells;
+    uvec2 kept_cells;         // of the slots
     uint by_pixel;            // 1: reflect by the normal and albedo of each pixel
     uint first_row;           // of the hemicube, of those that this dispatch looks at
     uint end_row;
@@ -215,7 +216,7 @@ void main() {
                     // The moment whose height is the irradiance.
                     vec3 moment = vec3(from.xy / max(from.z, LEAST_HEIGHT), 1.0);
                     vec2 square = to_square(from);
-                    uint at_moment = 3 * (m * directions + cell_of(square, cells));
+                    uint at_moment = 3 * (m * kept_cells.x * kept_cells.y + cell_of(square, kept_cells));
                     for (uint colour = 0; colour < 3; colour++) {
                         moments_direct[at_moment + colour] += emitted[colour] * moment;
                         moments_indirect[at_moment + colour] += reflected[colour] * moment;

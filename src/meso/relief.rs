@@ -120,6 +120,15 @@ impl Relief {
         }
     }
 
+    /// Slots in which elements keep what arrives, for drawing: the directions, or 64 of more. Light
+    /// is moved by its own direction whatever they are.
+    pub fn kept(&self) -> Directions {
+        match self.directions.count() {
+            0..=64 => self.directions,
+            _ => Options::default().directions,
+        }
+    }
+
     pub fn response(&self, element: usize) -> &Response {
         &self.responses[self.class[element] as usize]
     }

@@ -148,9 +148,11 @@ impl Gather {
             ];
             Ok(OfChunk { plain, meso })
         };
-        let none = (0, 0, [0; 2]);
-        let (first_relief_source, relief_source_count, cells) =
-            relief.map_or(none, |r| (r.first_source, r.source_count, r.cells()));
+        let none = (0, 0, [[0; 2]; 2]);
+        let (first_relief_source, relief_source_count, [cells, kept_cells]) = relief
+            .map_or(none, |r| {
+                (r.first_source, r.source_count, [r.cells(), r.kept_cells()])
+            });
         let shape = kept.shape;
         Ok(Self {
             shape,
@@ -165,6 +167,7 @@ impl Gather {
                 first_relief_source,
                 relief_source_count,
                 cells,
+                kept_cells,
             },
             chunks: kept.chunks.iter().map(bind).collect::<Result<_>>()?,
         })

@@ -67,7 +67,7 @@ impl NearToRelief {
             parameters: Parameters {
                 first_element: relief.first_element,
                 element_count: relief.element_count,
-                cells: relief.cells(),
+                kept_cells: relief.kept_cells(),
             },
         }))
     }

@@ -108,6 +108,7 @@ impl PixelsRelief {
                         first_relief_source: relief.first_source,
                         relief_source_count: relief.source_count,
                         cells: relief.cells(),
+                        kept_cells: relief.kept_cells(),
                         by_pixel: u32::from(relief.by_pixel),
                         first_row,
                         end_row: (first_row + band).min(rows),

@@ -29,7 +29,9 @@ pub fn meso_elements(elements: &Elements, relief: &Relief) -> Vec<MesoElement> {
 /// Elements and sources with a relief are the last of their kinds, point lights aside: each is a
 /// contiguous range.
 pub struct ReliefBuffers {
+    /// That sources send in, and slots in which elements keep what arrives.
     pub directions: Directions,
+    pub kept: Directions,
     pub first_element: u32,
     pub element_count: u32,
     pub first_source: u32,
@@ -91,8 +93,10 @@ impl ReliefBuffers {
         let k = relief.directions.count() as u64;
         let first_element = elements.len() - relief.count();
         let meso = first_element..elements.len();
-        let moment_bytes = 36 * k * meso.len() as u64;
-        check_room(device, meso.len(), k, moment_bytes)?;
+        let kept = relief.kept();
+        let slots_kept = kept.count() as u64;
+        let moment_bytes = 36 * slots_kept * meso.len() as u64;
+        check_room(device, meso.len(), slots_kept, moment_bytes)?;
         let of_relief = sources.relief.clone();
         let members = sources.list[of_relief.clone()].iter();
         let most_members = members.map(|s| s.element_count).max().unwrap_or(1);
@@ -117,6 +121,7 @@ impl ReliefBuffers {
         let reflected_bytes = (size_of::<Reflected>() * meso.len()) as u64;
         Ok(Self {
             directions: relief.directions,
+            kept,
             first_element: first_element as u32,
             element_count: meso.len() as u32,
             first_source: of_relief.start as u32,
@@ -171,6 +176,11 @@ impl ReliefBuffers {
     /// Columns and rows of the directions' square.
     pub fn cells(&self) -> [u32; 2] {
         [self.directions.columns, self.directions.rows]
+    }
+
+    /// Of the square of the slots that elements keep.
+    pub fn kept_cells(&self) -> [u32; 2] {
+        [self.kept.columns, self.kept.rows]
     }
 }
 

@@ -23,7 +23,7 @@ pub fn receive(relief: &Relief, element: usize, parts: &[NearPart], beyond: &[Ve
     let response = relief.response(element);
     let mut received = Received {
         irradiance: DVec3::ZERO,
-        moments: vec![[DVec3::ZERO; 3]; relief.directions.count()],
+        moments: vec![[DVec3::ZERO; 3]; relief.kept().count()],
         coefficients: [DVec3::ZERO; RANK],
         reflected: DVec3::ZERO,
     };
@@ -32,7 +32,7 @@ pub fn receive(relief: &Relief, element: usize, parts: &[NearPart], beyond: &[Ve
         let factor = part.factor.as_dvec3();
         received.irradiance += factor.z * light;
         for point in points(factor) {
-            let slot = relief.directions.slot_of(point.normalize());
+            let slot = relief.kept().slot_of(point.normalize());
             for c in 0..3 {
                 received.moments[slot][c] += light[c] * point;
             }

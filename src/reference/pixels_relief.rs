@@ -46,10 +46,11 @@ impl Received {
     /// Nothing yet.
     pub fn new(elements: &Elements, relief: &Relief) -> Self {
         let slots = relief.count() * relief.directions.count();
+        let kept = relief.count() * relief.kept().count();
         Self {
             direct: vec![DVec3::ZERO; elements.len()],
             indirect: vec![DVec3::ZERO; elements.len()],
-            moments: vec![[DVec3::ZERO; 3]; slots],
+            moments: vec![[DVec3::ZERO; 3]; kept],
             reflected: vec![DVec3::ZERO; relief.count()],
             outgoing: vec![DVec3::ZERO; slots],
         }
@@ -116,10 +117,11 @@ impl Received {
             elements.normal[e],
         ];
         let from = -DVec3::from_array(frame.map(|axis| axis.dot(ray)));
-        let slot = relief.directions.slot_of(from);
+        let slots = relief.kept();
+        let slot = slots.slot_of(from);
         let moment = (from / from.z.max(LEAST_HEIGHT)).with_z(1.0);
         for c in 0..3 {
-            self.moments[m * k + slot][c] += moment * brought[c];
+            self.moments[m * slots.count() + slot][c] += moment * brought[c];
         }
         let Some(texels) = &relief.texels else {
             let response = relief.response(e);

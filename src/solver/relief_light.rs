@@ -12,8 +12,8 @@ use crate::passes::buffers::download;
 use crate::passes::relief_buffers::ReliefBuffers;
 use crate::vk::Device;
 
-/// Light of the elements with a relief, in internal order; `slot` is an index of
-/// [`crate::math::directions::Directions`] in the element's tangent frame.
+/// Light of the elements with a relief, in internal order, in their tangent frames; `slot` is an
+/// index of [`Relief::kept`], `direction` of [`Relief::directions`].
 pub struct ReliefLight {
     /// The elements, `[meso element]`.
     pub elements: Vec<u32>,
@@ -24,12 +24,18 @@ pub struct ReliefLight {
     /// Of the functions by which each element responds, Σ E u_r(ω), `[meso element][rank]`, RGB,
     /// W·m⁻²: see [`crate::meso::Basis`].
     pub coefficients: Vec<Vec3>,
-    /// What is sent into a slot's directions as radiosity πL, emission included, `[meso
-    /// element][slot]`, RGB, W·m⁻².
+    /// What is sent as radiosity πL, bilinear between the directions, emission included, `[meso
+    /// element][direction]`, RGB, W·m⁻².
     pub exitant: Vec<Vec3>,
 }
 
 impl ReliefLight {
+    /// What meso element m sends, `[direction]`.
+    pub fn sent(&self, relief: &Relief, m: usize) -> &[Vec3] {
+        let k = relief.directions.count();
+        &self.exitant[m * k..(m + 1) * k]
+    }
+
     pub(super) fn download(
         device: &Arc<Device>,
         elements: &Elements,
@@ -37,7 +43,7 @@ impl ReliefLight {
         buffers: &ReliefBuffers,
     ) -> Result<Self> {
         let k = relief.directions.count();
-        let count = k * buffers.element_count as usize;
+        let count = relief.kept().count() * buffers.element_count as usize;
         let direct: Vec<[Vec3; 3]> = download(device, &buffers.moments_direct, count)?;
         let mut moments: Vec<[Vec3; 3]> = download(device, &buffers.moments_indirect, count)?;
         for (sum, direct) in moments.iter_mut().zip(&direct) {
@@ -47,7 +53,11 @@ impl ReliefLight {
         let coefficients: Vec<Vec4> = download(device, &buffers.coefficients, held)?;
         let coefficients: Vec<Vec3> = coefficients.into_iter().map(Vec4::truncate).collect();
         let outgoing: Vec<Vec3> = if buffers.by_pixel {
-            download(device, &buffers.outgoing, count)?
+            download(
+                device,
+                &buffers.outgoing,
+                k * buffers.element_count as usize,
+            )?
         } else {
             Vec::new()
         };

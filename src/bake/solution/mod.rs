@@ -7,6 +7,7 @@ mod write;
 use glam::{DVec3, Vec3};
 
 use crate::bake::discretisation::discretisation;
+use crate::math::directions::Directions;
 use crate::mesh::corners::{Joined, corner_irradiance};
 use crate::mesh::elements::Elements;
 use crate::meso::Relief;
@@ -71,14 +72,15 @@ pub struct DirectionalLight {
 
 impl DirectionalLight {
     fn new(elements: &Elements, relief: &Relief, light: &ReliefLight) -> Self {
-        let k = relief.directions.count();
+        let kept = relief.kept();
+        let k = kept.count();
         let mut order: Vec<usize> = (0..light.elements.len()).collect();
         let input = |m: usize| elements.input_index[light.elements[m] as usize];
         order.sort_by_key(|&m| input(m));
         let slots = |m: usize| m * k..(m + 1) * k;
         Self {
             elements: order.iter().map(|&m| input(m)).collect(),
-            directions: (0..k).map(|slot| relief.directions.centre(slot)).collect(),
+            directions: (0..k).map(|slot| kept.centre(slot)).collect(),
             frames: order
                 .iter()
                 .map(|&m| light.elements[m] as usize)
@@ -100,10 +102,22 @@ impl DirectionalLight {
                 .collect(),
             exitant: order
                 .iter()
-                .flat_map(|&m| light.exitant[slots(m)].to_vec())
+                .flat_map(|&m| in_slots(relief, &kept, light.sent(relief, m)))
                 .collect(),
         }
     }
+}
+
+/// What is sent by direction, `[direction]`, in the slots that are kept.
+fn in_slots(relief: &Relief, kept: &Directions, sent: &[Vec3]) -> Vec<Vec3> {
+    if *kept == relief.directions {
+        return sent.to_vec();
+    }
+    let look = |slot: usize| {
+        let four = relief.directions.bilinear(kept.centre(slot)).into_iter();
+        four.map(|(k, weight)| sent[k] * weight as f32).sum()
+    };
+    (0..kept.count()).map(look).collect()
 }
 
 impl Solution {
