@@ -113,7 +113,7 @@ pub struct SolveOptions {
     /// Turns the hemicubes about their axes: another seed, other aliasing
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Directions of the light on relief: 16, 32 or 64
+    /// Directions in which relief sends light: 16, 32, 64, 128 or 256
     #[arg(long, value_name = "K", default_value_t = 64)]
     directions: u32,
     /// How relief takes part: keeping energy, by the paper's equations, or not at all
