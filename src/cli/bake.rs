@@ -28,8 +28,9 @@ use mesolux::vk::Device;
 /// (colour, vector), exitant [M,K,3]. Ctrl-C stops the solver and keeps what it has.
 #[derive(Args)]
 pub struct Options {
-    /// A built-in name (cornell, cornell-relief, bowl-and-bunny, fruit-platter, brick-court), an .obj,
-    /// .gltf or .glb file, or a scene.toml
+    /// A built-in name (cornell, cornell-box, cornell-relief, bowl-and-bunny, fruit-platter,
+    /// brick-court, brick-wall, woven-cloth, embossed-plate), an .obj, .gltf or .glb
+    /// file, or a scene.toml
     scene: String,
     /// The file to write
     #[arg(short, long, value_name = "OUT.safetensors")]

@@ -34,9 +34,10 @@ use tracing_subscriber::prelude::*;
 /// Bake and draw global illumination with Vulkan: progressive radiosity through hemicube item
 /// buffers.
 ///
-/// SCENE is a built-in name (cornell, cornell-relief, bowl-and-bunny, fruit-platter, brick-court), an
-/// .obj, .gltf or .glb file, or a scene.toml. Results go to files and stdout, everything else to stderr. Exit
-/// code 2 means that an input was wrong; nothing is written then.
+/// SCENE is a built-in name (cornell, cornell-box, cornell-relief, bowl-and-bunny, fruit-platter,
+/// brick-court, brick-wall, woven-cloth, embossed-plate), an .obj, .gltf or .glb file,
+/// or a scene.toml. Results go to files and stdout, everything else to stderr. Exit code 2 means that
+/// an input was wrong; nothing is written then.
 #[derive(Parser)]
 #[command(version, about)]
 struct Cli {
@@ -139,6 +140,14 @@ impl Builtin {
         self.load_for(Quality::default(), name)
     }
 
+    /// The same, cut only where options ask for it.
+    fn load_as_made(&self, name: &str) -> Result<Scene> {
+        match self.element_size.is_none() && self.fineness.is_none() {
+            true => self.read(name),
+            false => self.load(name),
+        }
+    }
+
     /// The same, cut as finely as a bake of that quality wants it.
     fn load_for(&self, quality: Quality, name: &str) -> Result<Scene> {
         let scene = self.read(name)?;
@@ -183,7 +192,8 @@ impl Builtin {
     }
 
     fn refined(&self, name: &str, scene: Scene, quality: Quality) -> Scene {
-        let named = mesolux::scene::builtin::NAMES.contains(&name);
+        use mesolux::scene::builtin::{COARSE, NAMES};
+        let named = NAMES.contains(&name) && !COARSE.contains(&name);
         let fineness = self.fineness.unwrap_or(quality.fineness());
         if self.no_refine || named && self.element_size.is_none() && fineness <= 1.0 {
             return scene;

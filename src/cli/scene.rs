@@ -7,10 +7,12 @@ use clap::Args;
 use super::Builtin;
 use mesolux::error::{Error, Result};
 
-/// Write a built-in scene as OBJ, MTL and scene.toml
+/// Write a built-in scene as OBJ, MTL and scene.toml, cut only where --element-size or --fineness
+/// asks for it
 #[derive(Args)]
 pub struct Options {
-    /// A built-in name: cornell, fruit-platter, bowl-and-bunny, cornell-relief or brick-court
+    /// A built-in name: cornell, fruit-platter, bowl-and-bunny, cornell-relief, brick-court,
+    /// cornell-box, brick-wall, woven-cloth or embossed-plate
     name: String,
     /// The folder to write to
     #[arg(short, long, value_name = "DIR")]
@@ -28,7 +30,7 @@ pub fn run(options: &Options) -> Result<()> {
             names.join(", ")
         )));
     }
-    let scene = options.builtin.load(&options.name)?;
+    let scene = options.builtin.load_as_made(&options.name)?;
     let path = mesolux::scene::write_scene(&scene, &options.output)?;
     tracing::info!("{}: {} elements", path.display(), scene.triangles.len());
     Ok(())

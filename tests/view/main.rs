@@ -5,6 +5,7 @@
 mod harness;
 mod screens;
 
+use std::path::Path;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
@@ -428,4 +429,23 @@ fn closes_during_a_bake() {
         );
     }
     assert!(begin.elapsed() < Duration::from_secs(60));
+}
+
+/// The scripts beside the scenes in `assets/` run to their end.
+#[test]
+fn shows_the_assets() {
+    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets");
+    for (name, script) in [
+        ("woven-cloth", "show.txt"),
+        ("embossed-plate", "embossed-plate/lamp.txt"),
+    ] {
+        let folder = tempfile::tempdir().expect("a folder for the test");
+        let script = std::fs::read_to_string(assets.join(script)).expect("the script is there");
+        let scene = assets.join(name).join("scene.toml");
+        let script = script.replace("close\n", "screenshot last.png\nclose\n");
+        view(folder.path(), scene.to_str().expect("a text"), &script);
+        let last = image::open(folder.path().join("last.png")).expect("it was written");
+        let [r, g, b] = mean(&last.to_rgb8());
+        assert!((r + g + b) / 3.0 > 20.0, "{name}: {r} {g} {b}");
+    }
 }

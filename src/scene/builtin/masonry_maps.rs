@@ -43,9 +43,9 @@ pub(super) const STONE: DVec2 = DVec2::new(1.2, 1.2);
 /// Metres that a tile of plaster is wide and high.
 pub(super) const PLASTERING: DVec2 = DVec2::new(2.4, 2.4);
 
-/// Old brickwork in running bond, its joints set back by some 9 mm.
-pub(super) fn brickwork() -> Result<Maps> {
-    make("brickwork", [1024, 512], |at| {
+/// Old brickwork in running bond, its joints set back by some 9 mm, in so many texels.
+pub(super) fn brickwork(size: [u32; 2]) -> Result<Maps> {
+    make("brickwork", size, |at| {
         let [x, y] = at;
         // Courses are not quite straight.
         let wave = 0.0015 * smooth(at, [6, 5], 11);

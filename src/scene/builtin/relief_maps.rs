@@ -54,6 +54,51 @@ pub fn brick(size: u32) -> HeightMap {
     })
 }
 
+/// A plain weave, 6 threads each way: each goes over one and under the next.
+pub fn weave(size: u32) -> HeightMap {
+    make("weave", size, |u, v| {
+        let thread = |along: f64, across: f64| {
+            let at = 6.0 * across;
+            let off = at.rem_euclid(1.0) - 0.5;
+            let round = (1.0 - (off / 0.44).powi(2)).max(0.0).sqrt();
+            let over = if at.floor().rem_euclid(2.0) == 0.0 {
+                1.0
+            } else {
+                -1.0
+            };
+            // Over at the middle of every second thread that it meets.
+            (0.45 + 0.3 * over * (PI * 6.0 * along).sin()) * round.min(1.0) + 0.25 * round
+        };
+        thread(u, v).max(thread(v + 1.0 / 6.0, u))
+    })
+}
+
+/// A star of eight rays in two rings, raised from a flat ground.
+pub fn star(size: u32) -> HeightMap {
+    make("star", size, |u, v| {
+        let (x, y) = (2.0 * u - 1.0, 2.0 * v - 1.0);
+        let (r, angle) = (x.hypot(y), y.atan2(x));
+        let step = |t: f64| {
+            let t = t.clamp(0.0, 1.0);
+            t * t * (3.0 - 2.0 * t)
+        };
+        // A ridge at some distance from its middle, its foot as smooth as its crest.
+        let bead = |off: f64, half: f64| (1.0 - (off / (1.3 * half)).powi(2)).max(0.0).powi(2);
+        let rings = bead(r - 0.86, 0.055).max(0.7 * bead(r - 0.70, 0.04));
+        // Each ray falls off to its edges, from a crest in its middle.
+        let turn = (angle * 8.0 / TAU).rem_euclid(1.0) - 0.5;
+        let reach = 0.60 - 0.24 * (2.0 * turn.abs()).sqrt();
+        let ray = step((reach - r) / 0.10) * (1.0 - 1.2 * turn.abs());
+        let boss = 1.1 * bead(r, 0.17);
+        let dots = (0..16).map(|i| {
+            let at = TAU * (f64::from(i) + 0.5) / 16.0;
+            0.6 * bead((x - 0.78 * at.cos()).hypot(y - 0.78 * at.sin()), 0.03)
+        });
+        let border = step((x.abs().max(y.abs()) - 0.94) / 0.03);
+        dots.fold(rings.max(ray).max(boss).max(border), f64::max)
+    })
+}
+
 /// The height map of a function on the tile, stretched to 0..=1 in steps of 1/65535, so that a
 /// 16-bit PNG holds it.
 fn make(name: &str, size: u32, height: impl Fn(f64, f64) -> f64) -> HeightMap {

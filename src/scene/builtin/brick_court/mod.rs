@@ -101,7 +101,7 @@ fn materials() -> Result<Vec<Material>> {
     };
     let stone = Arc::new(masonry_maps::stone()?);
     Ok(vec![
-        pictured("brick", masonry_maps::brickwork()?),
+        pictured("brick", masonry_maps::brickwork([1024, 512])?),
         pictured("paving", masonry_maps::paving()?),
         Material {
             map_kd: Some(stone),
