@@ -142,7 +142,8 @@ fn spherical_dimples() {
                     100.0 * worst,
                     100.0 * spread
                 );
-                assert!(worst <= 0.01 && spread <= 0.005);
+                // Measured: 0.28 and 0.19 %.
+                assert!(worst <= 0.006 && spread <= 0.004);
             }
         }
     }

@@ -258,7 +258,9 @@ mod tests {
     /// A facet tilted 45° under a uniform sky of radiance 1: E = π (1 + cos τ)/2, in every azimuth.
     #[test]
     fn tilted_facet_under_a_uniform_sky() {
-        for (k, most) in [(16, 0.035), (32, 0.02), (64, 0.01)] {
+        // Measured: 0.03, 0.03, 0.04 %.
+        const MOST: f64 = 8e-4;
+        for k in [16, 32, 64] {
             let d = Directions::new(k).expect("a number of the paper");
             // A sum over 512² cells, independent of the one inside.
             let (mut moments, size) = (vec![DVec3::ZERO; d.count()], 512);
@@ -279,7 +281,7 @@ mod tests {
                 "K = {k}: tilted facet, largest error {:.2} %",
                 100.0 * largest
             );
-            assert!(largest <= most, "K = {k}: {largest}");
+            assert!(largest <= MOST, "K = {k}: {largest}");
         }
     }
 }

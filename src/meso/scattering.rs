@@ -47,6 +47,11 @@ pub struct Scattering<'a> {
     facets: Facets,
     /// Of the tile.
     basis: Basis,
+    /// Over the mean of each colour, `[facet]`: how colours differ from place to place, not which is
+    /// the strongest, matters to a basis.
+    relative: Vec<Vec3>,
+    /// One over that mean.
+    over_mean: Vec3,
     /// Radiosity of the facets for each coefficient, straight and after bounces inside the relief:
     /// one column `[rank][colour]` for each facet.
     straight: DMatrix<f32>,
@@ -85,8 +90,10 @@ impl<'a> Scattering<'a> {
         let exchange = Exchange::new(visibility, &facets.sky);
         let coarse_fits = fits(&COARSE);
         let seen = seen(&facets, &coarse_fits);
-        let sent: Vec<f32> = reflectance.iter().map(|r| r.element_sum() / 3.0).collect();
-        let basis = Basis::of(sent_from_cells(&facets, &seen, &sent));
+        let mean = reflectance.iter().sum::<Vec3>() / reflectance.len() as f32;
+        let over_mean = Vec3::select(mean.cmpgt(Vec3::ZERO), mean.recip(), Vec3::ZERO);
+        let relative: Vec<Vec3> = reflectance.iter().map(|&r| r * over_mean).collect();
+        let basis = Basis::of(sent_from_cells(&facets, &seen, &relative));
         let straight = straight(&facets.transfer, &basis, reflectance);
         let mut bounces = straight.clone();
         // `[rank]` of `[facet]`
@@ -114,6 +121,8 @@ impl<'a> Scattering<'a> {
             reflectance,
             facets,
             basis,
+            relative,
+            over_mean,
             straight,
             bounced: bounces,
             glowing,
@@ -147,13 +156,40 @@ impl<'a> Scattering<'a> {
     /// `seen` are the facets that each part of them lists for the footprints, see
     /// [`Self::seen_through`].
     fn of_footprint(&self, seen: &[Vec<Vec<Seen>>], footprint: usize, tile: &Response) -> Response {
+        let Some(view) = self.view(seen, footprint) else {
+            return tile.clone();
+        };
+        // Of the facets that are seen: what they receive from each fine cell, and their light after
+        // bounces.
+        let transfer = DMatrixView::from_slice(&self.facets.transfer, CELLS, self.glowing.len());
+        let transfer = transfer.select_columns(&view.facets);
+        let bounced = self.bounced.select_columns(&view.facets);
+        let basis = self.basis_of(&view, &transfer, &bounced);
+        let reflectance: Vec<Vec3> = view.facets.iter().map(|&q| self.reflectance[q]).collect();
+        let from_tile = self.basis.product(&basis);
+        let lit =
+            straight(transfer.as_slice(), &basis, &reflectance) + turned(&bounced, &from_tile);
+        let (seen, of_tile) = (&view.areas * &self.fits, &view.of_tile * &self.fits);
+        let mut matrix = lit * &seen;
         let k = self.directions.count();
+        let mut whole = DMatrix::zeros(COLOURS, k);
+        for (i, sent) in tile.matrix.iter().enumerate() {
+            (0..3).for_each(|c| whole[(3 * (i / k) + c, i % k)] = sent[c]);
+        }
+        let whole = turned(&whole, &from_tile);
+        let mut emission = self.emission(&seen, view.facets.iter().copied());
+        for (out, &share) in of_tile.iter().enumerate() {
+            emission[out] += tile.emission[out] * share;
+            (0..COLOURS).for_each(|row| matrix[(row, out)] += whole[(row, out)] * share);
+        }
+        Response::new(&self.directions, basis, rows(&matrix), emission)
+    }
+
+    /// What is seen through a footprint; None where nothing is.
+    fn view(&self, seen: &[Vec<Vec<Seen>>], footprint: usize) -> Option<View> {
         let seen = || seen.iter().flat_map(|facets| &facets[footprint]);
         let mut facets: Vec<usize> = seen().map(|s| s.facet as usize).collect();
         facets.dedup();
-        if facets.is_empty() {
-            return tile.clone();
-        }
         // Projected areas, `[fine cell][facet]`, and their sums with the share of the whole tile.
         let mut areas = DMatrix::zeros(CELLS, facets.len());
         let plane = 0.5 * self.field.aspect * self.field.facet_count() as f64;
@@ -171,58 +207,33 @@ impl<'a> Scattering<'a> {
             .map(|(cell, whole)| (cell.direction.z / whole) as f32)
             .collect();
         for column in areas.as_mut_slice().chunks_exact_mut(CELLS) {
-            column
-                .iter_mut()
-                .zip(&scales)
-                .for_each(|(area, scale)| *area *= scale);
+            let areas = column.iter_mut().zip(&scales);
+            areas.for_each(|(area, scale)| *area *= scale);
         }
-        let of_tile: Vec<f32> = (of_tile.iter().zip(&scales))
-            .map(|(&of_tile, scale)| of_tile as f32 * scale)
-            .collect();
-        let of_tile = DMatrix::from_row_slice(1, CELLS, &of_tile);
-        let areas = areas.transpose();
-        let through = |fits: &DMatrix<f32>| (&areas * fits, &of_tile * fits);
+        let shares = of_tile.iter().zip(&scales);
+        let of_tile = shares.map(|(&of_tile, scale)| of_tile as f32 * scale);
+        (!facets.is_empty()).then(|| View {
+            facets,
+            areas: areas.transpose(),
+            of_tile: DMatrix::from_iterator(1, CELLS, of_tile),
+        })
+    }
 
-        // Of these facets: what they receive from each fine cell, and their light by the basis.
-        let transfer = DMatrixView::from_slice(&self.facets.transfer, CELLS, self.glowing.len());
-        let transfer = transfer.select_columns(&facets);
-        let bounced = self.bounced.select_columns(&facets);
-
-        let (seen, _) = through(&self.coarse_fits);
-        let mut reflected = seen.clone();
-        for mut column in reflected.column_iter_mut() {
-            for (share, &q) in column.iter_mut().zip(&facets) {
-                *share *= self.reflectance[q].element_sum() / 3.0;
-            }
-        }
-        let mut sent = (&transfer * reflected).transpose();
+    /// The basis of a footprint. `transfer` is `[fine cell]` and `bounced` `[rank][colour]`, one
+    /// column for each facet that is seen.
+    fn basis_of(&self, view: &View, transfer: &DMatrix<f32>, bounced: &DMatrix<f32>) -> Basis {
+        let seen = &view.areas * &self.coarse_fits;
+        let relative: Vec<Vec3> = view.facets.iter().map(|&q| self.relative[q]).collect();
+        let mut sent = (transfer * reflected(&seen, &relative)).transpose();
         for (mut column, cell) in sent.column_iter_mut().zip(FineCell::all()) {
             column /= cell.direction.z as f32;
         }
-        let grey = DMatrix::from_fn(RANK, facets.len(), |r, i| {
-            (0..3).map(|c| bounced[(3 * r + c, i)]).sum::<f32>() / 3.0
+        let bounced = bounced * seen;
+        let of_slots = DMatrix::from_fn(RANK, COARSE.count(), |r, out| {
+            bounced[(3 * r + out % 3, out)] * self.over_mean[out % 3]
         });
-        sent += (grey * &seen).transpose() * self.basis.matrix();
-        let basis = Basis::of(sent.cast());
-
-        let reflectance: Vec<Vec3> = facets.iter().map(|&q| self.reflectance[q]).collect();
-        let from_tile = self.basis.product(&basis);
-        let lit =
-            straight(transfer.as_slice(), &basis, &reflectance) + turned(&bounced, &from_tile);
-        let (seen, of_tile_seen) = through(&self.fits);
-        let mut matrix = lit * &seen;
-        let mut whole = DMatrix::zeros(COLOURS, k);
-        for (i, sent) in tile.matrix.iter().enumerate() {
-            (0..3).for_each(|c| whole[(3 * (i / k) + c, i % k)] = sent[c]);
-        }
-        let whole = turned(&whole, &from_tile);
-        let mut emission = self.emission(&seen, facets.iter().copied());
-        for out in 0..k {
-            let share = of_tile_seen[(0, out)];
-            emission[out] += tile.emission[out] * share;
-            (0..COLOURS).for_each(|row| matrix[(row, out)] += whole[(row, out)] * share);
-        }
-        Response::new(&self.directions, basis, rows(&matrix), emission)
+        sent += of_slots.transpose() * self.basis.matrix();
+        Basis::of(sent.cast())
     }
 
     /// H of facets with their shares in the view, `[facet][out]`.
@@ -330,21 +341,38 @@ fn seen(facets: &Facets, fits: &DMatrix<f32>) -> DMatrix<f32> {
     seen
 }
 
+/// What is seen through a footprint from the fine cells.
+struct View {
+    /// In order.
+    facets: Vec<usize>,
+    /// Their projected areas, and the share of the whole tile that is mixed in, `[facet][fine cell]`
+    /// and `[fine cell]`: together the z of the cell.
+    areas: DMatrix<f32>,
+    of_tile: DMatrix<f32>,
+}
+
+/// Shares of facets, `[facet][slot]`, times their reflectance: each slot takes one colour, all three
+/// in turn, so that a basis knows them all.
+fn reflected(seen: &DMatrix<f32>, reflectance: &[Vec3]) -> DMatrix<f32> {
+    let mut reflected = seen.clone();
+    for (slot, mut column) in reflected.column_iter_mut().enumerate() {
+        let shares = column.iter_mut().zip(reflectance);
+        shares.for_each(|(share, of)| *share *= of[slot % 3]);
+    }
+    reflected
+}
+
 /// Light that leaves for an irradiance of 1 from each fine cell, without bounces inside the relief,
 /// `[slot][fine cell]`. `seen` is `[facet][slot]` and `reflectance` `[facet]`.
-fn sent_from_cells(facets: &Facets, seen: &DMatrix<f32>, reflectance: &[f32]) -> DMatrix<f64> {
+fn sent_from_cells(facets: &Facets, seen: &DMatrix<f32>, reflectance: &[Vec3]) -> DMatrix<f64> {
     let transfer = DMatrixView::from_slice(&facets.transfer, CELLS, reflectance.len());
     let parts: Vec<DMatrix<f32>> = (0..reflectance.len())
         .into_par_iter()
         .step_by(PART)
         .map(|first| {
             let count = PART.min(reflectance.len() - first);
-            let mut seen = seen.rows(first, count).into_owned();
-            for mut column in seen.column_iter_mut() {
-                let shares = column.iter_mut().zip(&reflectance[first..]);
-                shares.for_each(|(share, reflectance)| *share *= reflectance);
-            }
-            transfer.columns(first, count) * seen
+            let seen = seen.rows(first, count).into_owned();
+            transfer.columns(first, count) * reflected(&seen, &reflectance[first..])
         })
         .collect();
     let mut sent: DMatrix<f64> = DMatrix::zeros(CELLS, seen.ncols());
