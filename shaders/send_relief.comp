@@ -31,8 +31,6 @@ layout(scalar, binding = 9) buffer ShotExits { vec3 shot_exits[]; };
 layout(scalar, binding = 10) coherent buffer MemberExits { vec3 member_exits[]; };
 // [slot][emitted, reflected][direction]
 layout(scalar, binding = 11) writeonly buffer Exits { vec4 exits[]; };
-// With `by_pixel`: what each element sends, [meso element][direction].
-layout(scalar, binding = 12) readonly buffer Outgoing { vec3 outgoing[]; };
 
 layout(push_constant, scalar) uniform Parameters {
     uint first_source;
@@ -40,7 +38,6 @@ layout(push_constant, scalar) uniform Parameters {
     uint first_element;
     uint most_members;
     uvec2 cells;
-    uint by_pixel;            // 1: the pixel estimator has reflected the light already
     uint first_slot;
 };
 
@@ -82,18 +79,13 @@ void main() {
     // Respond: every member's light in its own frame.
     for (uint i = 0; i < s.element_count; i++) {
         uint m = s.first_element + i - first_element;
+        MesoElement meso = meso_elements[m];
         vec3 sent = vec3(0.0);
-        if (by_pixel == 1) {
-            sent = outgoing[m * DIRECTIONS + j];
-        } else {
-            MesoElement meso = meso_elements[m];
-            for (uint r = 0; r < RELIEF_RANK; r++) {
-                uint row = meso.response * RELIEF_RANK + r;
-                sent += fetch(matrices, row * DIRECTIONS + j).xyz * fetch(coefficients, m * RELIEF_RANK + r).xyz;
-            }
-            sent *= meso.scale;
+        for (uint r = 0; r < RELIEF_RANK; r++) {
+            uint row = meso.response * RELIEF_RANK + r;
+            sent += fetch(matrices, row * DIRECTIONS + j).xyz * fetch(coefficients, m * RELIEF_RANK + r).xyz;
         }
-        member_exits[(first_member + i) * DIRECTIONS + j] = sent;
+        member_exits[(first_member + i) * DIRECTIONS + j] = sent * meso.scale;
     }
     memoryBarrierBuffer();
     barrier();

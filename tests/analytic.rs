@@ -4,6 +4,7 @@ mod common;
 
 use common::Build;
 use glam::DVec3;
+use mesolux::bake::quality;
 use mesolux::solver::{Estimator, Settings};
 use std::f32::consts::PI;
 
@@ -219,11 +220,14 @@ fn point_light() {
     let screen = DVec3::new(0.25, -0.5, -0.25);
     build.quad(screen, DVec3::Z * 0.5, DVec3::X * 0.25, (1, 1), black);
     build.point_light(DVec3::ZERO, 3.0);
-    for estimator in [Estimator::Receiver, Estimator::Pixel] {
-        let solved = build.solve(&Settings {
-            estimator,
-            ..Settings::default()
-        });
+    let pixel = Settings {
+        estimator: Estimator::Pixel,
+        ..Settings::default()
+    };
+    let paper = quality::paper(16).expect("a number of the paper");
+    for settings in [Settings::default(), pixel, paper] {
+        let estimator = settings.estimator;
+        let solved = build.solve(&settings);
         let mut worst = 0f64;
         for e in floor.clone().chain(ceiling.clone()) {
             let at = build
@@ -245,10 +249,11 @@ fn point_light() {
             "point light, {estimator:?}: largest error {:.2} %",
             100.0 * worst
         );
-        // Measured: 0.04 and 5.3 %.
+        // Measured: 0.04, 5.3 and, by lamps' hemicubes as coarse as others, 23 %.
         let most = match estimator {
             Estimator::Receiver => 8e-4,
             Estimator::Pixel => 0.1,
+            Estimator::Paper => 0.4,
         };
         assert!(worst <= most, "{worst}");
     }

@@ -527,3 +527,65 @@ fn draws_parts_of_the_light_and_compares() {
         assert_eq!(done.status.code(), Some(2), "{wrong:?}");
     }
 }
+
+/// The paper's method bakes by one name, refuses what it leaves no choice of, and is drawn by its
+/// own shading unless asked otherwise.
+#[test]
+fn the_papers_preset() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = |args: &[&str]| mesolux(args, folder.path());
+    let bake = |with: &[&str]| {
+        let scene = ["bake", "embossed-plate", "-o", "a.safetensors"];
+        run(&[&scene, with].concat())
+    };
+    for (with, told) in [
+        (
+            &["--preset", "paper", "--transport", "physical"][..],
+            "cannot be used with",
+        ),
+        (
+            &["--preset", "paper", "--quality", "draft"],
+            "cannot be used with",
+        ),
+        (
+            &["--preset", "paper", "--directions", "128"],
+            "16, 32 or 64",
+        ),
+        (&["--estimator", "pixel"], "--preset paper"),
+    ] {
+        let refused = bake(with);
+        let error = String::from_utf8_lossy(&refused.stderr);
+        assert_eq!(refused.status.code(), Some(2), "{error}");
+        assert!(error.contains(told), "{error}");
+    }
+    let baked = bake(&[
+        "--preset",
+        "paper",
+        "--hemicube",
+        "32",
+        "--shots",
+        "400",
+        "--json",
+    ]);
+    let error = String::from_utf8_lossy(&baked.stderr);
+    assert!(baked.status.success(), "{error}");
+    let report: serde_json::Value = serde_json::from_slice(&baked.stdout).expect("JSON");
+    assert_eq!(report["estimator"], "paper");
+    // None is cut, and none shoots for another.
+    assert_eq!(report["sources"], report["elements"]);
+    let pixels = |with: &[&str]| {
+        let draw = ["render", "a.safetensors", "-o", "a.png", "--size", "48x48"];
+        let drawn = run(&[&draw, with].concat());
+        assert!(
+            drawn.status.success(),
+            "{}",
+            String::from_utf8_lossy(&drawn.stderr)
+        );
+        image::open(folder.path().join("a.png"))
+            .expect("a picture")
+            .into_rgb8()
+    };
+    let own = pixels(&[]);
+    assert_eq!(own, pixels(&["--shading", "clusters", "--direct", "slots"]));
+    assert_ne!(own, pixels(&["--shading", "factored", "--direct", "sharp"]));
+}

@@ -71,7 +71,7 @@ fn finer_faces_sharpen_shadows() {
         // The pixel estimator draws emitters finely unless told otherwise.
         let finer = match estimator {
             Estimator::Receiver => Some(4 * FACE),
-            Estimator::Pixel => None,
+            Estimator::Pixel | Estimator::Paper => None,
         };
         let [plain, fine] = [Some(FACE), finer].map(|emitter_hemicube| {
             let solved = build.solve(&Settings {

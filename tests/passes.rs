@@ -408,7 +408,7 @@ fn estimators_equal_their_twins() {
                         };
                         reference::form_factors::gather(elements, source, e, sees)
                     }
-                    Estimator::Pixel => {
+                    Estimator::Pixel | Estimator::Paper => {
                         reference::bin_pixels::irradiance(source, sums[e], elements.area[e])
                     }
                 })
@@ -453,7 +453,7 @@ fn estimators_equal_their_twins() {
         let most = match estimator {
             Estimator::Receiver => 0,
             // 16 measured.
-            Estimator::Pixel => elements.len() / 20,
+            Estimator::Pixel | Estimator::Paper => elements.len() / 20,
         };
         assert!(exchange <= most, "{exchange} exchange, {most} may");
         let power = |value: &dyn Fn(usize) -> f64| {

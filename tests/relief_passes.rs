@@ -15,9 +15,8 @@ use mesolux::passes::relief_buffers::ReliefBuffers;
 use mesolux::passes::types::Reflected;
 use mesolux::reference;
 use mesolux::reference::near_to_relief::receive;
-use mesolux::reference::pixels_relief::{Light, Received};
 use mesolux::reference::send_relief::send_relief;
-use mesolux::solver::{Estimator, Settings, Solver};
+use mesolux::solver::{Settings, Solver};
 use mesolux::vk::Commands;
 
 const BATCH: u32 = 6;
@@ -61,13 +60,8 @@ fn scene() -> Build {
 }
 
 fn solver(transport: Transport, k: u32, shots: Option<u32>) -> Solver {
-    solver_by(Estimator::Receiver, transport, k, shots)
-}
-
-fn solver_by(estimator: Estimator, transport: Transport, k: u32, shots: Option<u32>) -> Solver {
     let build = scene();
     let settings = Settings {
-        estimator,
         hemicube: FACE,
         // The twins look at one batch after another, all of one size.
         emitter_hemicube: Some(FACE),
@@ -286,8 +280,7 @@ fn near_parts_bring_light_as_their_twin() {
     )
     .expect("it fits");
     let state = State::new(&device, &scene).expect("it fits");
-    let buffers = ReliefBuffers::new(&device, &on.elements, relief, &on.sources, None, false)
-        .expect("it fits");
+    let buffers = ReliefBuffers::new(&device, &on.elements, relief, &on.sources).expect("it fits");
     let pass = NearToRelief::new(&device, &on.near, &state, &buffers).expect("it is made");
     let pass = pass.expect("relief sees near sources");
     let light = |i: u32| Vec3::new((i % 7) as f32 - 2.0, (i % 5) as f32, 0.5 * (i % 3) as f32);
@@ -348,131 +341,4 @@ fn apart<'a>(
         .zip(expected)
         .map(|(a, b)| (a - *b).abs().max_element());
     apart.fold(0.0, f64::max) / largest
-}
-
-/// What one batch brings pixel by pixel, from the item buffers and the sent light of the device.
-#[test]
-fn pixels_bring_light_as_their_twin() {
-    // Differences of sums before and after the batch, each of thousands of pixels in f32.
-    const ROUNDING: f64 = 1e-4;
-    // A pixel whose ray lies on the border of two slots or texels may fall to either side, and
-    // moves what one pixel in hundreds brings.
-    const BORDER: f64 = 0.02;
-    for (transport, k) in [(Transport::Physical, 32), (Transport::Paper, 16)] {
-        let (mut by_direction, mut even) = (0, 0);
-        // Emission at first, and later what the relief sends.
-        for batches in [2_u32, 3, 80] {
-            let start = |shots| solver_by(Estimator::Pixel, transport, k, shots);
-            let mut now = start(None);
-            // It asks before each batch.
-            let mut left = batches + 1;
-            now.run(|_| {
-                left -= 1;
-                left > 0
-            })
-            .expect("batches run");
-            let mut before = start(Some((batches - 1) * BATCH));
-            before.run(|_| true).expect("it runs");
-            let exits = now
-                .relief_exits(BATCH as usize)
-                .expect("they come back")
-                .expect("it has relief");
-            let items = now.shot_items().expect("they come back");
-            let items = items.expect("it shoots by pixel");
-            let relief = now.problem.elements.relief.as_ref().expect("it has relief");
-            let mut twin = Received::new(&now.problem.elements, relief);
-            let width = exits.slots.len() * FACE as usize;
-            for (i, slot) in exits.slots.iter().enumerate() {
-                if slot.source == NONE {
-                    continue;
-                }
-                let source = &now.problem.sources.list[slot.source as usize];
-                let column: Vec<u32> = items
-                    .chunks_exact(width)
-                    .flat_map(|row| &row[i * FACE as usize..][..FACE as usize])
-                    .copied()
-                    .collect();
-                let part = |p: usize| -> Vec<DVec3> {
-                    let row = &exits.exits[(2 * i + p) * k as usize..][..k as usize];
-                    row.iter().map(|v| v.as_dvec3()).collect()
-                };
-                let (emitted, reflected) = (part(0), part(1));
-                let of_relief = now.problem.sources.relief.contains(&(slot.source as usize));
-                let light = if of_relief {
-                    by_direction += 1;
-                    Light::ByDirection(&emitted, &reflected)
-                } else {
-                    even += 1;
-                    Light::Even(slot.emitted.as_dvec3(), slot.reflected.as_dvec3())
-                };
-                twin.add(&now.problem.elements, relief, source, &column, FACE, &light);
-            }
-            let (after, before) = (now.light(), before.light());
-            let (after, before) = (after.expect("it comes"), before.expect("it comes"));
-            let change = |after: &[Vec3], before: &[Vec3]| -> Vec<DVec3> {
-                let pairs = after.iter().zip(before);
-                pairs.map(|(a, b)| a.as_dvec3() - b.as_dvec3()).collect()
-            };
-            let direct = change(&after.irradiance_direct, &before.irradiance_direct);
-            let whole = change(&after.irradiance, &before.irradiance);
-            let radiosity = change(&after.radiosity, &before.radiosity);
-            let expected: Vec<DVec3> = twin
-                .direct
-                .iter()
-                .zip(&twin.indirect)
-                .map(|(d, i)| *d + *i)
-                .collect();
-            let (after, before) = (
-                after.relief.expect("it has relief"),
-                before.relief.expect("it has relief"),
-            );
-            let moments = after.moments.iter().zip(&before.moments);
-            let moments = moments.flat_map(|(a, b)| [0, 1, 2].map(|c| (a[c] - b[c]).as_dvec3()));
-            let sent = change(&after.exitant, &before.exitant);
-            let meso = now.problem.elements.len() - relief.count();
-            let errors = [
-                apart(direct.iter().copied(), twin.direct.iter()),
-                apart(whole.iter().copied(), expected.iter()),
-                apart(radiosity[meso..].iter().copied(), twin.reflected.iter()),
-                apart(moments, twin.moments.iter().flatten()),
-                match transport {
-                    Transport::Paper => apart(sent.iter().copied(), twin.outgoing.iter()),
-                    _ => 0.0,
-                },
-            ];
-            println!(
-                "{transport:?}, K = {k}, batch {batches}: irradiance direct {:.1e}, whole {:.1e}; reflected {:.1e}, moments {:.1e}, sent {:.1e}",
-                errors[0], errors[1], errors[2], errors[3], errors[4]
-            );
-            assert!(expected.iter().any(|e| *e != DVec3::ZERO));
-            assert!(errors[..2].iter().all(|&e| e <= ROUNDING));
-            assert!(errors[2..].iter().all(|&e| e <= BORDER));
-        }
-        println!("{by_direction} sources by direction, {even} evenly");
-        assert!(by_direction > 3 && even > 3);
-    }
-    assert_silent();
-}
-
-/// Pixel sums have one order: the same run gives the same bits.
-#[test]
-fn pixels_of_relief_are_deterministic() {
-    for transport in [Transport::Physical, Transport::Paper] {
-        let bits = || {
-            let mut solver = solver_by(Estimator::Pixel, transport, 16, Some(60));
-            solver.run(|_| true).expect("it runs");
-            let light = solver.light().expect("it comes back");
-            let relief = light.relief.expect("it has relief");
-            (
-                light.irradiance,
-                light.radiosity,
-                relief.moments,
-                relief.exitant,
-            )
-        };
-        let (a, b) = (bits(), bits());
-        assert!(a.1.iter().any(|v| *v != Vec3::ZERO));
-        assert_eq!(a, b);
-    }
-    assert_silent();
 }

@@ -134,8 +134,9 @@ fn read(words: &[u32]) -> Read {
     read
 }
 
-/// Loaded word by word, in the order that `load_triangle` and `met` expect.
-const BY_WORDS: [&str; 2] = ["Triangle", "ShadowOccluder"];
+/// Loaded as texels of four words, in the order that `load_triangle`, `met` and `bin_shots.comp`
+/// expect.
+const BY_WORDS: [&str; 4] = ["Triangle", "ShadowOccluder", "ReliefPatch", "ReliefTexel"];
 
 #[test]
 fn structs_lie_as_in_the_spirv() {

@@ -150,22 +150,6 @@ struct MesoElement {
     vec3 scale;         // its own reflectance over the tile's mean
 };
 
-// Where an element with a relief lies in its texture.
-struct MesoTexel {
-    vec2 uv_a;
-    vec2 uv_b;
-    vec2 uv_c;
-    uint first;         // facet of the texture among those of all textures
-    uint columns;
-    uint rows;
-};
-
-// A facet of a texture, as the pixel estimator looks it up.
-struct TextureFacet {
-    vec3 reflectance;
-    vec3 normal;        // in the frame of the element
-};
-
 // Reflected radiosity of an element with a relief, with the rounding error of its last sum.
 struct Reflected {
     vec3 sum;
@@ -302,4 +286,46 @@ struct LitTriangle {
     vec3 plane;         // its own normal
     float above;        // what rays start above it
     uint open;          // 1: nothing stands between it and the lights
+};
+
+// A patch that shoots, as the pixels of its hemicube read it.
+struct Shot {
+    vec3 eye;
+    float power;        // that a radiosity of 1 sends through the whole hemicube, in units of the sums
+    vec3 tangent;       // of the hemicube
+    uint source;
+    vec3 bitangent;
+    uint kind;
+    vec3 normal;
+    uint by_direction;  // 1: what it reflects depends on the direction
+    vec3 emitted;       // radiosity
+    uint unused_a;
+    vec3 reflected;
+    uint unused_b;
+    vec3 along_u;       // frame of its directions, beside the normal
+    uint unused_c;
+    vec3 along_v;
+    uint unused_d;
+};
+
+// A patch with a relief as pixels see it: texel = (across, along) · (place - centroid) + at.
+struct ReliefPatch {
+    vec3 across;
+    float across_at;
+    vec3 along;
+    float along_at;
+    vec3 tangent;
+    uint first;         // of its texture among the texels of all
+    vec3 bitangent;
+    uint size;          // columns + rows << 16
+};
+
+// Half a texel of a relief, as it sends light on.
+struct ReliefTexel {
+    vec3 reflectance;
+    float share;        // of a uniform sender's power: by the directions that it sends in
+    uint hidden_low;    // bits of the directions that are 90° and more from its normal
+    uint hidden_high;
+    uint unused_a;
+    uint unused_b;
 };

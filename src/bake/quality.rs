@@ -1,9 +1,12 @@
 //! Presets of a bake's settings, from coarse and quick to fine and slow; `mesolux bench pareto`
 //! measures error against time.
 
+use crate::error::Result;
+use crate::math::directions::Directions;
 use crate::mesh::near::Nearness;
 use crate::mesh::sources::Grouping;
-use crate::solver::Settings;
+use crate::meso::{self, Transport};
+use crate::solver::{Estimator, Settings};
 
 /// Quality of a bake.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -53,6 +56,30 @@ impl Quality {
             Self::High | Self::Reference => 2.0,
         }
     }
+}
+
+/// The paper's method to the letter, in `k` directions: every element shoots from its own hemicube,
+/// lamps as others, form factors are sums of pixels, and no light is scaled.
+///
+/// # Errors
+/// As [`Directions::new`].
+pub fn paper(k: u32) -> Result<Settings> {
+    Ok(Settings {
+        estimator: Estimator::Paper,
+        residual: 5e-2,
+        grouping: Grouping::ELEMENTS,
+        nearness: Nearness::NONE,
+        silhouettes: false,
+        normalise: false,
+        carries: false,
+        merging: false,
+        relief: meso::Options {
+            transport: Transport::Paper,
+            directions: Directions::new(k)?,
+            cache: None,
+        },
+        ..Settings::default()
+    })
 }
 
 /// The settings of hemicubes of so many pixels a side and sources `scale` times the default size:

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::progress::{Bar, catch_interrupts, interrupted};
 use super::{BakingDevices, Builtin};
-use mesolux::bake::quality::Quality;
+use mesolux::bake::quality::{self, Quality};
 use mesolux::bake::solution::{Origin, Solution};
 use mesolux::error::{Error, Result};
 use mesolux::math::directions::Directions;
@@ -41,7 +41,7 @@ pub struct Options {
     keep_visibility: bool,
     /// Light SCENE, of which emission and point lights may have changed, by the form factors that
     /// were kept with this bake
-    #[arg(long, value_name = "BAKE.safetensors", conflicts_with = "estimator")]
+    #[arg(long, value_name = "BAKE.safetensors", conflicts_with_all = ["estimator", "preset"])]
     relight: Option<PathBuf>,
     #[command(flatten)]
     solve: SolveOptions,
@@ -60,6 +60,17 @@ pub struct Options {
 /// How the scene is solved.
 #[derive(Args, Clone, Serialize)]
 pub struct SolveOptions {
+    /// The paper's method to the letter, in place of ours: each element shoots from its own
+    /// hemicube, and pixels bring light by the paper's equations; --residual is 0.05 unless given
+    #[arg(
+        long,
+        value_enum,
+        conflicts_with_all = [
+            "estimator", "quality", "transport", "emitter_hemicube", "source_elements",
+            "source_area", "source_power", "no_normalise", "no_carry", "visibility_memory",
+        ],
+    )]
+    preset: Option<PresetName>,
     /// Form factors by Lambert's formula for each receiver, or by the pixels' sums as in the paper
     #[arg(long, value_enum, default_value = "receiver")]
     estimator: EstimatorName,
@@ -114,7 +125,7 @@ pub struct SolveOptions {
     /// Turns the hemicubes about their axes: another seed, other aliasing
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Directions in which relief sends light: 16, 32, 64, 128 or 256
+    /// Directions in which relief sends light: 16, 32, 64, 128 or 256; with --preset paper up to 64
     #[arg(long, value_name = "K", default_value_t = 64)]
     directions: u32,
     /// How relief takes part: keeping energy, by the paper's equations, or not at all
@@ -131,10 +142,16 @@ pub struct SolveOptions {
 
 #[derive(Clone, Copy, ValueEnum, Serialize)]
 #[serde(rename_all = "lowercase")]
+enum PresetName {
+    Paper,
+}
+
+#[derive(Clone, Copy, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
 enum TransportName {
     /// Masking, shadowing and bounces inside the relief
     Physical,
-    /// Equations (1) to (4) of the paper as printed; loses energy
+    /// By equation (3) of the paper, all else as by default; loses energy
     Paper,
     /// Every element flat: no directions
     Lambert,
@@ -222,6 +239,17 @@ impl SolveOptions {
     }
 
     pub fn settings(&self) -> Result<Settings> {
+        if self.preset.is_some() {
+            let preset = quality::paper(self.directions)?;
+            return Ok(Settings {
+                hemicube: self.hemicube.unwrap_or(preset.hemicube),
+                residual: self.residual.unwrap_or(preset.residual),
+                budget: self.budget()?,
+                shots: self.shots,
+                seed: self.seed,
+                ..preset
+            });
+        }
         let preset = self.quality().settings();
         Ok(Settings {
             estimator: match self.estimator {

@@ -9,22 +9,13 @@ pub struct ShowOptions {
     /// Which light is drawn
     #[arg(long, value_enum, default_value = "global")]
     light: LightName,
-    /// How surfaces with relief are drawn
-    #[arg(
-        long,
-        value_enum,
-        default_value = "factored",
-        conflicts_with = "reference"
-    )]
-    shading: ShadingName,
-    /// How light straight from emitters and point lights is drawn
-    #[arg(
-        long,
-        value_enum,
-        default_value = "sharp",
-        conflicts_with = "reference"
-    )]
-    direct: DirectName,
+    /// How surfaces with relief are drawn [default: factored; clusters with --preset paper]
+    #[arg(long, value_enum, conflicts_with = "reference")]
+    shading: Option<ShadingName>,
+    /// How light straight from emitters and point lights is drawn [default: sharp; slots with
+    /// --preset paper]
+    #[arg(long, value_enum, conflicts_with = "reference")]
+    direct: Option<DirectName>,
     /// What is drawn of surfaces with relief
     #[arg(
         long,
@@ -107,15 +98,17 @@ impl ShowOptions {
         Lighting {
             part,
             shading: match self.shading {
-                ShadingName::Factored => ReliefShading::Factored,
-                ShadingName::Clusters => ReliefShading::Clusters,
-                ShadingName::Normal => ReliefShading::Normal,
-                ShadingName::Parallax => ReliefShading::Parallax,
-                ShadingName::None => ReliefShading::None,
+                None => lighting.shading,
+                Some(ShadingName::Factored) => ReliefShading::Factored,
+                Some(ShadingName::Clusters) => ReliefShading::Clusters,
+                Some(ShadingName::Normal) => ReliefShading::Normal,
+                Some(ShadingName::Parallax) => ReliefShading::Parallax,
+                Some(ShadingName::None) => ReliefShading::None,
             },
             direct: match self.direct {
-                DirectName::Sharp => Direct::Sharp,
-                DirectName::Slots => Direct::Slots,
+                None => lighting.direct,
+                Some(DirectName::Sharp) => Direct::Sharp,
+                Some(DirectName::Slots) => Direct::Slots,
             },
             show: match self.view {
                 ViewName::Shaded => Show::Shaded,

@@ -65,6 +65,15 @@ impl Directions {
         (cell(row, self.rows) * self.columns + cell(column, self.columns)) as usize
     }
 
+    /// The slot whose middle is nearest to a direction (unit, z up); the first of several.
+    pub fn nearest(&self, direction: DVec3) -> usize {
+        let cosine = |slot: &usize| self.centre(*slot).dot(direction);
+        (0..self.count()).fold(0, |best, slot| match cosine(&slot) > cosine(&best) {
+            true => slot,
+            false => best,
+        })
+    }
+
     /// The direction at the centre of a slot's cell.
     pub fn centre(&self, slot: usize) -> DVec3 {
         let (column, row) = (slot as u32 % self.columns, slot as u32 / self.columns);
@@ -226,6 +235,27 @@ mod tests {
             }
         }
         assert!(Directions::new(17).is_err());
+    }
+
+    /// The nearest middle is that of a direction's own cell or of one of the eight about it: those
+    /// that `bin_shots.comp` looks at.
+    #[test]
+    fn the_nearest_middle_is_close_by() {
+        let mut others = 0;
+        for k in ALL {
+            let d = Directions::new(k).expect("a number of the paper");
+            for cell in FineCell::all() {
+                let cell_of = |slot: usize| [slot as u32 % d.columns, slot as u32 / d.columns];
+                let (own, nearest) = (d.slot_of(cell.direction), d.nearest(cell.direction));
+                let [a, b] = [own, nearest].map(cell_of);
+                assert!(
+                    a[0].abs_diff(b[0]) <= 1 && a[1].abs_diff(b[1]) <= 1,
+                    "{cell:?}"
+                );
+                others += u32::from(own != nearest);
+            }
+        }
+        assert!(others > 0);
     }
 
     /// Cells of one solid angle: the share of random directions in each is 1/K.

@@ -1,6 +1,5 @@
 //! Finds the relief of a scene's elements: their tangent frames, and the responses of their tiles.
 
-use bytemuck::Zeroable;
 use glam::{DVec2, Vec3};
 
 use super::elements::Elements;
@@ -26,18 +25,15 @@ impl Texels {
         let shading = &tile.shading;
         let facets = shading.normals.iter().zip(&shading.reflectance);
         self.facets
-            .extend(facets.map(|(normal, &reflectance)| TextureFacet {
+            .extend(facets.map(|(&normal, &reflectance)| TextureFacet {
                 reflectance,
-                normal: normal.as_vec3(),
+                normal,
             }));
         for (&e, uv) in tile.members.iter().zip(coordinates) {
             // Shifted towards the origin, where f32 is most precise.
             let home = uv[0].floor();
-            let [uv_a, uv_b, uv_c] = uv.map(|p| (p - home).as_vec2());
             self.elements[e] = MesoTexel {
-                uv_a,
-                uv_b,
-                uv_c,
+                uv: uv.map(|p| p - home),
                 first,
                 columns: tile.field.columns,
                 rows: tile.field.rows,
@@ -154,7 +150,7 @@ impl Relief {
             responses: Vec::new(),
             classes: Vec::new(),
             texels: (options.transport == Transport::Paper).then(|| Texels {
-                elements: vec![MesoTexel::zeroed(); count],
+                elements: vec![MesoTexel::default(); count],
                 facets: Vec::new(),
             }),
             highest_albedo: 0.0,

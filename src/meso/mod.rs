@@ -18,13 +18,14 @@ mod shading;
 mod transfer;
 mod visibility;
 
-pub use crate::structs::{MesoTexel, TextureFacet};
 pub use basis::{Basis, RANK};
 pub use factors::{CORNERS, Factors, RANK_STEP};
 pub use footprints::Footprints;
 pub use height_field::{Facet, HeightField};
 pub use height_pyramid::HeightPyramid;
-pub use relief::{Class, March, Options, Relief, Texels, Transport, visibility};
+pub use relief::{
+    Class, March, MesoTexel, Options, Relief, Texels, TextureFacet, Transport, visibility,
+};
 pub use response::{Response, slot_shares};
 pub use scattering::Scattering;
 pub use shading::Shading;

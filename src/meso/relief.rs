@@ -4,10 +4,10 @@
 
 use std::path::{Path, PathBuf};
 
-use glam::Vec3;
+use glam::{DVec2, DVec3, Vec3};
 use serde::Serialize;
 
-use super::{HeightField, MesoTexel, Response, TextureFacet, Visibility};
+use super::{HeightField, Response, Visibility};
 use crate::constants::NONE;
 use crate::error::Result;
 use crate::math::directions::Directions;
@@ -19,7 +19,8 @@ pub enum Transport {
     /// Masking, shadowing and bounces inside the relief; keeps energy.
     #[default]
     Physical,
-    /// The paper's equations (1) to (4) as printed; loses energy.
+    /// The paper's equation (3): what a texel reflects leaves in every direction less than 90° from
+    /// its normal; loses energy.
     Paper,
     /// No relief: every element is a flat diffuse one.
     Lambert,
@@ -69,12 +70,31 @@ pub struct Relief {
     pub highest_albedo: f32,
 }
 
+/// Where an element lies in its texture.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct MesoTexel {
+    /// Texture coordinates of the corners.
+    pub uv: [DVec2; 3],
+    /// Facet of the texture among those of all textures.
+    pub first: u32,
+    pub columns: u32,
+    pub rows: u32,
+}
+
+/// Half a texel of a texture: one side of a cell's diagonal.
+#[derive(Debug, Clone, Copy)]
+pub struct TextureFacet {
+    pub reflectance: Vec3,
+    /// In the frame of the element.
+    pub normal: DVec3,
+}
+
 /// Normals and reflectance for look-ups by the pixels of an item buffer.
 #[derive(Debug, Clone, Default)]
 pub struct Texels {
     /// `[element]` in the elements' own order; zero for one without relief.
     pub elements: Vec<MesoTexel>,
-    /// Facets of the tiles' height fields, one tile after another.
+    /// Facets of the tiles' height fields, `[row][column][half]`, one tile after another.
     pub facets: Vec<TextureFacet>,
 }
 

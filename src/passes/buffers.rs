@@ -169,6 +169,10 @@ fn eyes(sources: &[sources::Source]) -> Vec<[f32; 4]> {
         };
         (0..SOURCE_EYES as usize).map(texel).collect::<Vec<_>>()
     };
+    // Only the `receiver` estimator gives sources places, and reads them.
+    if sources.iter().all(|source| source.places.is_empty()) {
+        return Vec::new();
+    }
     let seeing = sources.iter().filter(|source| source.kind != KIND_POINT);
     seeing.flat_map(of_source).collect()
 }

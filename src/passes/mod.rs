@@ -3,6 +3,7 @@
 
 pub mod batch;
 pub mod bin_pixels;
+pub mod bin_shots;
 pub mod buffers;
 pub mod couple;
 pub mod cull;
@@ -20,7 +21,6 @@ pub mod near_rows;
 pub mod near_to_relief;
 pub mod normalise;
 pub mod occluder_tree;
-pub mod pixels_relief;
 pub mod receiver_blocks;
 pub mod relief;
 pub mod relief_buffers;
@@ -29,7 +29,10 @@ pub mod relief_visibility;
 pub mod send_relief;
 pub mod shade;
 pub mod shadow_rays;
+pub mod shoot;
+pub mod shot_light;
 pub mod types;
+pub mod unshot;
 
 use crate::constants::GROUP;
 

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use bytemuck::Zeroable;
 use glam::{Vec3, Vec4};
 
 use super::buffers::{filled, upload};
@@ -63,12 +62,6 @@ pub struct ReliefBuffers {
     pub member_exits: Buffer,
     /// `[slot][emitted, reflected][direction]`, a texel each.
     pub exits: Buffer,
-    /// Whether elements reflect by the normal and albedo of each pixel; the rest is for that alone.
-    pub by_pixel: bool,
-    pub texels: Buffer,
-    pub facets: Buffer,
-    /// Reflected light by direction, `[meso element][direction]`.
-    pub outgoing: Buffer,
 }
 
 /// Memory for what the members of sources send, and the most sources of a dispatch: a software
@@ -77,9 +70,6 @@ const SENDING_BYTES: u64 = 32 << 20;
 const MOST_SENDING: u64 = 256;
 
 impl ReliefBuffers {
-    /// `by_pixel_slots`: slots of a batch of the `pixel` estimator. `by_pixel`: whether each pixel
-    /// reflects by its own normal and albedo, as with the `pixel` estimator and `paper` transport.
-    ///
     /// # Errors
     /// More directional state than a buffer of the device may hold.
     pub fn new(
@@ -87,8 +77,6 @@ impl ReliefBuffers {
         elements: &Elements,
         relief: &Relief,
         sources: &Sources,
-        by_pixel_slots: Option<u32>,
-        by_pixel: bool,
     ) -> Result<Self> {
         let k = relief.directions.count() as u64;
         let first_element = elements.len() - relief.count();
@@ -100,17 +88,9 @@ impl ReliefBuffers {
         let of_relief = sources.relief.clone();
         let members = sources.list[of_relief.clone()].iter();
         let most_members = members.map(|s| s.element_count).max().unwrap_or(1);
-        let sending = || {
-            let slot = 12 * k * u64::from(most_members);
-            (SENDING_BYTES / slot).clamp(1, MOST_SENDING) as u32
-        };
-        let batch_slots = by_pixel_slots.unwrap_or_else(sending);
+        let slot_bytes = 12 * k * u64::from(most_members);
+        let batch_slots = (SENDING_BYTES / slot_bytes).clamp(1, MOST_SENDING) as u32;
         let gpu_elements = meso_elements(elements, relief);
-        let (texels, facets) = match &relief.texels {
-            Some(on) if by_pixel => (on.elements[meso.clone()].to_vec(), on.facets.clone()),
-            // No buffer is empty: a shader that does not read one binds it all the same.
-            _ => (vec![Zeroable::zeroed()], vec![Zeroable::zeroed()]),
-        };
         let responses = Responses::new(relief);
         let directions_list: Vec<Vec4> = (slot_shares(&relief.directions).iter().enumerate())
             .map(|(slot, &share)| relief.directions.centre(slot).extend(share).as_vec4())
@@ -151,13 +131,6 @@ impl ReliefBuffers {
                 uses,
             )?,
             exits: Buffer::new(device, "exits", 2 * TEXEL_BYTES * k * slots, texels_use)?,
-            by_pixel,
-            texels: upload(device, "meso texels", &texels, uses)?,
-            facets: upload(device, "texture facets", &facets, uses)?,
-            outgoing: zeroed(
-                "outgoing",
-                12 * if by_pixel { k * meso.len() as u64 } else { 1 },
-            )?,
         })
     }
 
@@ -169,8 +142,7 @@ impl ReliefBuffers {
             &self.coefficients,
             &self.reflected,
         ];
-        let sent = [&self.shot_exits, &self.outgoing];
-        moments.into_iter().chain(sent)
+        moments.into_iter().chain([&self.shot_exits])
     }
 
     /// Columns and rows of the directions' square.

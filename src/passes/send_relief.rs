@@ -35,7 +35,6 @@ impl SendRelief {
             shot_exits: &relief.shot_exits,
             member_exits: &relief.member_exits,
             exits: &relief.exits,
-            outgoing: &relief.outgoing,
         };
         let directions = [relief.directions.count() as u32];
         Ok(Self {
@@ -47,7 +46,6 @@ impl SendRelief {
                 first_element: relief.first_element,
                 most_members: relief.most_members,
                 cells: relief.cells(),
-                by_pixel: relief.by_pixel.into(),
                 first_slot: 0,
             },
         })

@@ -11,7 +11,7 @@ pub mod measure;
 pub mod near_to_relief;
 pub mod normalise;
 pub mod occluder_rays;
-pub mod pixels_relief;
+pub mod paper;
 pub mod relief_rays;
 pub mod relief_visibility;
 pub mod send_relief;

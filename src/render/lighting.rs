@@ -12,6 +12,7 @@ use crate::constants::{
 };
 use crate::picture::Light;
 use crate::scene::Scene;
+use crate::solver::BY_PAPER;
 
 /// How triangles with a relief are drawn.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -126,6 +127,18 @@ impl<'a> Lighting<'a> {
         }
     }
 
+    /// What the paper's method solved is drawn by it as well.
+    fn by_paper(self, is_so: bool) -> Self {
+        match is_so {
+            true => Self {
+                shading: ReliefShading::Clusters,
+                direct: Direct::Slots,
+                ..self
+            },
+            false => self,
+        }
+    }
+
     pub(super) fn relief(&self) -> Option<(&'a DirectionalLight, u32)> {
         self.relief.zip(self.shading.code())
     }
@@ -191,7 +204,7 @@ impl<'a> From<&'a Solution> for Lighting<'a> {
         Self {
             irradiance_direct: Some(&solution.irradiance_direct),
             relief: solution.relief.as_ref(),
-            ..Self::plain(&solution.irradiance)
+            ..Self::plain(&solution.irradiance).by_paper(solution.report.estimator == BY_PAPER)
         }
     }
 }
@@ -201,7 +214,7 @@ impl<'a> From<&'a Bake> for Lighting<'a> {
         Self {
             irradiance_direct: Some(&bake.irradiance_direct),
             relief: bake.relief.as_ref(),
-            ..Self::plain(&bake.irradiance)
+            ..Self::plain(&bake.irradiance).by_paper(bake.by_paper)
         }
     }
 }

@@ -41,7 +41,7 @@ impl Solver {
     pub fn ambient(&self) -> Result<Ambient> {
         let unshot = match &self.method {
             Method::Rows(spine) => spine.ledger.unshot_by_colour(),
-            Method::Shots(shots) => shots.unshot_by_colour(&self.problem.state)?,
+            Method::Shots(shots) => shots.unshot_by_colour(),
         };
         Ok(Ambient::new(unshot, &self.problem.elements))
     }

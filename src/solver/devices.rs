@@ -38,16 +38,15 @@ pub fn open_devices(wanted: Option<&str>, validation: bool) -> Result<Vec<Arc<De
 /// The device that holds the solution, and all of them.
 ///
 /// # Errors
-/// No device; several for the `pixel` estimator, which takes light by direction from the pixels
-/// themselves.
+/// No device; several for another estimator than `receiver`.
 pub fn check_devices<'a>(
     devices: &'a [Arc<Device>],
     settings: &Settings,
 ) -> Result<&'a Arc<Device>> {
     match devices {
         [] => Err(Error::Device("a bake needs a device".into())),
-        [_, _, ..] if settings.estimator == Estimator::Pixel => Err(Error::Usage(
-            "--estimator pixel takes one --device, not several".into(),
+        [_, _, ..] if settings.estimator != Estimator::Receiver => Err(Error::Usage(
+            "--estimator pixel and --preset paper take one --device, not several".into(),
         )),
         [first, ..] => Ok(first),
     }

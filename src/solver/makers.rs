@@ -83,7 +83,7 @@ impl Makers {
         };
         let occluders = match settings.estimator {
             Estimator::Receiver => Some(OccluderTree::new(device, &parts.problem.occluder_tree)?),
-            Estimator::Pixel => None,
+            Estimator::Pixel | Estimator::Paper => None,
         };
         let row_parts = RowParts {
             settings,

@@ -4,8 +4,7 @@
 //! rows ─► coupling ─► solve ─► gather
 //! ```
 //!
-//! `spine` is the method. The `pixel` estimator in scenes with relief shoots pixel by pixel
-//! instead: `shots`.
+//! `spine` is the method. The paper's own is `shots`: progressive radiosity, pixel by pixel.
 
 mod ambient;
 mod coupling;
@@ -53,7 +52,7 @@ pub use problem::Problem;
 pub use progress::Update;
 use progress::{Bound, Watch};
 pub use relief_light::ReliefLight;
-pub use report::{Discretisation, Report, Seconds, Skipped, StopReason, SurfaceError};
+pub use report::{BY_PAPER, Discretisation, Report, Seconds, Skipped, StopReason, SurfaceError};
 pub use rows::Stages;
 pub use self_test::{choose_device, ids_come_back_right, open_device};
 pub use settings::{
@@ -135,10 +134,8 @@ impl Solver {
         let start = Instant::now();
         let problem = Problem::new(device, elements, lights, settings, kept)?;
         let bound = Bound::new(&problem);
-        let method = match &problem.relief {
-            Some(relief) if settings.estimator == Estimator::Pixel => {
-                Method::Shots(Shots::new(device, &problem, relief, bound)?)
-            }
+        let method = match settings.estimator {
+            Estimator::Paper => Method::Shots(Shots::new(device, &problem, bound)?),
             _ => Method::Rows(Spine::new(devices, &problem, bound, kept)?),
         };
         let mut report = Report::new(devices, &problem);
@@ -158,11 +155,11 @@ impl Solver {
     ///
     /// # Errors
     /// Emission of elements that neither emitted nor reflected; another number of point lights; the
-    /// `pixel` estimator in a scene with relief. The solver is then as it was. A device that fails.
+    /// paper's method. The solver is then as it was. A device that fails.
     pub fn relight(&mut self, scene: &Scene) -> Result<()> {
         let start = Instant::now();
         let Method::Rows(spine) = &mut self.method else {
-            let what = "the pixel estimator keeps nothing in a scene with relief: bake again";
+            let what = "the paper's method keeps no form factors: bake again";
             return Err(Error::Usage(what.into()));
         };
         let moved = self.problem.relight(&self.device, scene)?;
@@ -204,8 +201,7 @@ impl Solver {
             }
             Method::Shots(shots) => {
                 shots.run(on, report, &mut watch)?;
-                let unshot = shots.left(on)?;
-                (unshot, self.bound.importance() * unshot)
+                (shots.left(), self.bound.importance() * shots.left())
             }
         };
         report.stop = watch.stop.unwrap_or(StopReason::Residual);
@@ -220,19 +216,21 @@ impl Solver {
         let Problem {
             elements, state, ..
         } = &self.problem;
+        let spine = match &self.method {
+            Method::Rows(spine) => spine,
+            Method::Shots(shots) => return shots.light(elements),
+        };
         let count = elements.len();
         let parts = [&state.direct, &state.indirect];
         let [mut direct, mut indirect] = download_all::<Vec3, 2>(&self.device, parts, count)?;
-        if let Method::Rows(spine) = &self.method {
-            // What rounding leaves below none is none.
-            let add = |light: &mut [Vec3], near: &[DVec3]| {
-                for (light, near) in light.iter_mut().zip(near) {
-                    *light = (light.as_dvec3() + near).max(DVec3::ZERO).as_vec3();
-                }
-            };
-            add(&mut direct, &spine.near.direct);
-            add(&mut indirect, &spine.near.indirect);
-        }
+        // What rounding leaves below none is none.
+        let add = |light: &mut [Vec3], near: &[DVec3]| {
+            for (light, near) in light.iter_mut().zip(near) {
+                *light = (light.as_dvec3() + near).max(DVec3::ZERO).as_vec3();
+            }
+        };
+        add(&mut direct, &spine.near.direct);
+        add(&mut indirect, &spine.near.indirect);
         let irradiance: Vec<Vec3> = direct.iter().zip(&indirect).map(|(d, i)| d + i).collect();
         let mut radiosity: Vec<Vec3> = (0..count)
             .map(|e| elements.emitted[e] + elements.reflectance[e] * irradiance[e])
@@ -281,21 +279,12 @@ impl Solver {
     /// benchmarks and comparisons with the twins. Their rows take room from those of the solution.
     ///
     /// # Panics
-    /// Of the `pixel` estimator in a scene with relief, which makes no rows.
+    /// Of the paper's method, which makes no rows.
     pub fn draw(&mut self, sources: &[u32]) -> Result<DrawnBatch> {
         let on = &self.problem;
         match &mut self.method {
             Method::Rows(spine) => spine.draw_alone(on, sources),
-            Method::Shots(_) => panic!("the pixel estimator makes no rows in a scene with relief"),
-        }
-    }
-
-    /// Item buffers of the last shots of the `pixel` estimator in a scene with relief,
-    /// `[row][slot][column]`; none otherwise.
-    pub fn shot_items(&self) -> Result<Option<Vec<u32>>> {
-        match &self.method {
-            Method::Rows(_) => Ok(None),
-            Method::Shots(shots) => shots.items().map(Some),
+            Method::Shots(_) => panic!("the paper's method makes no rows"),
         }
     }
 
@@ -319,14 +308,11 @@ impl Solver {
     /// The last sources that were gathered and what each sent, with what those with a relief sent
     /// by direction; for comparison with the pass's twin. None without relief.
     pub fn relief_exits(&self, count: usize) -> Result<Option<ReliefExits>> {
-        let Some(relief) = &self.problem.relief else {
+        let (Some(relief), Method::Rows(spine)) = (&self.problem.relief, &self.method) else {
             return Ok(None);
         };
         let k = relief.directions.count();
-        let slots = match &self.method {
-            Method::Rows(spine) => spine.gathered_slots(count)?,
-            Method::Shots(shots) => shots.slots(count)?,
-        };
+        let slots = spine.gathered_slots(count)?;
         Ok(Some(ReliefExits {
             slots,
             exits: download::<Vec4>(&self.device, &relief.exits, 2 * k * count)?

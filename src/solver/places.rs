@@ -42,7 +42,7 @@ impl Solver {
     /// device that fails.
     pub fn light_at(&self, places: &[Place]) -> Result<Vec<LightAt>> {
         let on = &self.problem;
-        if on.settings.estimator == Estimator::Pixel {
+        if on.settings.estimator != Estimator::Receiver {
             let what = "light at places needs the `receiver` estimator";
             return Err(Error::Usage(what.into()));
         }

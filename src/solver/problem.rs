@@ -14,6 +14,7 @@ use crate::mesh::occluders::Occluders;
 use crate::mesh::open_eyes::open_eyes;
 use crate::mesh::shadow_tree::ShadowTree;
 use crate::mesh::sources::{self, LitBy, Source, Sources, far_power};
+use crate::meso::{Relief, Transport};
 use crate::passes::batch::Hemicubes;
 use crate::passes::buffers::{SceneBuffers, State};
 use crate::passes::relief_buffers::ReliefBuffers;
@@ -40,7 +41,7 @@ pub struct Problem {
     pub sources: Sources,
     pub connections: Connections,
     pub occluders: Occluders,
-    /// Of the occluders; empty with the `pixel` estimator.
+    /// Of the occluders; of the `receiver` estimator alone.
     pub(super) occluder_tree: ShadowTree<ShadowOccluder>,
     pub near: NearPairs,
     pub(super) scene: SceneBuffers,
@@ -82,6 +83,9 @@ impl Problem {
             let what = "kept form factors are of other sources: bake again with --keep-visibility";
             return Err(Error::Usage(what.into()));
         }
+        if let Some(what) = refused(settings, elements.relief.as_ref()) {
+            return Err(Error::Usage(what.into()));
+        }
         let occluders = match settings.estimator {
             Estimator::Receiver if settings.merging => Occluders::merged(&elements, &connections),
             _ => Occluders::elements(&elements),
@@ -98,7 +102,7 @@ impl Problem {
                 };
                 (tree, near)
             }
-            Estimator::Pixel => {
+            Estimator::Pixel | Estimator::Paper => {
                 if sources.list.iter().any(Source::is_far) {
                     let what = "suns, skies, spots and IES files need the `receiver` estimator";
                     return Err(Error::Usage(what.into()));
@@ -112,13 +116,10 @@ impl Problem {
         let state = State::new(device, &scene)?;
         let wanted = settings.batch.clamp(1, scene.source_count.max(1));
         let slots = Hemicubes::fitting_slots(device, &scene, settings.hemicube, wanted);
-        let shoots = settings.estimator == Estimator::Pixel;
-        let relief = |relief: &crate::meso::Relief| {
-            let by_pixel = shoots && relief.texels.is_some();
-            let slots = shoots.then_some(slots);
-            ReliefBuffers::new(device, &elements, relief, &sources, slots, by_pixel)
-        };
-        let relief = elements.relief.as_ref().map(relief).transpose()?;
+        let relief = (elements.relief.as_ref())
+            .filter(|_| settings.estimator != Estimator::Paper)
+            .map(|relief| ReliefBuffers::new(device, &elements, relief, &sources))
+            .transpose()?;
         Ok(Self {
             settings: settings.clone(),
             elements,
@@ -198,6 +199,21 @@ impl Problem {
         let strong =
             |source: &Source| !source.is_far() && least > 0.0 && source.emitted_power() >= least;
         list.iter().map(strong).collect()
+    }
+}
+
+/// What settings ask of relief and cannot be.
+fn refused(settings: &Settings, relief: Option<&Relief>) -> Option<&'static str> {
+    let transport = relief?.transport;
+    match settings.estimator {
+        Estimator::Pixel => Some(
+            "--estimator pixel sums light without its direction: in scenes with relief use \
+             --preset paper, or --transport lambert",
+        ),
+        Estimator::Paper if transport != Transport::Paper => {
+            Some("the paper's method needs the paper's transport")
+        }
+        _ => None,
     }
 }
 

@@ -22,7 +22,7 @@ pub struct ReliefLight {
     /// Of this what comes straight from emitters and point lights.
     pub moments_direct: Vec<[Vec3; 3]>,
     /// Of the functions by which each element responds, Σ E u_r(ω), `[meso element][rank]`, RGB,
-    /// W·m⁻²: see [`crate::meso::Basis`].
+    /// W·m⁻²: see [`crate::meso::Basis`]. None by the paper's method.
     pub coefficients: Vec<Vec3>,
     /// What is sent as radiosity πL, bilinear between the directions, emission included, `[meso
     /// element][direction]`, RGB, W·m⁻².
@@ -42,7 +42,6 @@ impl ReliefLight {
         relief: &Relief,
         buffers: &ReliefBuffers,
     ) -> Result<Self> {
-        let k = relief.directions.count();
         let count = relief.kept().count() * buffers.element_count as usize;
         let direct: Vec<[Vec3; 3]> = download(device, &buffers.moments_direct, count)?;
         let mut moments: Vec<[Vec3; 3]> = download(device, &buffers.moments_indirect, count)?;
@@ -52,15 +51,6 @@ impl ReliefLight {
         let held = RANK * buffers.element_count as usize;
         let coefficients: Vec<Vec4> = download(device, &buffers.coefficients, held)?;
         let coefficients: Vec<Vec3> = coefficients.into_iter().map(Vec4::truncate).collect();
-        let outgoing: Vec<Vec3> = if buffers.by_pixel {
-            download(
-                device,
-                &buffers.outgoing,
-                k * buffers.element_count as usize,
-            )?
-        } else {
-            Vec::new()
-        };
         let first = buffers.first_element;
         let exitant = coefficients
             .par_chunks(RANK)
@@ -70,17 +60,9 @@ impl ReliefLight {
                 let response = relief.response(e);
                 let scale = relief.scale[e];
                 let emitted = elements.emitted[e] / response.mean_emission;
-                let sent = match outgoing.get(m * k..(m + 1) * k) {
-                    Some(sent) => sent.to_vec(),
-                    None => response
-                        .send(coefficients)
-                        .iter()
-                        .map(|s| *s * scale)
-                        .collect(),
-                };
-                sent.into_iter()
-                    .zip(&response.emission)
-                    .map(move |(sent, emission)| sent + emitted * *emission)
+                let sent = response.send(coefficients).into_iter();
+                sent.zip(&response.emission)
+                    .map(move |(sent, emission)| sent * scale + emitted * *emission)
                     .collect::<Vec<_>>()
             })
             .collect();

@@ -205,6 +205,9 @@ pub struct Report {
     culls: bool,
 }
 
+/// [`Report::estimator`] of the paper's method.
+pub const BY_PAPER: &str = "paper";
+
 /// What was relief, and how.
 #[derive(Debug, Clone, Serialize)]
 pub struct ReliefReport {
@@ -242,6 +245,7 @@ impl Report {
             estimator: match settings.estimator {
                 Estimator::Receiver => "receiver",
                 Estimator::Pixel => "pixel",
+                Estimator::Paper => BY_PAPER,
             },
             hemicube: settings.hemicube,
             emitter_hemicube: match strong {

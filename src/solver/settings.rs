@@ -17,6 +17,10 @@ pub enum Estimator {
     Receiver,
     /// The paper's equations (1) and (2): the sum of the pixels' form factors.
     Pixel,
+    /// The paper's whole method, equations (1) to (4): each element shoots from its own hemicube
+    /// what it has not sent, and each pixel adds what it brings. Its relief is of
+    /// [`meso::Transport::Paper`].
+    Paper,
 }
 
 /// How it is found what sources see that emit strongly.
@@ -140,6 +144,7 @@ impl Settings {
         match (self.emitter_hemicube, self.estimator) {
             (Some(face), _) => EmitterShadows::Hemicubes(face),
             (None, Estimator::Receiver) => EmitterShadows::Rays,
+            (None, Estimator::Paper) => EmitterShadows::Hemicubes(self.hemicube),
             (None, Estimator::Pixel) => {
                 let finer = (EMITTER_SCALE * self.hemicube).min(FINEST.max(self.hemicube));
                 EmitterShadows::Hemicubes(finer)

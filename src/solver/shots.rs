@@ -1,102 +1,68 @@
-//! The `pixel` estimator in a scene with relief: each pixel brings light by its own direction, so
-//! that there is no row to keep. Sources are drawn for every shot, those with the most unshot power
-//! first (Southwell), and what they reflect is measured before each batch.
+//! The paper's method: progressive radiosity. Every element is a patch; those with the most unshot
+//! power draw their hemicubes, and each pixel adds what it brings.
+
+mod light;
 
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use super::drawing::{Drawing, read_items};
+use super::drawing::Drawing;
 use super::progress::{Bound, Watch};
-use super::rows::{Looks, Stages, emitter_looks};
+use super::rows::Stages;
 use super::{Problem, Report, StopReason};
-use crate::constants::{FACES, KIND_POINT};
+use crate::constants::FACES;
 use crate::error::Result;
 use crate::mesh::sources::Source;
 use crate::passes::batch::Batch;
-use crate::passes::buffers::{State, download};
-use crate::passes::measure::Measure;
-use crate::passes::measure_relief::MeasureRelief;
-use crate::passes::pixels_relief::PixelsRelief;
-use crate::passes::relief_buffers::ReliefBuffers;
-use crate::passes::send_relief::SendRelief;
+use crate::passes::bin_shots::BinShots;
+use crate::passes::buffers::download;
+use crate::passes::shoot::Shoot;
+use crate::passes::shot_light::ShotLight;
 use crate::passes::types::Slot;
+use crate::passes::unshot::Unshot;
 use crate::vk::{Buffer, BufferUse, Commands, Device, Stage, Timestamps};
 
 pub(super) struct Shots {
     device: Arc<Device>,
     measuring: Commands,
-    all: ShotPass,
-    emitters: Option<ShotPass>,
-    /// `[source]`
-    sources: Vec<Shot>,
+    unshot: Unshot,
+    /// Reflected and not sent, as measured last, RGB, internal units, `[source]`.
+    reflected: Vec<Vec3>,
+    /// Emitted power that waits to be sent, `[source]`.
+    emitted: Vec<DVec3>,
+    light: ShotLight,
+    batch: ShotBatch,
     bound: Bound,
 }
 
-/// What a source has sent.
-#[derive(Debug, Clone, Copy)]
-struct Shot {
-    strong: bool,
-    emitted: DVec3,
-    /// That radiosity is multiplied by for power.
-    area: f64,
-    emission_shot: bool,
-    reflected: DVec3,
-}
+/// Over the power of the strongest patch of a batch, that of the weakest, at least.
+const ALIKE: f64 = 0.5;
 
-/// Sources of a batch with large faces, at most.
-const FINE_SLOTS: u32 = 4;
+/// Over what was emitted, what is sent before the solution is given up: far below where a sum of
+/// [`ShotLight`] would overflow.
+const MOST_SENT: f64 = 1000.0;
 
 const STAMPS: u32 = 4;
 
 impl Shots {
-    /// In a scene with `relief`.
-    pub fn new(
-        device: &Arc<Device>,
-        on: &Problem,
-        relief: &ReliefBuffers,
-        bound: Bound,
-    ) -> Result<Self> {
-        let measure = Measure::new(device, &on.scene, &on.state)?;
-        let measure_relief = MeasureRelief::new(device, &on.scene, &on.state, relief)?;
-        let measuring = Commands::record(device, "measure", |cmd| {
+    pub fn new(device: &Arc<Device>, on: &Problem, bound: Bound) -> Result<Self> {
+        let power: f64 = on.sources.list.iter().map(Source::emitted_power).sum();
+        let light = ShotLight::new(device, &on.elements, power, on.slots)?;
+        let unshot = Unshot::new(device, &on.scene, &light)?;
+        let measuring = Commands::record(device, "unshot", |cmd| {
             cmd.barrier(&[Stage::Compute, Stage::Transfer], &[Stage::Compute]);
-            measure.record(cmd);
-            cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-            measure_relief.record(cmd);
+            unshot.record(cmd);
             Ok(())
         })?;
-        let shot = |(source, strong): (&Source, bool)| Shot {
-            strong,
-            emitted: source.emitted.as_dvec3(),
-            area: match source.kind {
-                KIND_POINT => std::f64::consts::TAU,
-                _ => source.area,
-            },
-            emission_shot: false,
-            reflected: DVec3::ZERO,
-        };
-        let list = on.sources.list.iter().zip(on.strong());
-        let sources: Vec<Shot> = list.map(shot).collect();
-        let any_strong = sources.iter().any(|s| s.strong);
-        let looks = match any_strong {
-            true => emitter_looks(device, &on.settings),
-            false => None,
-        };
-        let emitters = match looks {
-            Some(Looks::Hemicubes(face)) => {
-                let slots = relief.slots.min(FINE_SLOTS);
-                Some(ShotPass::new(device, on, relief, slots, face)?)
-            }
-            _ => None,
-        };
-        let face = on.settings.hemicube;
         Ok(Self {
             device: Arc::clone(device),
             measuring,
-            all: ShotPass::new(device, on, relief, relief.slots, face)?,
-            emitters,
-            sources,
+            unshot,
+            reflected: vec![Vec3::ZERO; on.sources.list.len()],
+            emitted: on.sources.list.iter().map(emitted).collect(),
+            batch: ShotBatch::new(device, on, &light)?,
+            light,
             bound,
         })
     }
@@ -104,14 +70,14 @@ impl Shots {
     /// Shoots until little is left or the watch says stop.
     pub fn run(&mut self, on: &Problem, report: &mut Report, watch: &mut Watch<'_>) -> Result<()> {
         let limit = on.settings.shots.unwrap_or(u32::MAX);
+        let mut sent = 0.0;
         loop {
-            let reflected = self.measure(on)?;
-            let unshot = self.unshot(&reflected);
-            if !watch.look(report.shots, unshot, self.bound.importance() * unshot) {
+            self.measure()?;
+            let left = self.left();
+            if !watch.look(report.shots, left, self.bound.importance() * left) {
                 return Ok(());
             }
-            let (chosen, strong) = self.choose(&reflected);
-            if chosen.is_empty() {
+            if left <= self.bound.stop_power() {
                 watch.stop = Some(StopReason::Residual);
                 return Ok(());
             }
@@ -119,121 +85,86 @@ impl Shots {
                 watch.stop = Some(StopReason::Shots);
                 return Ok(());
             }
-            let pass = match (&mut self.emitters, strong) {
-                (Some(emitters), true) => emitters,
-                _ => &mut self.all,
-            };
-            let most = pass.slots().min((limit - report.shots) as usize);
-            let slots: Vec<Slot> = (chosen.into_iter().take(most))
-                .map(|s| self.sources[s].shoot(s as u32, reflected[s]))
+            if self.bound.share(sent) > MOST_SENT {
+                tracing::warn!(
+                    "the scene absorbs no light: what is emitted goes to and fro for ever"
+                );
+                watch.stop = Some(StopReason::Unsolved);
+                return Ok(());
+            }
+            let most = (self.batch.slot_count()).min((limit - report.shots) as usize);
+            let slots: Vec<Slot> = (self.strongest(most).into_iter())
+                .map(|s| {
+                    sent += self.power(s);
+                    let emits = std::mem::take(&mut self.emitted[s]) != DVec3::ZERO;
+                    Slot {
+                        emitted: match emits {
+                            true => on.sources.list[s].emitted,
+                            false => Vec3::ZERO,
+                        },
+                        ..Slot::of(s as u32)
+                    }
+                })
                 .collect();
-            let (stages, counts) = pass.run(&slots)?;
+            let (stages, counts) = self.batch.run(&slots)?;
             report.seconds.stages += stages;
-            for (counts, _) in counts.chunks(FACES as usize).zip(&slots) {
-                report.add_drawn(counts, strong);
+            for counts in counts.chunks(FACES as usize).take(slots.len()) {
+                report.add_drawn(counts, false);
             }
         }
     }
 
-    /// Radiosity that each source reflects by now.
-    fn measure(&mut self, on: &Problem) -> Result<Vec<DVec3>> {
+    /// The sources with the most unshot power, alike, at most so many, the strongest first.
+    fn strongest(&self, most: usize) -> Vec<usize> {
+        let mut powers: Vec<(usize, f64)> = (0..self.reflected.len())
+            .map(|s| (s, self.power(s)))
+            .filter(|&(_, power)| power > 0.0)
+            .collect();
+        let first = |a: &(usize, f64), b: &(usize, f64)| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0));
+        if powers.len() > most {
+            powers.select_nth_unstable_by(most - 1, first);
+            powers.truncate(most);
+        }
+        powers.sort_by(first);
+        let least = powers.first().map_or(0.0, |p| ALIKE * p.1);
+        let alike = powers.into_iter().take_while(|p| p.1 >= least);
+        alike.map(|(s, _)| s).collect()
+    }
+
+    fn measure(&mut self) -> Result<()> {
         self.measuring.submit()?;
         self.measuring.wait()?;
-        let count = self.sources.len();
-        let reflected: Vec<Vec3> = download(&self.device, &on.state.reflected, count)?;
-        Ok(reflected.into_iter().map(Vec3::as_dvec3).collect())
+        self.reflected = download(&self.device, &self.unshot.powers, self.reflected.len())?;
+        Ok(())
     }
 
-    /// Sources with unshot power, the strongest first: of the strong emitters while one has not
-    /// sent its emission, which the flag says.
-    fn choose(&self, reflected: &[DVec3]) -> (Vec<usize>, bool) {
-        let mut powers: Vec<(usize, f64)> = Vec::new();
-        let strong = self.sources.iter().any(|s| s.strong && !s.emission_shot);
-        let (mut emitted_left, mut power_left) = (0.0, 0.0);
-        for (s, (shot, &reflected)) in self.sources.iter().zip(reflected).enumerate() {
-            let (power, emitted) = shot.unshot(reflected);
-            emitted_left += emitted;
-            power_left += power;
-            if power > 0.0 && (!strong || shot.strong && !shot.emission_shot) {
-                powers.push((s, power));
-            }
-        }
-        if emitted_left == 0.0 && power_left <= self.bound.stop_power() {
-            return (Vec::new(), false);
-        }
-        powers.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        (powers.into_iter().map(|(s, _)| s).collect(), strong)
+    /// Unshot power of a source, summed over the colours.
+    fn power(&self, s: usize) -> f64 {
+        (self.reflected[s].as_dvec3() + self.emitted[s]).element_sum()
     }
 
-    fn unshot(&self, reflected: &[DVec3]) -> f64 {
-        let powers = self.sources.iter().zip(reflected);
-        powers
-            .map(|(shot, &reflected)| shot.unshot(reflected).0)
-            .sum()
+    /// Unshot power when last measured, summed over the colours.
+    pub fn left(&self) -> f64 {
+        self.unshot_by_colour().element_sum()
     }
 
-    /// Unshot power after the last run.
-    pub fn left(&mut self, on: &Problem) -> Result<f64> {
-        let reflected = self.measure(on)?;
-        Ok(self.unshot(&reflected))
-    }
-
-    /// Unshot power by colour, after the last run.
-    pub fn unshot_by_colour(&self, state: &State) -> Result<DVec3> {
-        let count = self.sources.len();
-        let reflected: Vec<Vec3> = download(&self.device, &state.reflected, count)?;
-        let left = |(shot, reflected): (&Shot, Vec3)| {
-            let emitted = match shot.emission_shot {
-                true => DVec3::ZERO,
-                false => shot.emitted,
-            };
-            (emitted + reflected.as_dvec3() - shot.reflected) * shot.area
-        };
-        Ok(self.sources.iter().zip(reflected).map(left).sum())
+    pub fn unshot_by_colour(&self) -> DVec3 {
+        let reflected = self.reflected.iter().map(|power| power.as_dvec3());
+        reflected.sum::<DVec3>() + self.emitted.iter().sum::<DVec3>()
     }
 }
 
-impl Shots {
-    /// The last slots that were shot by hemicubes of the common size, and their item buffers.
-    pub fn slots(&self, count: usize) -> Result<Vec<Slot>> {
-        download(&self.device, &self.all.batch.slots, count)
-    }
-
-    pub fn items(&self) -> Result<Vec<u32>> {
-        read_items(&self.device, &self.all.batch)
-    }
-}
-
-impl Shot {
-    /// Unshot power, and of it what is emitted.
-    fn unshot(&self, reflected: DVec3) -> (f64, f64) {
-        let emitted = match self.emission_shot {
-            true => 0.0,
-            false => self.emitted.element_sum() * self.area,
-        };
-        let reflected = (reflected - self.reflected).abs().element_sum() * self.area;
-        (emitted + reflected, emitted)
-    }
-
-    /// All that the source has left.
-    fn shoot(&mut self, source: u32, reflected: DVec3) -> Slot {
-        let sent = (reflected - self.reflected).as_vec3();
-        self.reflected += sent.as_dvec3();
-        let emitted = match std::mem::replace(&mut self.emission_shot, true) {
-            true => Vec3::ZERO,
-            false => self.emitted.as_vec3(),
-        };
-        Slot {
-            emitted,
-            source,
-            reflected: sent,
-            scale: 1.0,
-        }
+/// Power, RGB, internal units.
+fn emitted(source: &Source) -> DVec3 {
+    let sum = f64::from(source.emitted.element_sum());
+    match sum > 0.0 {
+        true => source.emitted.as_dvec3() * (source.emitted_power() / sum),
+        false => DVec3::ZERO,
     }
 }
 
 /// Draws a batch and adds what its pixels bring.
-struct ShotPass {
+struct ShotBatch {
     commands: Commands,
     wanted: Buffer,
     readback: Buffer,
@@ -241,21 +172,16 @@ struct ShotPass {
     batch: Batch,
 }
 
-impl ShotPass {
-    fn new(
-        device: &Arc<Device>,
-        on: &Problem,
-        relief: &ReliefBuffers,
-        slots: u32,
-        face: u32,
-    ) -> Result<Self> {
-        let size = Drawing::fitting(device, &on.scene, &on.settings, slots, face);
+impl ShotBatch {
+    fn new(device: &Arc<Device>, on: &Problem, light: &ShotLight) -> Result<Self> {
+        let face = on.settings.hemicube;
+        let size = Drawing::fitting(device, &on.scene, &on.settings, on.slots, face);
         let (drawing, batch) = Drawing::new(device, &on.scene, on.settings.culling, &size)?;
-        let send = SendRelief::new(device, &on.scene, &batch.slots, relief)?;
-        let pixels = PixelsRelief::new(device, &on.scene, &on.state, &batch, relief)?;
+        let shoot = Shoot::new(device, &on.scene, light, &batch.slots, batch.slot_count)?;
+        let bin = BinShots::new(device, &on.scene, light, &batch)?;
         let counts = &batch.hemicubes().counts;
         let bytes = u64::from(batch.slot_count) * size_of::<Slot>() as u64;
-        let wanted = Buffer::new(device, "shots", bytes, BufferUse::Upload)?;
+        let wanted = Buffer::new(device, "wanted shots", bytes, BufferUse::Upload)?;
         let readback = Buffer::new(device, "counts", counts.bytes(), BufferUse::Readback)?;
         let timestamps = Timestamps::new(device, "shot timestamps", STAMPS)?;
         let commands = Commands::record(device, "shots", |cmd| {
@@ -264,12 +190,12 @@ impl ShotPass {
             cmd.barrier(&used, &[Stage::Transfer]);
             cmd.copy(&wanted, 0, &batch.slots, 0, bytes);
             cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
+            shoot.record(cmd);
             cmd.timestamp(&timestamps, 0);
-            send.record(cmd, 0..batch.slot_count);
-            cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
             drawing.record(cmd, &on.scene, &batch, || cmd.timestamp(&timestamps, 1));
             cmd.timestamp(&timestamps, 2);
-            pixels.record(cmd, relief, &batch);
+            cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+            bin.record(cmd);
             cmd.timestamp(&timestamps, 3);
             cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
             cmd.copy(counts, 0, &readback, 0, counts.bytes());
@@ -285,13 +211,13 @@ impl ShotPass {
         })
     }
 
-    fn slots(&self) -> usize {
+    fn slot_count(&self) -> usize {
         self.batch.slot_count as usize
     }
 
     /// How long it took, and the counts of each face.
     fn run(&mut self, slots: &[Slot]) -> Result<(Stages, Vec<[u32; 3]>)> {
-        let mut all = vec![Slot::EMPTY; self.slots()];
+        let mut all = vec![Slot::EMPTY; self.slot_count()];
         all[..slots.len()].copy_from_slice(slots);
         self.wanted.write(0, &all);
         self.commands.submit()?;

@@ -169,3 +169,19 @@ pub fn solve(elements: Elements, lights: &Lights, settings: &Settings) -> Solved
     assert_silent();
     solved
 }
+
+/// Middles of n² equal parts of a triangle, as shares of its edges from the first corner.
+#[allow(dead_code)]
+pub fn thirds(n: u32) -> Vec<[f64; 2]> {
+    let mut places = Vec::new();
+    for i in 0..n {
+        for j in 0..n - i {
+            let at = |i: u32, third: f64| (f64::from(i) + third) / f64::from(n);
+            places.push([at(i, 1.0 / 3.0), at(j, 1.0 / 3.0)]);
+            if i + j + 1 < n {
+                places.push([at(i, 2.0 / 3.0), at(j, 2.0 / 3.0)]);
+            }
+        }
+    }
+    places
+}

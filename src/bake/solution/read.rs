@@ -13,6 +13,7 @@ use super::{DirectionalLight, Origin};
 use crate::error::{Error, Result};
 use crate::scene::OnInput;
 use crate::scene::contents::{Contents, ElementCounts};
+use crate::solver::BY_PAPER;
 
 /// The part of a bake file that drawing needs.
 pub struct Bake {
@@ -25,6 +26,8 @@ pub struct Bake {
     pub relief: Option<DirectionalLight>,
     /// Where each triangle lies in the scene as it was read.
     pub on_input: Vec<OnInput>,
+    /// Whether it was made by the paper's method.
+    pub by_paper: bool,
 }
 
 impl Bake {
@@ -43,6 +46,7 @@ impl Bake {
             corner_irradiance: file.corners("corner_irradiance", irradiance.len())?,
             relief: file.relief(irradiance.len())?,
             on_input: file.on_input(irradiance.len())?,
+            by_paper: file.json::<Value>("report")?["estimator"] == BY_PAPER,
             irradiance,
         };
         match bake.irradiance.len() == bake.irradiance_direct.len() {

@@ -162,7 +162,7 @@ impl Try {
             done.rows.push(Row {
                 method: match self.estimator {
                     Estimator::Receiver => Method::Receiver,
-                    Estimator::Pixel => Method::Pixel,
+                    Estimator::Pixel | Estimator::Paper => Method::Pixel,
                 },
                 hemicube: Some(self.hemicube),
                 emitter_hemicube: settings.emitter_shadows().face(),

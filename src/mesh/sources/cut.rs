@@ -113,6 +113,7 @@ pub(super) fn cut(
                     .is_some_and(|lit| limits.too_uneven(area, || lit.unevenness(&members)))
             };
             let large = many
+                || grouping.alone
                 || limits.too_much(area, emitted)
                 || limits.too_patchy(elements, &members, area);
             if members.len() > 1 && (large || uneven()) {

@@ -49,9 +49,20 @@ pub struct Grouping {
     /// and bias at random points: 1.20 and −0.56 % with 502 sources uncut; 0.94 and −0.31 % with 577
     /// at 0.05; 0.83 and −0.22 % with 724 at 0.025; 0.77 and −0.13 % with 1,032 at 0.0125.
     pub max_unevenness: f64,
+    /// Whether every element is a source of its own, whatever it is.
+    pub alone: bool,
 }
 
 impl Grouping {
+    /// Every element shoots alone, and none is cut.
+    pub const ELEMENTS: Self = Self {
+        max_elements: 1,
+        max_area: f64::INFINITY,
+        max_power: f64::INFINITY,
+        max_unevenness: f64::INFINITY,
+        alone: true,
+    };
+
     /// The work of drawing grows as sources times elements, and the work near a source as elements
     /// times members of a source. With members as the square root of the elements both grow alike,
     /// and sources still become smaller.
@@ -71,6 +82,7 @@ impl Default for Grouping {
             max_area: 1.0 / 256.0,
             max_power: 1.0 / 32.0,
             max_unevenness: 0.025,
+            alone: false,
         }
     }
 }
