@@ -2,6 +2,7 @@
 
 mod bars;
 mod difference;
+pub mod figure3;
 pub mod frame;
 pub mod hemicube;
 pub mod irradiance;

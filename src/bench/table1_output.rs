@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 #[derive(Debug, Clone, Serialize)]
 pub struct Row {
     pub scene: String,
-    /// `lambert`, `16`, `32`, `64` or `high-poly`.
+    /// `lambert`, `16`, `32`, `64`, the same after [`PAPER`], or `high-poly`.
     pub kind: String,
     pub elements: u64,
     pub meso_elements: u64,
@@ -47,7 +47,7 @@ pub struct Rate {
 /// What a bake of relief gains and loses against the same relief as geometry.
 pub(super) fn against_high_poly(row: &Row, high: &Row, difference: &Difference) -> String {
     format!(
-        "{:<17} {:<10} {:.2} times as fast as high-poly; its {} plain triangles against it: bias {:+.2} %, rms {:.2} %",
+        "{:<17} {:<13} {:.2} times as fast as high-poly; its {} plain triangles against it: bias {:+.2} %, rms {:.2} %",
         row.scene,
         bake_name(&row.kind),
         high.seconds / row.seconds,
@@ -57,10 +57,47 @@ pub(super) fn against_high_poly(row: &Row, high: &Row, difference: &Difference) 
     )
 }
 
-pub(super) const HEADER: &str = "scene             bake       elements  meso  hemicubes  seconds  of it relief  over K=16  over lambert  paper, min  fps factored  clusters  paper";
+/// Before K of bakes to the letter of the paper.
+pub(super) const PAPER: &str = "paper-";
 
-/// A row as it is printed, with its time over those of the same scene's K = 16 and `lambert`.
+pub(super) const HEADER: &str = "scene             bake          elements  meso  hemicubes  seconds  of it relief  over K=16  over lambert  paper, min  fps factored  clusters  paper";
+
+/// K = 64 over K = 16 of one scene's rows, by default and to the letter, beside the paper's.
+pub(super) fn ratios(scene: &[Row]) -> Vec<String> {
+    let of = |before: &str, k: &str| scene.iter().find(|r| r.kind == format!("{before}{k}"));
+    let ratio = |before: &str| {
+        let (few, many) = (of(before, "16")?, of(before, "64")?);
+        let frames = |of: fn(&Row) -> Option<f64>| {
+            of(few)
+                .zip(of(many))
+                .map_or("-".into(), |(a, b)| format!("{:.2}", a / b))
+        };
+        Some(format!(
+            "{:<17} {:<13} K = 64 over 16: bakes {:.3}, the paper's {}; frames by clusters {}, the paper's {}",
+            few.scene,
+            if before == PAPER {
+                "to the letter"
+            } else {
+                "ours"
+            },
+            many.seconds / few.seconds,
+            many.paper_minutes
+                .zip(few.paper_minutes)
+                .map_or("-".into(), |(a, b)| format!("{:.3}", a / b)),
+            frames(|r| r.fps_clusters.map(|f| f.median)),
+            frames(|r| r.paper_fps),
+        ))
+    };
+    ["", PAPER].into_iter().filter_map(ratio).collect()
+}
+
+/// A row as it is printed, with its time over those of the same scene's K = 16, of the same method,
+/// and `lambert`.
 pub(super) fn line(row: &Row, scene: &[Row]) -> String {
+    let sixteen = match row.kind.starts_with(PAPER) {
+        true => format!("{PAPER}16"),
+        false => "16".to_owned(),
+    };
     let over = |kind: &str| {
         scene
             .iter()
@@ -69,7 +106,7 @@ pub(super) fn line(row: &Row, scene: &[Row]) -> String {
     };
     let fps = |rate: Option<Rate>| rate.map_or("-".into(), |r| format!("{:.2}", r.median));
     format!(
-        "{:<17} {:<10} {:>8} {:>4.0}% {:>10} {:>8.1} {:>13.2} {:>10} {:>13} {:>11} {:>13} {:>9} {:>6}",
+        "{:<17} {:<13} {:>8} {:>4.0}% {:>10} {:>8.1} {:>13.2} {:>10} {:>13} {:>11} {:>13} {:>9} {:>6}",
         row.scene,
         bake_name(&row.kind),
         row.elements,
@@ -77,7 +114,7 @@ pub(super) fn line(row: &Row, scene: &[Row]) -> String {
         row.hemicubes,
         row.seconds,
         row.relief_seconds,
-        over("16"),
+        over(&sixteen),
         over("lambert"),
         row.paper_minutes.map_or("-".into(), |m| format!("{m:.1}")),
         fps(row.fps_factored),
@@ -129,11 +166,14 @@ pub(super) fn write(rows: &[Row], folder: &Path) -> Result<()> {
 }
 
 /// Kinds of bakes with their colours.
-pub(super) const KINDS: [(&str, RGBColor); 5] = [
+const KINDS: [(&str, RGBColor); 8] = [
     ("lambert", RGBColor(120, 120, 120)),
     ("16", RGBColor(158, 202, 225)),
     ("32", RGBColor(66, 146, 198)),
     ("64", RGBColor(8, 69, 148)),
+    ("paper-16", RGBColor(199, 233, 192)),
+    ("paper-32", RGBColor(116, 196, 118)),
+    ("paper-64", RGBColor(0, 109, 44)),
     ("high-poly", RGBColor(217, 95, 14)),
 ];
 
@@ -220,10 +260,13 @@ fn fps_chart(rows: &[Row]) -> Bars<'static> {
 /// Seconds, one group a scene.
 fn chart(rows: &[Row]) -> Bars<'static> {
     let groups = scenes_of(rows);
+    let kinds: Vec<_> = (KINDS.iter())
+        .filter(|kind| rows.iter().any(|row| row.kind == kind.0))
+        .collect();
     let bars = rows.iter().filter_map(|row| {
         Some(Bar {
             group: groups.iter().position(|g| *g == row.scene)?,
-            kind: KINDS.iter().position(|k| k.0 == row.kind)?,
+            kind: kinds.iter().position(|k| k.0 == row.kind)?,
             value: row.seconds,
             spread: None,
         })
@@ -232,7 +275,7 @@ fn chart(rows: &[Row]) -> Bars<'static> {
         caption: "Time of a bake",
         unit: "seconds",
         bars: bars.collect(),
-        kinds: KINDS
+        kinds: kinds
             .iter()
             .map(|(kind, colour)| (bake_name(kind), *colour))
             .collect(),
@@ -242,8 +285,9 @@ fn chart(rows: &[Row]) -> Bars<'static> {
 
 /// A kind of bake as it is shown.
 fn bake_name(kind: &str) -> String {
-    match kind.parse::<u32>() {
-        Ok(k) => format!("K = {k}"),
-        Err(_) => kind.to_owned(),
-    }
+    let named = |k: &str, before: &str| k.parse::<u32>().ok().map(|k| format!("{before}K = {k}"));
+    let letter = kind.strip_prefix(PAPER).and_then(|k| named(k, "paper, "));
+    letter
+        .or_else(|| named(kind, ""))
+        .unwrap_or_else(|| kind.to_owned())
 }

@@ -142,7 +142,7 @@ pub struct SolveOptions {
 
 #[derive(Clone, Copy, ValueEnum, Serialize)]
 #[serde(rename_all = "lowercase")]
-enum PresetName {
+pub enum PresetName {
     Paper,
 }
 

@@ -4,14 +4,17 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
+use super::bake::PresetName;
 use super::bake_scene::BakeScene;
 use super::{Builtin, DeviceOptions};
+use mesolux::bake::quality;
 use mesolux::bake::solution::Bake;
 use mesolux::bench::places::Sample;
 use mesolux::bench::truth::{Truth, Wanted};
-use mesolux::bench::{frame, hemicube, irradiance, scaling, stress, table1};
+use mesolux::bench::{figure3, frame, hemicube, irradiance, scaling, stress, table1};
 use mesolux::error::{Error, Result};
 use mesolux::scene::Scene;
+use mesolux::solver::Settings;
 
 /// Measure speeds on this machine; use a release build
 #[derive(Args)]
@@ -22,6 +25,9 @@ pub struct Options {
 
 #[derive(Subcommand)]
 enum What {
+    /// The paper's Figure 3: direct, indirect and global light, of a bunny under a point light and of
+    /// a horse under an area light
+    Figure3(Figure3Options),
     /// Milliseconds a frame of the three scenes, by shading of the relief, number of directions and
     /// size
     Frame(FrameOptions),
@@ -57,9 +63,13 @@ struct Table1Options {
     /// Elements of each scene, for a quicker look; the paper's numbers if not given
     #[arg(long, value_name = "N")]
     patches: Option<usize>,
-    /// Error bound at which a bake is done, as a share of the emitted power
-    #[arg(long, value_name = "X", default_value_t = 0.01)]
-    residual: f64,
+    /// Also bake and draw by the paper's method to the letter: half an hour and more a bake
+    #[arg(long, value_enum)]
+    preset: Option<PresetName>,
+    /// Error bound at which a bake is done, as a share of the emitted power [default: 0.01, with
+    /// --preset paper 0.05]
+    #[arg(long, value_name = "X")]
+    residual: Option<f64>,
     /// Rounds over which the frames are measured, 1280x720 pixels; each draws every kind of frame
     /// once; 0: no frames
     #[arg(long, value_name = "N", default_value_t = 9)]
@@ -67,6 +77,24 @@ struct Table1Options {
     /// Leave out the bake of the relief as geometry, which takes longest
     #[arg(long)]
     no_high_poly: bool,
+    #[command(flatten)]
+    device: DeviceOptions,
+}
+
+#[derive(Args)]
+struct Figure3Options {
+    /// Folder for figure3.png and figure3-paper.png
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Also by the paper's method to the letter: an hour and more at full size
+    #[arg(long, value_enum)]
+    preset: Option<PresetName>,
+    /// Elements of each scene, for a quicker look; the paper's numbers if not given
+    #[arg(long, value_name = "N")]
+    patches: Option<usize>,
+    /// Pixels a side of each of the six pictures
+    #[arg(long, value_name = "N", default_value_t = 400)]
+    size: u32,
     #[command(flatten)]
     device: DeviceOptions,
 }
@@ -179,6 +207,7 @@ struct HemicubeOptions {
 pub fn run(options: &Options) -> Result<()> {
     match &options.what {
         What::Hemicube(options) => run_hemicube(options),
+        What::Figure3(options) => run_figure3(options),
         What::Frame(options) => run_frame(options),
         What::Irradiance(options) => run_irradiance(options),
         What::Pictures(options) => super::bench_pictures::run(options),
@@ -210,6 +239,35 @@ fn run_frame(options: &FrameOptions) -> Result<()> {
         let scene = options.builtin.load(name)?;
         frame::run(&device, &scene, &wanted, &mut rows)?;
         frame::write(&rows, &options.output)?;
+    }
+    options.device.check()
+}
+
+fn run_figure3(options: &Figure3Options) -> Result<()> {
+    if !(8..=4096).contains(&options.size) {
+        return Err(Error::Usage(format!(
+            "--size {}: must be in 8 to 4096",
+            options.size
+        )));
+    }
+    let device = options.device.open()?;
+    super::progress::catch_interrupts();
+    let draw = |name, settings| {
+        let wanted = figure3::Options {
+            name,
+            side: options.size,
+            patches: options.patches,
+            settings,
+        };
+        figure3::run(&device, &wanted, &options.output, || {
+            !super::progress::interrupted()
+        })
+    };
+    let mut ours = Settings::default();
+    ours.relief.cache = super::bake::cache_folder();
+    draw("figure3.png", ours)?;
+    if options.preset.is_some() && !super::progress::interrupted() {
+        draw("figure3-paper.png", quality::paper(64)?)?;
     }
     options.device.check()
 }
@@ -272,7 +330,8 @@ fn run_table1(options: &Table1Options) -> Result<()> {
             options.scene.clone()
         },
         patches: options.patches,
-        residual: options.residual,
+        residual: (options.residual).unwrap_or(if options.preset.is_some() { 0.05 } else { 0.01 }),
+        paper: options.preset.is_some(),
         high_poly: !options.no_high_poly,
         frame_rounds: options.frame_rounds,
         cache: super::bake::cache_folder(),

@@ -137,6 +137,34 @@ impl Picture {
         })
     }
 
+    /// Pictures of one width below each other, each brightened as much as its own exposure is above
+    /// that of the last.
+    ///
+    /// # Errors
+    /// None, or of different widths.
+    pub fn stacked(pictures: &[Self]) -> Result<Self> {
+        let last = pictures
+            .last()
+            .ok_or_else(|| Error::Usage("no pictures to stack".into()))?;
+        if pictures.iter().any(|p| p.width != last.width) {
+            return Err(Error::Usage(
+                "pictures of different widths do not stand below each other".into(),
+            ));
+        }
+        let scaled = |p: &Self| -> Vec<[f32; 3]> {
+            let gain = (p.automatic_exposure - last.automatic_exposure).exp2();
+            let radiance = p.radiance.iter();
+            radiance.map(|pixel| pixel.map(|c| c * gain)).collect()
+        };
+        Ok(Self {
+            width: last.width,
+            height: pictures.iter().map(|p| p.height).sum(),
+            radiance: pictures.iter().flat_map(scaled).collect(),
+            automatic_exposure: last.automatic_exposure,
+            contrasts: Vec::new(),
+        })
+    }
+
     /// Reads linear radiance from an OpenEXR file; all pixels are metered.
     ///
     /// # Errors
