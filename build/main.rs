@@ -26,11 +26,31 @@ fn main() {
         println!("cargo::rerun-if-changed={path}");
     }
     println!("cargo::rerun-if-env-changed=MESOLUX_KEEP_SPIRV");
+    commit();
     if let Err(message) = shaders() {
         // One readable line a sentence, and no backtrace of the build script.
         println!("cargo::error={}", message.replace('\n', " "));
         std::process::exit(1);
     }
+}
+
+/// Passes the commit of the sources on, for reports; `unknown` outside a checkout.
+fn commit() {
+    let git = |arguments: &[&str]| {
+        let run = std::process::Command::new("git").args(arguments).output();
+        let text = run.ok().filter(|run| run.status.success())?.stdout;
+        String::from_utf8(text)
+            .ok()
+            .map(|text| text.trim().to_owned())
+    };
+    // Each commit adds a line to it.
+    let log = git(&["rev-parse", "--git-path", "logs/HEAD"]);
+    if let Some(log) = log.filter(|log| Path::new(log).is_file()) {
+        println!("cargo::rerun-if-changed={log}");
+    }
+    let commit = git(&["rev-parse", "--short=10", "HEAD"]);
+    let commit = commit.unwrap_or_else(|| "unknown".into());
+    println!("cargo::rustc-env=MESOLUX_COMMIT={commit}");
 }
 
 fn shaders() -> Result<(), String> {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use plotters::prelude::*;
 
-use super::lines::{Canvas, Drawn, write_svg};
+use super::lines::{Canvas, Drawn, svg, write_svg};
 use crate::error::Result;
 
 /// One bar: its group, its kind, its height, and the ends of its spread.
@@ -14,6 +14,9 @@ pub struct Bar {
     pub value: f64,
     pub spread: Option<(f64, f64)>,
 }
+
+/// Share of the highest bar from which on a bar's value stands above it.
+const LABELLED: f64 = 0.01;
 
 /// A chart of bars, one group beside the other, one colour for each kind.
 pub struct Bars<'a> {
@@ -27,8 +30,19 @@ pub struct Bars<'a> {
 
 impl Bars<'_> {
     pub fn write(&self, path: &Path) -> Result<()> {
-        let width = 320 + 260 * self.groups.len().max(2) as u32;
-        write_svg(path, (width, 480), |root| self.draw(root))
+        write_svg(path, self.size(), |root| self.draw(root))
+    }
+
+    /// The chart as SVG.
+    ///
+    /// # Errors
+    /// A chart that cannot be drawn.
+    pub fn svg(&self) -> std::result::Result<String, Box<dyn std::error::Error>> {
+        svg(self.size(), |root| self.draw(root))
+    }
+
+    fn size(&self) -> (u32, u32) {
+        (320 + 260 * self.groups.len().max(2) as u32, 480)
     }
 
     fn draw(&self, root: &Canvas<'_>) -> Drawn {
@@ -77,7 +91,8 @@ impl Bars<'_> {
                 let x = left(b) + 0.45 * step;
                 Some(PathElement::new([(x, low), (x, high)], BLACK))
             }))?;
-            chart.draw_series(bars().map(|b| {
+            let large = |b: &&Bar| b.value >= LABELLED * highest;
+            chart.draw_series(bars().filter(large).map(|b| {
                 let top = b.spread.map_or(b.value, |s| s.1.max(b.value));
                 let place = (left(b), top + 0.035 * highest);
                 let digits = usize::from(b.value < 10.0);

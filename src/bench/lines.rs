@@ -32,6 +32,14 @@ impl Lines<'_> {
         write_svg(path, (820, 540), |root| self.draw(root))
     }
 
+    /// The chart as SVG.
+    ///
+    /// # Errors
+    /// A chart that cannot be drawn.
+    pub fn svg(&self) -> std::result::Result<String, Box<dyn std::error::Error>> {
+        svg((820, 540), |root| self.draw(root))
+    }
+
     fn draw(&self, root: &Canvas<'_>) -> Drawn {
         let points = || self.lines.iter().flat_map(|l| l.points.iter().copied());
         let ends = |values: &mut dyn Iterator<Item = f64>| {
@@ -99,16 +107,26 @@ pub(super) fn write_svg(
     size: (u32, u32),
     draw: impl FnOnce(&Canvas<'_>) -> Drawn,
 ) -> Result<()> {
+    let svg = svg(size, draw).map_err(|e| Error::file(path, format!("cannot be drawn: {e}")))?;
+    write_atomically(path, |out| out.write_all(svg.as_bytes()))
+}
+
+/// The same as text.
+///
+/// # Errors
+/// A chart that cannot be drawn.
+pub(super) fn svg(
+    size: (u32, u32),
+    draw: impl FnOnce(&Canvas<'_>) -> Drawn,
+) -> std::result::Result<String, Box<dyn std::error::Error>> {
     let mut svg = String::new();
-    let drawn = || -> Drawn {
+    {
         let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
         root.fill(&WHITE)?;
         draw(&root)?;
         root.present()?;
-        Ok(())
-    };
-    drawn().map_err(|e| Error::file(path, format!("cannot be drawn: {e}")))?;
-    write_atomically(path, |out| out.write_all(svg.as_bytes()))
+    }
+    Ok(svg)
 }
 
 /// A label: thousands as k, millions as M.

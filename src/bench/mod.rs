@@ -15,6 +15,7 @@ mod pixels;
 pub mod places;
 mod power_law;
 pub mod relief_room;
+pub mod report;
 pub mod scaling;
 pub mod stress;
 pub mod table1;

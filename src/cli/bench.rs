@@ -39,6 +39,9 @@ enum What {
     /// Pictures of relief against path traced geometry: relMSE, bias and HDR-FLIP by material, view
     /// and part of the light
     Pictures(super::bench_pictures::Options),
+    /// What precompute costs on each device of this machine, as a page with charts, as JSON and as
+    /// Markdown: stages, rates, error against time, relighting, Table 1, frames
+    Report(super::bench_report::Options),
     /// How time and memory of a bake grow with the number of elements, at one error bound
     Scaling(ScalingOptions),
     /// Scenes at the ends of what numbers and meshes can do: what was asked, what came out, and the
@@ -211,6 +214,7 @@ pub fn run(options: &Options) -> Result<()> {
         What::Frame(options) => run_frame(options),
         What::Irradiance(options) => run_irradiance(options),
         What::Pictures(options) => super::bench_pictures::run(options),
+        What::Report(options) => super::bench_report::run(options),
         What::Scaling(options) => run_scaling(options),
         What::Stress(options) => run_stress(options),
         What::Pareto(options) => super::pareto::run(options),

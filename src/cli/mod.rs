@@ -4,6 +4,7 @@ mod bake;
 mod bake_scene;
 mod bench;
 mod bench_pictures;
+mod bench_report;
 mod camera;
 mod compare;
 mod devices;
