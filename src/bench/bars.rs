@@ -68,6 +68,7 @@ impl Bars<'_> {
         chart
             .configure_mesh()
             .disable_x_mesh()
+            .light_line_style(WHITE)
             .x_labels(2 * count + 1)
             .x_label_formatter(&name)
             .y_desc(self.unit)
