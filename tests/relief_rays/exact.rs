@@ -101,7 +101,8 @@ fn shadows_of_a_sinusoid() {
         let shadowed = hits.iter().filter(|hit| hit.cell != NONE).count();
         let share = shadowed as f64 / f64::from(RAYS);
         println!("sinusoid at {elevation} deg: {share:.5}, exact {exact:.5}");
-        assert!((share - exact).abs() < 0.005);
+        // Measured: 2.9e-4.
+        assert!((share - exact).abs() < 6e-4);
     }
     assert_silent();
 }
