@@ -85,7 +85,7 @@ impl Options {
         let candidates = Instance::new(false)?.candidates()?;
         let able = candidates.iter().filter(|c| c.missing.is_empty());
         let devices: Vec<_> = able
-            .map(|c| open_device(Some(&c.index.to_string()), self.device.validate))
+            .map(|c| open_device(Some(&c.index.to_string()), self.device.watched()))
             .filter_map(|opened| match opened {
                 Ok(device) => {
                     tracing::info!("device: {}", device.name());

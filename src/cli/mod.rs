@@ -232,9 +232,16 @@ struct DeviceOptions {
     validate: bool,
 }
 
+/// Set to anything, the validation layer watches every run: the tests set it for those they start.
+const VALIDATE: &str = "MESOLUX_VALIDATE";
+
 impl DeviceOptions {
+    fn watched(&self) -> bool {
+        self.validate || std::env::var_os(VALIDATE).is_some()
+    }
+
     fn open(&self) -> Result<std::sync::Arc<mesolux::vk::Device>> {
-        let device = mesolux::solver::open_device(self.device.as_deref(), self.validate)?;
+        let device = mesolux::solver::open_device(self.device.as_deref(), self.watched())?;
         tracing::info!("device: {}", device.name());
         Ok(device)
     }
@@ -259,8 +266,12 @@ struct BakingDevices {
 }
 
 impl BakingDevices {
+    fn watched(&self) -> bool {
+        self.validate || std::env::var_os(VALIDATE).is_some()
+    }
+
     fn open(&self) -> Result<Vec<std::sync::Arc<mesolux::vk::Device>>> {
-        let devices = mesolux::solver::open_devices(self.device.as_deref(), self.validate)?;
+        let devices = mesolux::solver::open_devices(self.device.as_deref(), self.watched())?;
         for device in &devices {
             tracing::info!("device: {}", device.name());
         }
