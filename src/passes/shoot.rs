@@ -42,7 +42,7 @@ impl Shoot {
             parameters: Parameters {
                 first_relief: light.first_relief,
                 directions: light.directions.count() as u32,
-                unit: light.scale(),
+                unit: light.unit,
             },
             slot_count,
         })

@@ -27,7 +27,7 @@ pub const REFLECTED_SUMS: usize = 6;
 /// The sums, and what of the scene only this method reads.
 pub struct ShotLight {
     /// Units of a power of 1, internal units.
-    pub unit: f64,
+    pub unit: f32,
     /// Without relief, of 16.
     pub directions: Directions,
     /// Elements from here on have a relief: patches.
@@ -88,7 +88,7 @@ impl ShotLight {
         let shot_texels = size_of::<Shot>() as u64 / TEXEL_BYTES;
         Ok(Self {
             unit: match emitted > 0.0 {
-                true => EMITTED_UNITS / emitted,
+                true => (EMITTED_UNITS / emitted) as f32,
                 false => 1.0,
             },
             directions,
@@ -107,19 +107,9 @@ impl ShotLight {
         })
     }
 
-    /// What shaders multiply powers by.
-    pub(super) fn scale(&self) -> f32 {
-        self.unit as f32
-    }
-
     /// Radiosity or irradiance of so many units on an area, internal units.
     pub fn per_area(&self, units: u64, area: f64) -> f64 {
-        units as f64 / (self.unit_in_shaders() * area)
-    }
-
-    /// As f32 rounds it.
-    pub fn unit_in_shaders(&self) -> f64 {
-        f64::from(self.scale())
+        units as f64 / (f64::from(self.unit) * area)
     }
 }
 

@@ -33,7 +33,7 @@ impl Unshot {
             parameters: Parameters {
                 source_count: scene.source_count,
                 first_relief: light.first_relief,
-                unit: light.scale(),
+                unit: light.unit,
             },
             powers,
         })
