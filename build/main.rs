@@ -22,7 +22,7 @@ mod constants;
 type Files = BTreeMap<String, String>;
 
 fn main() {
-    for path in ["build", "src/constants.rs", "shaders"] {
+    for path in ["build", "src", "shaders"] {
         println!("cargo::rerun-if-changed={path}");
     }
     println!("cargo::rerun-if-env-changed=MESOLUX_KEEP_SPIRV");
@@ -34,7 +34,8 @@ fn main() {
     }
 }
 
-/// Passes the commit of the sources on, for reports; `unknown` outside a checkout.
+/// Passes the commit of the sources on, for reports, and whether they differ from it; `unknown`
+/// outside a checkout.
 fn commit() {
     let git = |arguments: &[&str]| {
         let run = std::process::Command::new("git").args(arguments).output();
@@ -43,6 +44,12 @@ fn commit() {
             .ok()
             .map(|text| text.trim().to_owned())
     };
+    // A package inside somebody else's checkout is none of it.
+    let is_ours = git(&["rev-parse", "--show-prefix"]).is_some_and(|prefix| prefix.is_empty());
+    if !is_ours {
+        println!("cargo::rustc-env=MESOLUX_COMMIT=unknown");
+        return;
+    }
     // Each commit adds a line to it.
     let log = git(&["rev-parse", "--git-path", "logs/HEAD"]);
     if let Some(log) = log.filter(|log| Path::new(log).is_file()) {
@@ -50,6 +57,12 @@ fn commit() {
     }
     let commit = git(&["rev-parse", "--short=10", "HEAD"]);
     let commit = commit.unwrap_or_else(|| "unknown".into());
+    let sources = ["build", "src", "shaders", "Cargo.toml", "Cargo.lock"];
+    let changed = git(&[&["status", "--porcelain", "--"][..], &sources].concat());
+    let commit = match changed.is_some_and(|changed| !changed.is_empty()) {
+        true => format!("{commit} with changes"),
+        false => commit,
+    };
     println!("cargo::rustc-env=MESOLUX_COMMIT={commit}");
 }
 

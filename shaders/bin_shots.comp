@@ -51,7 +51,8 @@ struct Power {
 
 // To the nearest unit.
 Power in_units(vec3 power) {
-    return Power(uint64_t(int64_t(power.r + 0.5)), uint64_t(int64_t(power.g + 0.5)), uint64_t(int64_t(power.b + 0.5)));
+    i64vec3 units = i64vec3(power + 0.5);
+    return Power(uint64_t(units.r), uint64_t(units.g), uint64_t(units.b));
 }
 
 #define ADD(sums, at, power) { \
@@ -114,7 +115,8 @@ void main() {
     uvec4 axis = fetch_words(shots, first + 3);
     vec3 normal = uintBitsToFloat(axis.xyz);
     vec3 local = normalize(hemicube_direction(at, face_size));
-    vec3 ray = uintBitsToFloat(turned.xyz) * local.x + uintBitsToFloat(across.xyz) * local.y + normal * local.z;
+    vec3 ray = uintBitsToFloat(turned.xyz) * local.x + uintBitsToFloat(across.xyz) * local.y
+             + normal * local.z;
     vec3 emitted = fetch(shots, first + 4).xyz;
     vec3 sent = fetch(shots, first + 5).xyz;
     if (axis.w == 1) {
@@ -141,7 +143,8 @@ void main() {
     vec4 rows = fetch(patches, PATCH_TEXELS * m + 1);
     uvec4 tangent = fetch_words(patches, PATCH_TEXELS * m + 2);
     uvec4 bitangent = fetch_words(patches, PATCH_TEXELS * m + 3);
-    vec3 from = -vec3(dot(uintBitsToFloat(tangent.xyz), ray), dot(uintBitsToFloat(bitangent.xyz), ray), dot(plane.xyz, ray));
+    vec3 from = -vec3(dot(uintBitsToFloat(tangent.xyz), ray),
+                      dot(uintBitsToFloat(bitangent.xyz), ray), dot(plane.xyz, ray));
     uint place = RECEIVED_SUMS * (m * directions + nearest(from));
     if (emits) {
         ADD(incoming, place, direct)

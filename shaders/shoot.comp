@@ -71,9 +71,10 @@ void main() {
     shot.emitted = wanted.emitted;
     shot.reflected = vec3(0.0);
     for (uint c = 0; surface && c < 3; c++) {
-        uint64_t all = relief ? reflected[REFLECTED_SUMS * m + 3 + c]
-                              : received[RECEIVED_SUMS * e + c] + received[RECEIVED_SUMS * e + 3 + c];
-        shot.reflected[c] = relief ? 0.0 : reflectance[e][c] * float(all - sent[3 * e + c]) * per_area;
+        uint at = RECEIVED_SUMS * e + c;
+        uint64_t all = relief ? reflected[REFLECTED_SUMS * m + 3 + c] : received[at] + received[at + 3];
+        float unsent = float(all - sent[3 * e + c]) * per_area;
+        shot.reflected[c] = relief ? 0.0 : reflectance[e][c] * unsent;
         sent[3 * e + c] = all;
     }
     if (relief) {

@@ -33,9 +33,10 @@ void main() {
         uint e = fetch_words(sources, SOURCE_TEXELS * s + 5).x;
         for (uint c = 0; c < 3; c++) {
             uint64_t before = sent[3 * e + c];
+            uint at = RECEIVED_SUMS * e + c;
             power[c] = e >= first_relief
                 ? float(reflected[REFLECTED_SUMS * (e - first_relief) + 3 + c] - before)
-                : reflectance[e][c] * float(received[RECEIVED_SUMS * e + c] + received[RECEIVED_SUMS * e + 3 + c] - before);
+                : reflectance[e][c] * float(received[at] + received[at + 3] - before);
         }
     }
     unshot[s] = power / unit;

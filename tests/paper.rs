@@ -10,7 +10,7 @@ use mesolux::constants::NONE;
 use mesolux::math::directions::{Directions, FineCell};
 use mesolux::mesh::elements::Elements;
 use mesolux::reference::paper::Program;
-use mesolux::solver::{Settings, Solver};
+use mesolux::solver::{Settings, Solver, StopReason};
 
 /// A room with an area light and a point light, coloured relief on four of its sides and on a box
 /// that glows.
@@ -183,6 +183,40 @@ fn the_same_bits_every_run() {
     let (a, b) = (bits(), bits());
     assert!(a.1.iter().any(|v| *v != Vec3::ZERO));
     assert_eq!(a, b);
+    assert_silent();
+}
+
+/// A closed room that absorbs nothing, solved a batch at a time as the window does: light goes to
+/// and fro for ever, and is given up before a sum overflows.
+#[test]
+fn light_that_goes_on_for_ever_is_given_up() {
+    let mut build = Build::new();
+    let white = build.material(1.0, 0.0);
+    let lamp = build.material(1.0, 1.0);
+    let sides = build.room(DVec3::ZERO, DVec3::ONE, 1, white);
+    for t in &mut build.scene.triangles[sides[0].clone()] {
+        t.material = lamp;
+    }
+    let settings = Settings {
+        hemicube: 8,
+        ..paper(16).expect("a number of the paper")
+    };
+    let mut solver = solver(&build, &settings);
+    // Measured: 1,001, a batch sending all there is.
+    let most = 2000;
+    let turns = (0..most).position(|_| {
+        let mut asked = 0;
+        let one_batch = |_: &_| {
+            asked += 1;
+            asked < 2
+        };
+        solver.turn(one_batch).expect("it runs");
+        solver.report().stop == StopReason::Unsolved
+    });
+    println!("given up after {turns:?} batches");
+    assert!(turns.is_some());
+    let light = solver.light().expect("it comes back");
+    assert!(light.irradiance.iter().all(|e| e.is_finite() && e.x > 0.0));
     assert_silent();
 }
 

@@ -291,7 +291,7 @@ struct LitTriangle {
 // A patch that shoots, as the pixels of its hemicube read it.
 struct Shot {
     vec3 eye;
-    float power;        // that a radiosity of 1 sends through the whole hemicube, in units of the sums
+    float power;        // of a radiosity of 1 through the whole hemicube, in units of the sums
     vec3 tangent;       // of the hemicube
     uint source;
     vec3 bitangent;

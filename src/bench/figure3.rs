@@ -2,21 +2,18 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use crate::bake;
 use crate::error::{Error, Result};
 use crate::picture::{Light, Picture};
 use crate::render::{Lighting, Renderer, SAMPLES, View};
 use crate::scene::{LoadOptions, load};
-use crate::solver::Settings;
+use crate::solver::{Settings, StopReason, Update};
 use crate::vk::Device;
 
 /// The rows: a point light and a bunny with relief; an area light and a horse with relief.
 const SCENES: [&str; 2] = ["bowl-and-bunny", "cornell-relief"];
-
-/// Of progress.
-const BETWEEN_LINES: Duration = Duration::from_secs(10);
 
 /// How both rows are made.
 pub struct Options {
@@ -29,13 +26,14 @@ pub struct Options {
     pub settings: Settings,
 }
 
-/// Bakes, draws, and writes one picture into `folder`: columns of direct, indirect and global light,
-/// a row a scene, each exposed by its global light. None is written where `go_on` says no.
+/// Bakes, draws, and writes one picture into `folder`: columns of direct, indirect and global
+/// light, a row a scene, each exposed by its global light. `watch` hears how far a bake is; none is written
+/// where it says no.
 pub fn run(
     device: &Arc<Device>,
     options: &Options,
     folder: &Path,
-    go_on: impl Fn() -> bool,
+    mut watch: impl FnMut(&Update) -> bool,
 ) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, e))?;
     let path = folder.join(options.name);
@@ -47,22 +45,8 @@ pub fn run(
         };
         let scene = load(name, &builtin)?;
         let start = Instant::now();
-        let mut told = Duration::ZERO;
-        let solution = bake::bake(device, &scene, &options.settings, |update| {
-            if update.elapsed >= told {
-                told = update.elapsed + BETWEEN_LINES;
-                tracing::info!(
-                    "{}, {name}: {} shots in {:.0} s, error bound {:.1} %, {:.0} s left",
-                    options.name,
-                    update.shots,
-                    update.elapsed.as_secs_f64(),
-                    100.0 * update.error_bound.unwrap_or(f64::NAN),
-                    update.left.map_or(f64::NAN, |left| left.as_secs_f64())
-                );
-            }
-            go_on()
-        })?;
-        if !go_on() {
+        let solution = bake::bake(device, &scene, &options.settings, &mut watch)?;
+        if solution.report.stop == StopReason::Interrupted {
             return Ok(());
         }
         let baked = start.elapsed().as_secs_f64();
@@ -86,7 +70,8 @@ pub fn run(
         rows.push(Picture::side_by_side(&parts)?);
         let report = &solution.report;
         println!(
-            "{}: {name}, {} elements, {} hemicubes, error bound {:.2} %, baked in {baked:.1} s, drawn in {:.1} s",
+            "{}: {name}, {} elements, {} hemicubes, error bound {:.2} %, baked in {baked:.1} s, \
+             drawn in {:.1} s",
             path.display(),
             report.elements,
             report.hemicubes,

@@ -1,7 +1,7 @@
 //! `mesolux bench table1`: the paper's Table 1, its times and frame rates beside ours.
 //!
 //! The bakes of a scene take turns of a few seconds, so that what slows the machine slows all of
-//! them. To the letter of the paper they take some hundred times as long, and follow.
+//! them. To the letter of the paper they take much longer, and follow.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

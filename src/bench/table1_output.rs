@@ -73,7 +73,8 @@ pub(super) fn ratios(scene: &[Row]) -> Vec<String> {
                 .map_or("-".into(), |(a, b)| format!("{:.2}", a / b))
         };
         Some(format!(
-            "{:<17} {:<13} K = 64 over 16: bakes {:.3}, the paper's {}; frames by clusters {}, the paper's {}",
+            "{:<17} {:<13} K = 64 over 16: bakes {:.3}, the paper's {}; frames by clusters {}, \
+             the paper's {}",
             few.scene,
             if before == PAPER {
                 "to the letter"

@@ -194,6 +194,14 @@ impl SolveOptions {
     /// The same with nothing left to the preset, to be kept beside the result.
     pub fn filled(&self) -> Result<Self> {
         let settings = self.settings()?;
+        if self.preset.is_some() {
+            // It leaves no choice of the others.
+            return Ok(Self {
+                hemicube: Some(settings.hemicube),
+                residual: Some(settings.residual),
+                ..self.clone()
+            });
+        }
         Ok(Self {
             hemicube: Some(settings.hemicube),
             emitter_hemicube: settings.emitter_shadows().face(),
@@ -503,7 +511,7 @@ fn peak_resident_bytes() -> Option<u64> {
 }
 
 /// A line on how far the solver is.
-fn progress(update: &Update) -> String {
+pub fn progress(update: &Update) -> String {
     let bound = update
         .error_bound
         .map_or("none".to_owned(), |b| format!("{:.2} %", 100.0 * b));

@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::bake::PresetName;
+use super::bake::{PresetName, progress};
 use super::bake_scene::BakeScene;
+use super::progress::{Bar, interrupted};
 use super::{Builtin, DeviceOptions};
 use mesolux::bake::quality;
 use mesolux::bake::solution::Bake;
@@ -25,8 +26,8 @@ pub struct Options {
 
 #[derive(Subcommand)]
 enum What {
-    /// The paper's Figure 3: direct, indirect and global light, of a bunny under a point light and of
-    /// a horse under an area light
+    /// The paper's Figure 3: direct, indirect and global light, of a bunny under a point light and
+    /// of a horse under an area light
     Figure3(Figure3Options),
     /// Milliseconds a frame of the three scenes, by shading of the relief, number of directions and
     /// size
@@ -66,7 +67,7 @@ struct Table1Options {
     /// Elements of each scene, for a quicker look; the paper's numbers if not given
     #[arg(long, value_name = "N")]
     patches: Option<usize>,
-    /// Also bake and draw by the paper's method to the letter: half an hour and more a bake
+    /// Also bake and draw by the paper's method to the letter: 20 to 75 minutes a bake at full size
     #[arg(long, value_enum)]
     preset: Option<PresetName>,
     /// Error bound at which a bake is done, as a share of the emitted power [default: 0.01, with
@@ -89,7 +90,7 @@ struct Figure3Options {
     /// Folder for figure3.png and figure3-paper.png
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Also by the paper's method to the letter: an hour and more at full size
+    /// Also by the paper's method to the letter: about an hour at full size
     #[arg(long, value_enum)]
     preset: Option<PresetName>,
     /// Elements of each scene, for a quicker look; the paper's numbers if not given
@@ -263,14 +264,18 @@ fn run_figure3(options: &Figure3Options) -> Result<()> {
             patches: options.patches,
             settings,
         };
-        figure3::run(&device, &wanted, &options.output, || {
-            !super::progress::interrupted()
-        })
+        let bar = Bar::new();
+        let drawn = figure3::run(&device, &wanted, &options.output, |update| {
+            bar.show(progress(update));
+            !interrupted()
+        });
+        bar.finish();
+        drawn
     };
     let mut ours = Settings::default();
     ours.relief.cache = super::bake::cache_folder();
     draw("figure3.png", ours)?;
-    if options.preset.is_some() && !super::progress::interrupted() {
+    if options.preset.is_some() && !interrupted() {
         draw("figure3-paper.png", quality::paper(64)?)?;
     }
     options.device.check()

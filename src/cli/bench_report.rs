@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use clap::Args;
 
-use super::DeviceOptions;
 use super::progress::{catch_interrupts, interrupted};
+use super::{DeviceOptions, watched};
 use mesolux::bench::report::{self, Form, Report};
 use mesolux::error::{Error, Result};
 use mesolux::solver::open_device;
@@ -17,7 +17,7 @@ pub struct Options {
     /// Folder for report.html, report.json and report.md
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// The sizes of the paper, and more runs: an hour on a software device
+    /// The sizes of the paper, and more runs; takes longer
     #[arg(long)]
     full: bool,
     /// Elements of the Cornell box and of the scenes of Table 1, in place of those of the form
@@ -85,7 +85,7 @@ impl Options {
         let candidates = Instance::new(false)?.candidates()?;
         let able = candidates.iter().filter(|c| c.missing.is_empty());
         let devices: Vec<_> = able
-            .map(|c| open_device(Some(&c.index.to_string()), self.device.watched()))
+            .map(|c| open_device(Some(&c.index.to_string()), watched(self.device.validate)))
             .filter_map(|opened| match opened {
                 Ok(device) => {
                     tracing::info!("device: {}", device.name());

@@ -235,13 +235,13 @@ struct DeviceOptions {
 /// Set to anything, the validation layer watches every run: the tests set it for those they start.
 const VALIDATE: &str = "MESOLUX_VALIDATE";
 
-impl DeviceOptions {
-    fn watched(&self) -> bool {
-        self.validate || std::env::var_os(VALIDATE).is_some()
-    }
+fn watched(asked: bool) -> bool {
+    asked || std::env::var_os(VALIDATE).is_some()
+}
 
+impl DeviceOptions {
     fn open(&self) -> Result<std::sync::Arc<mesolux::vk::Device>> {
-        let device = mesolux::solver::open_device(self.device.as_deref(), self.watched())?;
+        let device = mesolux::solver::open_device(self.device.as_deref(), watched(self.validate))?;
         tracing::info!("device: {}", device.name());
         Ok(device)
     }
@@ -266,12 +266,9 @@ struct BakingDevices {
 }
 
 impl BakingDevices {
-    fn watched(&self) -> bool {
-        self.validate || std::env::var_os(VALIDATE).is_some()
-    }
-
     fn open(&self) -> Result<Vec<std::sync::Arc<mesolux::vk::Device>>> {
-        let devices = mesolux::solver::open_devices(self.device.as_deref(), self.watched())?;
+        let devices =
+            mesolux::solver::open_devices(self.device.as_deref(), watched(self.validate))?;
         for device in &devices {
             tracing::info!("device: {}", device.name());
         }

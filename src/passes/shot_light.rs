@@ -19,6 +19,9 @@ pub const MOST_DIRECTIONS: usize = 64;
 /// Units of the emitted power: patches send no more than 2¹³ times that before a sum overflows.
 const EMITTED_UNITS: f64 = (1_u64 << 50) as f64;
 
+/// Units of a power of 1, at most: of fainter scenes sums are coarser.
+const MOST_UNITS: f64 = 1e30;
+
 /// Sums of direct and indirect light, RGB each.
 pub const RECEIVED_SUMS: usize = 6;
 /// All that texels reflect and the share that leaves, RGB each.
@@ -88,7 +91,7 @@ impl ShotLight {
         let shot_texels = size_of::<Shot>() as u64 / TEXEL_BYTES;
         Ok(Self {
             unit: match emitted > 0.0 {
-                true => (EMITTED_UNITS / emitted) as f32,
+                true => (EMITTED_UNITS / emitted).min(MOST_UNITS) as f32,
                 false => 1.0,
             },
             directions,

@@ -16,7 +16,6 @@ use crate::error::Result;
 use crate::mesh::sources::Source;
 use crate::passes::batch::Batch;
 use crate::passes::bin_shots::BinShots;
-use crate::passes::buffers::download;
 use crate::passes::shoot::Shoot;
 use crate::passes::shot_light::ShotLight;
 use crate::passes::types::Slot;
@@ -26,7 +25,8 @@ use crate::vk::{Buffer, BufferUse, Commands, Device, Stage, Timestamps};
 pub(super) struct Shots {
     device: Arc<Device>,
     measuring: Commands,
-    unshot: Unshot,
+    /// [`Unshot::powers`].
+    readback: Buffer,
     /// Reflected and not sent, as measured last, RGB, internal units, `[source]`.
     reflected: Vec<Vec3>,
     /// Emitted power that waits to be sent, `[source]`.
@@ -34,6 +34,8 @@ pub(super) struct Shots {
     light: ShotLight,
     batch: ShotBatch,
     bound: Bound,
+    /// Power that has been sent, internal units.
+    sent: f64,
 }
 
 /// Over the power of the strongest patch of a batch, that of the weakest, at least.
@@ -50,27 +52,32 @@ impl Shots {
         let power: f64 = on.sources.list.iter().map(Source::emitted_power).sum();
         let light = ShotLight::new(device, &on.elements, power, on.slots)?;
         let unshot = Unshot::new(device, &on.scene, &light)?;
+        let bytes = unshot.powers.bytes();
+        let readback = Buffer::new(device, "unshot readback", bytes, BufferUse::Readback)?;
         let measuring = Commands::record(device, "unshot", |cmd| {
             cmd.barrier(&[Stage::Compute, Stage::Transfer], &[Stage::Compute]);
             unshot.record(cmd);
+            cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
+            cmd.copy(&unshot.powers, 0, &readback, 0, bytes);
+            cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
             Ok(())
         })?;
         Ok(Self {
             device: Arc::clone(device),
             measuring,
-            unshot,
+            readback,
             reflected: vec![Vec3::ZERO; on.sources.list.len()],
             emitted: on.sources.list.iter().map(emitted).collect(),
             batch: ShotBatch::new(device, on, &light)?,
             light,
             bound,
+            sent: 0.0,
         })
     }
 
     /// Shoots until little is left or the watch says stop.
     pub fn run(&mut self, on: &Problem, report: &mut Report, watch: &mut Watch<'_>) -> Result<()> {
         let limit = on.settings.shots.unwrap_or(u32::MAX);
-        let mut sent = 0.0;
         loop {
             self.measure()?;
             let left = self.left();
@@ -85,7 +92,7 @@ impl Shots {
                 watch.stop = Some(StopReason::Shots);
                 return Ok(());
             }
-            if self.bound.share(sent) > MOST_SENT {
+            if self.bound.share(self.sent) > MOST_SENT {
                 tracing::warn!(
                     "the scene absorbs no light: what is emitted goes to and fro for ever"
                 );
@@ -95,7 +102,7 @@ impl Shots {
             let most = (self.batch.slot_count()).min((limit - report.shots) as usize);
             let slots: Vec<Slot> = (self.strongest(most).into_iter())
                 .map(|s| {
-                    sent += self.power(s);
+                    self.sent += self.power(s);
                     let emits = std::mem::take(&mut self.emitted[s]) != DVec3::ZERO;
                     Slot {
                         emitted: match emits {
@@ -134,7 +141,7 @@ impl Shots {
     fn measure(&mut self) -> Result<()> {
         self.measuring.submit()?;
         self.measuring.wait()?;
-        self.reflected = download(&self.device, &self.unshot.powers, self.reflected.len())?;
+        self.reflected = self.readback.read(0, self.reflected.len());
         Ok(())
     }
 

@@ -157,15 +157,8 @@ impl Measure {
 
     /// Whether it is of the same thing.
     pub fn is_as(&self, other: &Self) -> bool {
-        let key = |m: &Self| {
-            (
-                m.section,
-                m.what.clone(),
-                m.quantity.clone(),
-                m.unit.clone(),
-            )
-        };
-        key(self) == key(other)
+        (self.section == other.section && self.what == other.what)
+            && (self.quantity == other.quantity && self.unit == other.unit)
     }
 }
 

@@ -11,7 +11,8 @@ const STYLE: &str = "
 body { font: 15px/1.5 system-ui, sans-serif; color: #222; background: #fff; margin: 2rem auto;
   max-width: 70rem; padding: 0 1.5rem; }
 h1 { font-size: 1.6rem; margin-bottom: .2rem; }
-h2 { font-size: 1.25rem; margin-top: 2.5rem; border-bottom: 2px solid #084594; padding-bottom: .2rem; }
+h2 { font-size: 1.25rem; margin-top: 2.5rem; padding-bottom: .2rem;
+  border-bottom: 2px solid #084594; }
 h3 { font-size: 1.05rem; margin: 2rem 0 .3rem; }
 p { margin: .3rem 0 .8rem; max-width: 48rem; }
 dl { display: grid; grid-template-columns: max-content 1fr; gap: .1rem 1.2rem; margin: 1rem 0; }
@@ -37,11 +38,12 @@ pub fn html(
     let mut out = String::new();
     writeln!(
         out,
-        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
-         content=\"width=device-width\">\n<title>Mesolux benchmark</title>\n<style>{STYLE}</style>\n\
-         </head>\n<body>\n<h1>Mesolux benchmark</h1>\n<p>What precomputed global illumination costs on \
-         this machine, and how exact it is. All figures are in <a href=\"report.json\">report.json</a>.\
-         </p>"
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width\">\n\
+         <title>Mesolux benchmark</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
+         <h1>Mesolux benchmark</h1>\n<p>What precomputed global illumination costs on this \
+         machine, and how exact it is. All figures are in \
+         <a href=\"report.json\">report.json</a>.</p>"
     )?;
     writeln!(out, "<dl>")?;
     for (name, value) in provenance(report) {

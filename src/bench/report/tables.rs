@@ -18,8 +18,8 @@ const CHAPTERS: [(Section, &str, &str); 6] = [
     (
         Section::Stages,
         "Bakes of the Cornell box by stage",
-        "Seconds of whole bakes without reading the scene, and of their stages. Stages from culling to \
-         keeping are timed by the device's own clock; they overlap with work of the CPU.",
+        "Seconds of whole bakes without reading the scene, and of their stages. Stages from \
+         culling to keeping are timed by the device's own clock; they overlap with work of the CPU.",
     ),
     (
         Section::Rates,
@@ -29,8 +29,8 @@ const CHAPTERS: [(Section, &str, &str); 6] = [
     (
         Section::Error,
         "Error against time",
-        "Irradiance against path traced irradiance, over its mean; beside it the 95 % interval over the \
-         places. Noise of the paths is taken out; 0 is an error that it hides.",
+        "Irradiance against path traced irradiance, over its mean; beside it the 95 % interval \
+         over the places. Noise of the paths is taken out; 0 is an error that it hides.",
     ),
     (
         Section::Relight,
@@ -40,8 +40,9 @@ const CHAPTERS: [(Section, &str, &str); 6] = [
     (
         Section::Table1,
         "Table 1: bakes",
-        "Whole bakes of the paper's three scenes (stand-ins for its models) at --quality draft: flat, and \
-         with relief in 16 and in 64 directions. Visibility of the relief is computed each time.",
+        "Whole bakes of the paper's three scenes (stand-ins for its models) at --quality draft: \
+         flat, and with relief in 16 and in 64 directions. Visibility of the relief is computed \
+         each time.",
     ),
     (
         Section::Frames,
