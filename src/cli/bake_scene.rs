@@ -10,7 +10,7 @@ use mesolux::error::{Error, Result};
 use mesolux::scene::{OnInput, Scene};
 
 /// Where the scene of a bake lies.
-#[derive(Args, Clone)]
+#[derive(Args, Clone, Default)]
 pub struct BakeScene {
     /// The scene of a BAKE, if it has moved; of a built-in scene, the statue's file
     #[arg(long = "scene", value_name = "FILE")]

@@ -6,7 +6,7 @@ use glam::DVec3;
 use mesolux::error::{Error, Result};
 use mesolux::scene::{Camera, Scene};
 
-#[derive(Args)]
+#[derive(Args, Default)]
 pub struct CameraOptions {
     /// A camera of the scene, by name; the first one if not given
     #[arg(long, value_name = "NAME")]

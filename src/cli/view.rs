@@ -1,6 +1,8 @@
 //! `mesolux view`.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use clap::Args;
@@ -10,10 +12,12 @@ use super::bake_scene::BakeScene;
 use super::camera::CameraOptions;
 use super::render::size;
 use super::{Builtin, DeviceOptions};
+use mesolux::bake::quality::Quality;
 use mesolux::bake::solution::Bake;
 use mesolux::error::{Error, Result};
+use mesolux::scene::builtin;
 use mesolux::solver::Visibility;
-use mesolux::view::{self, DeviceChoice, Step};
+use mesolux::view::{self, DeviceChoice, Opened, Session, Step};
 use mesolux::vk;
 
 /// Show a scene in a window while it bakes, or a bake
@@ -25,7 +29,7 @@ use mesolux::vk;
 #[derive(Args)]
 pub struct Options {
     /// A scene (see `bake`) or a bake (.safetensors)
-    #[arg(value_name = "SCENE|BAKE")]
+    #[arg(value_name = "SCENE|BAKE", default_value = "cornell")]
     input: String,
     /// Pixels across and down
     #[arg(long, value_name = "WxH", default_value = "1024x640", value_parser = size)]
@@ -43,7 +47,7 @@ pub struct Options {
     /// Do what a script says, one step a line, then close: move X Y, press|release
     /// left|middle|right, wheel N, key NAME [down|up], see front|right|top, resize W H, minimise,
     /// restore W H, set SWITCH VALUE, set lamp NAME colour|strength|position N..., frames N, wait
-    /// SECONDS, bake, relit, detail, overlays, screenshot FILE, save FILE, lose-surface, close
+    /// SECONDS, open SCENE|BAKE, bake, relit, detail, overlays, screenshot FILE, save FILE, lose-surface, close
     #[arg(long, value_name = "FILE")]
     script: Option<PathBuf>,
     #[command(flatten)]
@@ -83,6 +87,69 @@ impl Options {
     }
 }
 
+/// How scenes of the window are read.
+struct Reader {
+    builtin: Builtin,
+    bake_scene: BakeScene,
+    quality: Quality,
+}
+
+impl Reader {
+    fn open(&self, input: &str) -> Result<Opened> {
+        let path = Path::new(input);
+        let is_bake = path
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("safetensors"));
+        let (scene, bake, kept) = if is_bake {
+            let bake = Bake::load(path)?;
+            let scene = self.bake_scene.of(path, &bake)?;
+            let beside = beside(path);
+            let kept = match beside.is_file() {
+                true => Some(Visibility::load(&beside)?),
+                false => None,
+            };
+            (scene, Some(bake), kept)
+        } else {
+            self.bake_scene.refuse(input)?;
+            (self.builtin.load_for(self.quality, input)?, None, None)
+        };
+        let camera = CameraOptions::default().of(&scene)?;
+        Ok(Opened {
+            name: input.to_owned(),
+            scene,
+            bake,
+            kept,
+            camera,
+        })
+    }
+}
+
+/// Folder of scenes that ship with the program, in the working directory.
+const ASSETS: &str = "assets";
+/// Name of a scene's file in its folder.
+const SCENE: &str = "scene.toml";
+
+/// Scenes that the window offers: `input`, the built-in ones, those in `assets`, and those beside
+/// `input`.
+fn offered(input: &str) -> Vec<String> {
+    let mut offered = vec![input.to_owned()];
+    offered.extend(builtin::NAMES.map(str::to_owned));
+    let shown = Path::new(input);
+    let beside = shown.parent().and_then(Path::parent);
+    let beside = beside.filter(|_| shown.file_name().is_some_and(|name| name == SCENE));
+    let folders = [Some(Path::new(ASSETS)), beside];
+    for folder in folders.into_iter().flatten() {
+        let found = std::fs::read_dir(folder).into_iter().flatten().flatten();
+        let scenes = found.map(|entry| entry.path().join(SCENE));
+        let mut scenes: Vec<_> = scenes.filter(|path| path.is_file()).collect();
+        scenes.sort();
+        offered.extend(scenes.iter().map(|path| path.display().to_string()));
+    }
+    let mut seen = HashSet::new();
+    offered.retain(|name| seen.insert(name.clone()));
+    offered
+}
+
 pub fn run(options: &Options, start: Instant) -> Result<()> {
     let script = options.steps()?;
     let (width, height) = options.size;
@@ -93,34 +160,32 @@ pub fn run(options: &Options, start: Instant) -> Result<()> {
     }
     let settings = options.solve.settings()?;
     settings.check()?;
-    let path = Path::new(&options.input);
-    let is_bake = path
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("safetensors"));
-    let (scene, bake, kept) = if is_bake {
-        let bake = Bake::load(path)?;
-        let scene = options.bake_scene.of(path, &bake)?;
-        let beside = beside(path);
-        let kept = match beside.is_file() {
-            true => Some(Visibility::load(&beside)?),
-            false => None,
-        };
-        (scene, Some(bake), kept)
-    } else {
-        options.bake_scene.refuse(&options.input)?;
-        let quality = options.solve.quality();
-        let scene = options.builtin.load_for(quality, &options.input)?;
-        (scene, None, None)
+    let reader = Reader {
+        builtin: options.builtin.clone(),
+        bake_scene: options.bake_scene.clone(),
+        quality: options.solve.quality(),
     };
-    let camera = options.camera.of(&scene)?;
+    let mut opened = reader.open(&options.input)?;
+    opened.camera = options.camera.of(&opened.scene)?;
+    // Those of the scene that was given.
+    let reader = Reader {
+        builtin: Builtin {
+            statue: None,
+            patches: None,
+            ..reader.builtin
+        },
+        bake_scene: BakeScene::default(),
+        ..reader
+    };
     let lines = view::run(view::Options {
-        scene,
-        bake,
-        kept,
-        settings,
-        camera,
+        opened,
+        session: Session {
+            settings,
+            device: DeviceChoice::new(options.device.device.clone(), options.device.validate),
+            offered: offered(&options.input).into(),
+            open: Arc::new(move |name| reader.open(name)),
+        },
         size: options.size,
-        device: DeviceChoice::new(options.device.device.clone(), options.device.validate),
         script,
         start,
     })?;

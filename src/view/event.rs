@@ -35,6 +35,8 @@ pub enum Event {
     Scale(f32),
     /// Whether the window has the keyboard.
     Focus(bool),
+    /// A scene or a bake that was dropped on the window: its path.
+    Dropped(String),
     Close,
 }
 

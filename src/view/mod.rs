@@ -51,21 +51,41 @@ pub use window::run;
 
 /// Options of the window.
 pub struct Options {
-    pub scene: Scene,
-    /// A solution; None bakes the scene.
-    pub bake: Option<Bake>,
-    /// Visibility kept with the solution, for relighting.
-    pub kept: Option<Visibility>,
-    pub settings: Settings,
-    pub camera: Camera,
+    pub opened: Opened,
+    pub session: Session,
     /// Pixels across and down.
     pub size: (u32, u32),
-    pub device: DeviceChoice,
     /// Steps done in place of the user; the window closes at their end.
     pub script: Option<Vec<Step>>,
     /// When the program started.
     pub start: Instant,
 }
+
+/// A scene, read for the window.
+pub struct Opened {
+    /// What [`Session::open`] takes for it.
+    pub name: String,
+    pub scene: Scene,
+    /// A solution; None bakes the scene.
+    pub bake: Option<Bake>,
+    /// Visibility kept with the solution, for relighting.
+    pub kept: Option<Visibility>,
+    pub camera: Camera,
+}
+
+/// What stays while one scene of a window follows another.
+#[derive(Clone)]
+pub struct Session {
+    pub settings: Settings,
+    pub device: DeviceChoice,
+    /// Scenes that the panel offers, by what `open` takes.
+    pub offered: Arc<[String]>,
+    /// Reads a scene or a bake: a name of `offered`, or a file dropped on the window.
+    pub open: Open,
+}
+
+/// Reads a scene by its name or path.
+pub type Open = Arc<dyn Fn(&str) -> Result<Opened> + Send + Sync>;
 
 /// Tells the window that there is something new.
 type Wake = Arc<dyn Fn() + Send + Sync>;

@@ -25,6 +25,9 @@ pub struct Status<'a> {
     pub detail: Option<f64>,
     pub has_relief: bool,
     pub messages: &'a [String],
+    /// Scenes to choose from, and the one that is being read.
+    pub offered: &'a [String],
+    pub opening: Option<&'a str>,
     /// Error bounds of the bake: `[seconds, bound]`.
     pub bounds: &'a [[f64; 2]],
     /// The element under the cursor, or the one that was clicked.
@@ -53,6 +56,8 @@ pub enum Asked {
     Bake,
     /// Lights the scene by the lamps as they are now.
     Relight,
+    /// Shows another scene, an index of [`Status::offered`].
+    Open(usize),
 }
 
 const ERROR: Color32 = Color32::from_rgb(255, 120, 100);
@@ -67,6 +72,7 @@ pub fn show(context: &egui::Context, status: &Status<'_>, changed: &mut Changed<
         .fade_in(false)
         .vscroll(true)
         .show(context, |ui| {
+            scenes(ui, status, &mut asked);
             show_status(ui, status);
             ui.separator();
             light(ui, changed.switches);
@@ -93,8 +99,26 @@ pub fn show(context: &egui::Context, status: &Status<'_>, changed: &mut Changed<
     asked
 }
 
+fn scenes(ui: &mut Ui, status: &Status<'_>, asked: &mut Vec<Asked>) {
+    ComboBox::from_id_salt("scene")
+        .width(ui.available_width())
+        .selected_text(status.scene)
+        .show_ui(ui, |ui| {
+            for (i, name) in status.offered.iter().enumerate() {
+                if ui.selectable_label(name == status.scene, name).clicked() {
+                    asked.push(Asked::Open(i));
+                }
+            }
+        })
+        .response
+        .on_hover_text("scenes to show; a file can be dropped on the window");
+    if let Some(opening) = status.opening {
+        ui.label(format!("reading {opening}"));
+    }
+}
+
 fn show_status(ui: &mut Ui, status: &Status<'_>) {
-    ui.label(format!("{}: {} triangles", status.scene, status.triangles));
+    ui.label(format!("{} triangles", status.triangles));
     ui.label(RichText::new(status.device).small().weak());
     let frame = status
         .frame

@@ -86,6 +86,12 @@ impl Runner {
                 Step::Relit => viewer.edited.is_none(),
                 Step::Detail => viewer.is_detailed(),
                 Step::Overlays => viewer.has_overlays(),
+                Step::Open(name) => {
+                    if first {
+                        viewer.open(name.clone());
+                    }
+                    viewer.opening.is_none()
+                }
                 Step::Wait(seconds) => self.since.elapsed().as_secs_f64() >= *seconds,
                 Step::Set(words) => {
                     set(viewer, words)?;

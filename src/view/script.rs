@@ -24,6 +24,8 @@ pub enum Step {
     Detail,
     /// Waits until the sources and the item buffer have arrived, if they are to be shown.
     Overlays,
+    /// Shows another scene or bake, in place of the one shown.
+    Open(String),
     /// Waits this many seconds.
     Wait(f64),
     /// Sets a switch, or a property of a light.
@@ -110,6 +112,7 @@ fn parse(words: &[&str]) -> Option<Vec<Step>> {
         ["close"] => one(Event::Close),
         ["resize", width, height] => Some(vec![Step::Resize(pixels(width)?, pixels(height)?)]),
         ["frames", count] => Some(vec![Step::Frames(count.parse().ok()?)]),
+        ["open", ref name @ ..] if !name.is_empty() => Some(vec![Step::Open(name.join(" "))]),
         ["bake"] => Some(vec![Step::Bake]),
         ["relit"] => Some(vec![Step::Relit]),
         ["detail"] => Some(vec![Step::Detail]),

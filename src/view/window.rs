@@ -1,6 +1,8 @@
 //! The window: events of the system in, frames out.
 
 use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Instant;
 
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
@@ -14,7 +16,7 @@ use glam::DVec3;
 use super::event::{Event, Key, Modifiers, PointerButton};
 use super::runner::Runner;
 use super::viewer::Viewer;
-use super::{Options, Wake, calm_workers};
+use super::{Opened, Options, Session, Wake, background, calm_workers};
 use crate::error::{Error, Result};
 
 /// Another thread has a new result.
@@ -32,16 +34,17 @@ pub fn run(options: Options) -> Result<Vec<String>> {
         .map_err(|e| Error::Display(format!("no display to open a window on: {}", line(&e))))?;
     let mut app = App {
         proxy: events.create_proxy(),
-        title: format!("Mesolux: {}", options.scene.name),
         size: options.size,
-        runner: options.script.clone().map(Runner::new),
-        options: Some(options),
+        runner: options.script.map(Runner::new),
+        session: options.session,
+        first: Some((options.opened, options.start)),
+        reading: None,
         open: None,
         lines: Vec::new(),
         error: None,
     };
     let ran = events.run_app(&mut app);
-    app.close();
+    drop(app.close());
     match (app.error, ran) {
         (Some(error), _) => Err(error),
         (None, Err(e)) => Err(Error::Display(format!("the window failed: {}", line(&e)))),
@@ -60,11 +63,13 @@ fn line(error: &impl std::fmt::Display) -> String {
 
 struct App {
     proxy: EventLoopProxy<Woken>,
-    title: String,
     size: (u32, u32),
-    /// Kept until the window is open.
-    options: Option<Options>,
+    session: Session,
+    /// Kept until the window is open, with the time at which the program started.
+    first: Option<(Opened, Instant)>,
     runner: Option<Runner>,
+    /// The scene that is to be shown next, while another thread reads it, and when it was asked for.
+    reading: Option<(Receiver<Result<Opened>>, Instant)>,
     open: Option<(Viewer, Arc<Window>)>,
     lines: Vec<String>,
     error: Option<Error>,
@@ -72,31 +77,81 @@ struct App {
 
 impl App {
     fn open(&mut self, events: &ActiveEventLoop) -> Result<()> {
-        let Some(options) = self.options.take() else {
+        let Some((first, start)) = self.first.take() else {
             return Ok(());
         };
         let attributes = Window::default_attributes()
-            .with_title(self.title.clone())
             .with_inner_size(PhysicalSize::new(self.size.0, self.size.1));
         let window = events
             .create_window(attributes)
             .map_err(|e| Error::Display(format!("no window: {}", line(&e))))?;
-        let window = Arc::new(window);
+        self.show(first, Arc::new(window), start)
+    }
+
+    fn wake(&self) -> Wake {
         let proxy = self.proxy.clone();
-        let wake: Wake = Arc::new(move || {
+        Arc::new(move || {
             // A closed window needs no wake-up.
             let _ = proxy.send_event(Woken);
-        });
+        })
+    }
+
+    /// Shows a scene that was asked for at `start`, in a window that shows no other.
+    fn show(&mut self, opened: Opened, window: Arc<Window>, start: Instant) -> Result<()> {
+        window.set_title(&format!("Mesolux: {}", opened.scene.name));
         let PhysicalSize { width, height } = window.inner_size();
-        let mut viewer = Viewer::new(options, &window, (width, height), wake)?;
+        let (session, wake) = (&self.session, self.wake());
+        let mut viewer = Viewer::new(opened, session, &window, (width, height), start, wake)?;
         viewer.scale = window.scale_factor() as f32;
         viewer.input.scripted = self.runner.is_some();
         self.open = Some((viewer, window));
         Ok(())
     }
 
+    /// Has the chosen scene read, and shows it in place of the present one once that is done.
+    fn open_chosen(&mut self) -> Result<()> {
+        let wake = self.wake();
+        let Some((viewer, _)) = &mut self.open else {
+            return Ok(());
+        };
+        let Some(name) = viewer.opening.clone() else {
+            return Ok(());
+        };
+        let Some((reading, since)) = &self.reading else {
+            let (sender, receiver) = channel();
+            let open = Arc::clone(&self.session.open);
+            background("scene", move || {
+                // A window that was closed meanwhile wants no scene.
+                let _ = sender.send(open(&name));
+                wake();
+            });
+            self.reading = Some((receiver, Instant::now()));
+            return Ok(());
+        };
+        let Ok(read) = reading.try_recv() else {
+            return Ok(());
+        };
+        let since = *since;
+        self.reading = None;
+        viewer.opening = None;
+        match read {
+            Err(error) => viewer.fail(error),
+            Ok(opened) => {
+                let switches = viewer.switches.clone();
+                if let Some(window) = self.close() {
+                    self.show(opened, window, since)?;
+                }
+                if let Some((viewer, _)) = &mut self.open {
+                    viewer.switches = switches;
+                }
+                Ok(())
+            }
+        }
+    }
+
     /// Draws a frame if one is due, and schedules the next.
     fn go_on(&mut self, events: &ActiveEventLoop) -> Result<()> {
+        self.open_chosen()?;
         let Some((viewer, window)) = &mut self.open else {
             return Ok(());
         };
@@ -132,13 +187,12 @@ impl App {
         Ok(())
     }
 
-    /// Closes the window: everything on the devices is freed before it.
-    fn close(&mut self) {
-        if let Some((viewer, window)) = self.open.take() {
-            self.lines = viewer.timing.lines();
-            drop(viewer);
-            drop(window);
-        }
+    /// Frees everything on the devices; returns the window, which may be closed then.
+    fn close(&mut self) -> Option<Arc<Window>> {
+        let (viewer, window) = self.open.take()?;
+        self.lines.extend(viewer.timing.lines());
+        drop(viewer);
+        Some(window)
     }
 
     fn stop_on_error(&mut self, events: &ActiveEventLoop, done: Result<()>) {
@@ -205,6 +259,7 @@ fn translated(event: WindowEvent) -> Vec<Event> {
             x: position.x as f32,
             y: position.y as f32,
         }],
+        WindowEvent::DroppedFile(path) => vec![Event::Dropped(path.display().to_string())],
         WindowEvent::CursorLeft { .. } => vec![Event::PointerGone],
         WindowEvent::MouseInput { state, button, .. } => {
             let button = match button {

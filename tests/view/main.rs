@@ -98,6 +98,29 @@ fn the_detailed_picture_is_that_of_render() {
     assert!(detail != slots, "light points are sharper than elements");
 }
 
+/// Another scene takes the place of the first: by a script, and by the panel's menu, which offers
+/// the scene that the window was opened with first.
+#[test]
+fn another_scene_is_opened() {
+    let room = Room::new();
+    let script = "set detail off\nframes 2\nbake\nset panel off\nscreenshot first.png
+         open relief.toml\nbake\nscreenshot relief.png
+         set panel on\nframes 3\nmove 120 58\nframes 2\npress left\nrelease left\nframes 3
+         screenshot menu.png\nmove 60 83\nframes 2\npress left\nrelease left\nframes 3
+         wait 1\nbake\nset panel off\nscreenshot again.png";
+    let text = view_in("640x480", room.path(), "room.toml", script);
+    let lines = text.matches("first picture with light after").count();
+    assert_eq!(lines, 3, "one for each scene: {text}");
+    let [first, relief, again] =
+        ["first.png", "relief.png", "again.png"].map(|name| room.picture(name));
+    let found = difference(&first, &relief);
+    println!("relief changes codes by {found:.3} in the mean");
+    assert!(found > 0.05);
+    // Measured: 0, once 9e-4.
+    let found = difference(&first, &again);
+    assert!(found < 2e-3, "{found}");
+}
+
 /// A part of a picture: left, top, width, height.
 fn part(picture: &RgbImage, [left, top, width, height]: [u32; 4]) -> RgbImage {
     image::imageops::crop_imm(picture, left, top, width, height).to_image()

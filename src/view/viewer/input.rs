@@ -132,7 +132,7 @@ impl Viewer {
                 }
             }
             Event::See(side) => self.see(side),
-            Event::Resized { .. } | Event::Scale(_) | Event::Close => {}
+            Event::Resized { .. } | Event::Scale(_) | Event::Dropped(_) | Event::Close => {}
         }
     }
 

@@ -88,6 +88,7 @@ impl Viewer {
                 Asked::Save => self.save(None),
                 Asked::Bake => self.bake(),
                 Asked::Relight => self.relight(),
+                Asked::Open(i) => self.open(self.offered[i].clone()),
             }
         }
         self.panel_pass.update(&output.textures_delta)?;
@@ -107,7 +108,7 @@ impl Viewer {
         let marked = marked(&self.input);
         let device = self.screen.device().name().to_owned();
         let status = Status {
-            scene: &self.scene.name,
+            scene: &self.name,
             triangles: self.scene.triangles.len(),
             device: &device,
             cameras: &cameras,
@@ -118,6 +119,8 @@ impl Viewer {
             detail: self.shown_detail().map(|drawn| drawn.seconds),
             has_relief: self.base.materials.iter().any(|m| m.has_relief()),
             messages: &self.messages,
+            offered: &self.offered,
+            opening: self.opening.as_deref(),
             bounds: &self.bounds,
             element: marked.map(|e| self.describe(e)),
         };

@@ -26,7 +26,7 @@ use super::snapshot::{Progress, Snapshot};
 use super::surface_pass::SurfacePass;
 use super::switches::Switches;
 use super::timing::Timing;
-use super::{Options, Wake};
+use super::{Opened, Session, Wake};
 use crate::error::Result;
 use crate::render::Light;
 use crate::scene::{Camera, Scene};
@@ -72,6 +72,12 @@ pub struct Viewer {
     lights: u64,
     pictures: Pictures,
     messages: Vec<String>,
+    /// The scene that is shown, as [`Session::open`] takes it.
+    name: String,
+    /// Scenes that the panel offers.
+    offered: Arc<[String]>,
+    /// The scene that is to replace this one.
+    pub(super) opening: Option<String>,
     /// Paths of pictures that are being saved.
     pub(super) saving: Vec<PathBuf>,
 
@@ -109,21 +115,23 @@ impl Viewer {
     /// # Errors
     /// A display or a device that fails; a scene that does not fit the device.
     pub fn new(
-        options: Options,
+        opened: Opened,
+        session: &Session,
         window: &Arc<Window>,
         size: (u32, u32),
+        start: Instant,
         wake: Wake,
     ) -> Result<Self> {
-        let Options {
+        let Opened {
+            name,
             scene: base,
             bake,
             kept,
-            settings,
             camera,
-            device,
-            start,
-            ..
-        } = options;
+        } = opened;
+        let Session {
+            settings, device, ..
+        } = session.clone();
         let screen = Screen::new(window, size, &device)?;
         let scene = Arc::new(base.clone());
         let surfaces = SurfacePass::new(screen.device(), screen.pass(), &scene)?;
@@ -174,6 +182,9 @@ impl Viewer {
             snapshot,
             pictures: Pictures::default(),
             messages: Vec::new(),
+            offered: Arc::clone(&session.offered),
+            name,
+            opening: None,
             saving: Vec::new(),
             egui,
             input: Input::default(),
@@ -264,6 +275,7 @@ impl Viewer {
                 self.size = (width, height);
             }
             Event::Scale(scale) => self.scale = scale,
+            Event::Dropped(path) => self.open(path),
             other => self.take_input(other),
         }
     }
@@ -311,6 +323,12 @@ impl Viewer {
             scene: Arc::clone(&self.scene),
             epoch: self.epoch,
         });
+    }
+
+    /// Asks the window for another scene, by what [`Session::open`] takes.
+    pub(super) fn open(&mut self, name: String) {
+        self.opening = Some(name);
+        self.dirty = true;
     }
 
     fn start_epoch(&mut self) {

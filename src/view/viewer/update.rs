@@ -75,7 +75,7 @@ impl Viewer {
     }
 
     /// Shows an error to the user; a script ends with it.
-    fn fail(&mut self, error: Error) -> Result<()> {
+    pub(in crate::view) fn fail(&mut self, error: Error) -> Result<()> {
         match self.input.scripted {
             true => Err(error),
             false => {
