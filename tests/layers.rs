@@ -13,7 +13,7 @@ const LAYERS: [&[&str]; 10] = [
     &["passes", "reference"],
     &["solver"],
     &["bake"],
-    &["render"],
+    &["export", "render"],
     &["bench", "view"],
 ];
 

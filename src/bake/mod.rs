@@ -2,6 +2,7 @@
 
 pub mod cache;
 pub mod discretisation;
+pub mod lit_scene;
 pub mod quality;
 pub mod solution;
 

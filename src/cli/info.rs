@@ -6,7 +6,7 @@ use clap::{ArgMatches, Args};
 use serde::Serialize;
 use serde_json::Value;
 
-use super::render::refuse_baking;
+use super::baked::refuse_baking;
 use super::{Builtin, devices, inside};
 use mesolux::bake::quality::Quality;
 use mesolux::bake::solution::{About, Origin};

@@ -2,12 +2,14 @@
 
 mod bake;
 mod bake_scene;
+mod baked;
 mod bench;
 mod bench_pictures;
 mod bench_report;
 mod camera;
 mod compare;
 mod devices;
+mod export;
 mod info;
 mod inside;
 mod pareto;
@@ -84,6 +86,7 @@ enum Command {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         _given: Vec<std::ffi::OsString>,
     },
+    Export(export::Options),
     Compare(compare::Options),
     Scene(scene::Options),
     Info(info::Options),
@@ -325,6 +328,7 @@ pub fn main() -> ExitCode {
     let done = match &cli.command {
         Command::Bake(options) => bake::run(options),
         Command::Render(options) => render::run(options, given),
+        Command::Export(options) => export::run(options, given),
         #[cfg(feature = "window")]
         Command::View(options) => view::run(options, start),
         #[cfg(not(feature = "window"))]

@@ -1,25 +1,22 @@
 //! `mesolux render`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
-use clap::parser::ValueSource;
-use clap::{ArgMatches, Args, Id};
+use clap::{ArgMatches, Args};
 
-use super::bake::{SolveOptions, bake_visibly, origin, writable};
+use super::bake::{SolveOptions, writable};
 use super::bake_scene::BakeScene;
+use super::baked::{Wanted, is_bake};
 use super::camera::CameraOptions;
 use super::progress::interrupted;
 use super::reference::{self, ReferenceOptions};
 use super::series::{self, SeriesOptions};
 use super::show::ShowOptions;
 use super::{Builtin, DeviceOptions};
-use mesolux::bake::cache::CachedBake;
-use mesolux::bake::solution::Bake;
 use mesolux::error::{Error, Result};
 use mesolux::render::{FileKind, Lighting, Picture, Renderer, SAMPLES, View};
 use mesolux::scene::{Camera, Scene};
-use mesolux::solver::Settings;
 use mesolux::vk::Device;
 
 /// Draw a scene or a bake to a picture
@@ -68,29 +65,6 @@ pub fn size(text: &str) -> std::result::Result<(u32, u32), String> {
     ))
 }
 
-/// Options of a bake that drawing one uses as well.
-const USED_WITH_A_BAKE: [&str; 2] = ["cache", "no_cache"];
-
-/// # Errors
-/// An option on the command line that says how a scene is read or baked, beside a bake.
-pub fn refuse_baking(given: &ArgMatches, bake: &str) -> Result<()> {
-    for group in ["SolveOptions", "Builtin"] {
-        let Ok(Some(options)) = given.try_get_many::<Id>(group) else {
-            continue;
-        };
-        for option in options {
-            let is_given = given.value_source(option.as_str()) == Some(ValueSource::CommandLine);
-            if is_given && !USED_WITH_A_BAKE.contains(&option.as_str()) {
-                return Err(Error::Usage(format!(
-                    "{bake} is a bake already, which --{} has no effect on",
-                    option.as_str().replace('_', "-")
-                )));
-            }
-        }
-    }
-    Ok(())
-}
-
 pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
     FileKind::of(&options.output)?;
     if let Some(ev) = options.exposure
@@ -101,16 +75,15 @@ pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
         )));
     }
     writable(&options.output)?;
-    let path = Path::new(&options.input);
-    let is_bake = path
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("safetensors"));
-    match is_bake {
-        true => refuse_baking(given, &options.input)?,
-        false => options.bake_scene.refuse(&options.input)?,
-    }
+    let wanted = Wanted {
+        input: &options.input,
+        bake_scene: &options.bake_scene,
+        solve: &options.solve,
+        builtin: &options.builtin,
+    };
+    wanted.check(given)?;
     if options.reference.reference {
-        if is_bake {
+        if is_bake(&options.input) {
             return Err(Error::Usage(format!(
                 "{}: --reference draws a scene, not a bake",
                 options.input
@@ -118,77 +91,19 @@ pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
         }
         return run_reference(options);
     }
-    let settings = options.solve.settings()?;
-    let folder = settings.relief.cache.as_deref();
-    let (scene, bake) = if is_bake {
-        let bake = Bake::load(path)?;
-        (options.bake_scene.of(path, &bake)?, Some(bake))
-    } else {
-        settings.check()?;
-        let quality = options.solve.quality();
-        (options.builtin.load_for(quality, &options.input)?, None)
-    };
+    let opened = wanted.open()?;
     // Errors in the views are reported before the bake.
-    let camera = options.camera.of(&scene)?;
-    let cameras = options.series.cameras(&scene, &camera)?;
+    let camera = options.camera.of(&opened.scene)?;
+    let cameras = options.series.cameras(&opened.scene, &camera)?;
     let device = options.device.open()?;
-    let found = match (bake, folder) {
-        (Some(bake), _) => Some(bake),
-        (None, Some(folder)) => kept_bake(&options.cached(folder, &scene, &settings, &device)),
-        (None, None) => None,
-    };
-    let solution = match &found {
-        Some(_) => None,
-        None => Some(bake_visibly(&device, &scene, &settings)?),
-    };
-    if let (Some(solution), Some(folder)) = (&solution, folder) {
-        let origin = origin(&options.input, &options.builtin, scene.input_hash());
-        let cached = options.cached(folder, &scene, &settings, &device);
-        match cached.save(solution, &origin, &options.solve) {
-            Ok(true) => tracing::info!("bake kept as {}", cached.path.display()),
-            Ok(false) => tracing::info!("a bake that was stopped is not kept"),
-            Err(error) => tracing::warn!("the bake is not kept: {error}"),
-        }
-    }
-    let lighting = match (&found, &solution) {
-        (Some(bake), _) => Lighting::from(bake),
-        (None, Some(solution)) => Lighting::from(solution),
-        (None, None) => unreachable!("a scene is baked where no bake was found"),
-    };
+    let cache = opened.cache();
+    let (scene, bake) = opened.baked(&device)?;
     let lighting = Lighting {
-        cache: folder,
-        ..lighting
+        cache: cache.as_deref(),
+        ..Lighting::from(&bake)
     };
     options.draw(&device, &scene, lighting, &camera, cameras.as_deref())?;
     options.device.check()
-}
-
-/// The cached bake, if there is one.
-fn kept_bake(cached: &CachedBake) -> Option<Bake> {
-    match cached.load() {
-        Ok(found) => {
-            if found.is_some() {
-                tracing::info!("bake found in the cache: {}", cached.path.display());
-            }
-            found
-        }
-        Err(error) => {
-            tracing::warn!("{error}; baking again");
-            None
-        }
-    }
-}
-
-/// Identity of the program's build: a rebuilt one may bake differently.
-fn program() -> String {
-    let version = env!("CARGO_PKG_VERSION");
-    let built = std::env::current_exe()
-        .and_then(std::fs::metadata)
-        .and_then(|file| Ok((file.len(), file.modified()?)));
-    match built {
-        Ok((length, at)) => format!("mesolux {version} {length} {at:?}"),
-        Err(_) => format!("mesolux {version}"),
-    }
 }
 
 /// The same by the path tracer.
@@ -227,18 +142,6 @@ impl Options {
             width: self.size.0,
             height: self.size.1,
         }
-    }
-
-    /// The place of this bake in the cache.
-    fn cached(
-        &self,
-        folder: &Path,
-        scene: &Scene,
-        settings: &Settings,
-        device: &Device,
-    ) -> CachedBake {
-        let maker = format!("{} on {}", program(), device.name());
-        CachedBake::new(folder, scene, settings, &maker)
     }
 
     /// One picture, or a series of them.

@@ -3,10 +3,15 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{Estimator, Light, Problem, ReliefLight, Solver};
+use super::{Estimator, Problem, ReliefLight, Solver};
 use crate::error::{Error, Result};
+use crate::math::directions::Directions;
 use crate::mesh::elements::Elements;
-use crate::mesh::near::Outlook;
+use crate::mesh::near::{Looking, Outlook};
+use crate::mesh::shadow_tree::ShadowTree;
+use crate::mesh::sources::Source;
+use crate::scene::sky::Sky;
+use crate::structs::ShadowOccluder;
 
 /// A place on a surface, or in space.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,117 +31,262 @@ pub struct LightAt {
     pub indirect: Vec3,
 }
 
+/// What can send and stop light: elements in the order of their sources.
+#[derive(Clone, Copy)]
+pub struct Senders<'a> {
+    pub elements: &'a Elements,
+    pub sources: &'a [Source],
+    pub occluders: &'a ShadowTree<ShadowOccluder>,
+    pub sky: Option<&'a Sky>,
+}
+
+/// What elements with a relief send by direction, emission included.
+pub struct SentByDirection {
+    pub directions: Directions,
+    /// Index into the vectors below, `[element]`; none of an element without relief.
+    pub meso: Vec<Option<u32>>,
+    /// Tangent, bitangent and normal, `[meso element]`.
+    pub frames: Vec<[Vec3; 3]>,
+    /// Radiosity πL, bilinear between the directions, `[meso element][direction]`, RGB.
+    pub exitant: Vec<Vec3>,
+}
+
+/// A lit scene, looked at from places.
+pub struct Lit<'a> {
+    of: Senders<'a>,
+    outlook: Outlook<'a>,
+    /// `[source]`
+    sent: Vec<Sent>,
+    /// All surfaces, and those that emit.
+    surfaces: Vec<usize>,
+    emitters: Vec<usize>,
+    by_direction: Option<&'a SentByDirection>,
+}
+
 /// Radiosity of the parts of a source, `[part]`.
 struct Sent {
     emitted: Vec<DVec3>,
     reflected: Vec<DVec3>,
+    /// Whether a member sends by direction.
+    directed: bool,
 }
 
 impl Solver {
-    /// Irradiance at `places` of what has been solved: form factors to the parts of all sources, in
-    /// f64, with a ray to each part of 1/192 of the view or less, and the light that each part
-    /// sends. Costs some milliseconds a place on one core, and more where there are more elements.
+    /// Irradiance at `places` of what has been solved; see [`Lit::at`].
     ///
     /// # Errors
-    /// A place that is not finite, a normal that is not of unit length; the `pixel` estimator; a
-    /// device that fails.
+    /// As [`Lit::at`]; the `pixel` estimator; a device that fails.
     pub fn light_at(&self, places: &[Place]) -> Result<Vec<LightAt>> {
         let on = &self.problem;
         if on.settings.estimator != Estimator::Receiver {
             let what = "light at places needs the `receiver` estimator";
             return Err(Error::Usage(what.into()));
         }
-        let is_good = |place: &Place| {
-            place.position.is_finite() && (place.normal.length() - 1.0).abs() < 1e-6
-        };
-        if let Some(i) = places.iter().position(|place| !is_good(place)) {
-            return Err(Error::Usage(format!(
-                "place {i}: its position must be finite and its normal of unit length"
-            )));
-        }
+        check(places)?;
         let light = self.light()?;
-        let outlook = Outlook::new(&on.elements, &on.sources.list, &on.occluder_tree);
-        let sent: Vec<Sent> = (0..on.sources.list.len())
-            .into_par_iter()
-            .map(|s| sent(on, &outlook, s, &light))
+        let by_direction = light.relief.as_ref().and_then(|sent| directed(on, sent));
+        let of = Senders {
+            elements: &on.elements,
+            sources: &on.sources.list,
+            occluders: &on.occluder_tree,
+            sky: on.sky.as_ref(),
+        };
+        Lit::new(of, &light.radiosity, by_direction.as_ref()).at(places)
+    }
+}
+
+/// # Errors
+/// A place that is not finite, a normal that is not of unit length.
+fn check(places: &[Place]) -> Result<()> {
+    let is_good =
+        |place: &Place| place.position.is_finite() && (place.normal.length() - 1.0).abs() < 1e-6;
+    match places.iter().position(|place| !is_good(place)) {
+        None => Ok(()),
+        Some(i) => Err(Error::Usage(format!(
+            "place {i}: its position must be finite and its normal of unit length"
+        ))),
+    }
+}
+
+fn directed(on: &Problem, light: &ReliefLight) -> Option<SentByDirection> {
+    let relief = on.elements.relief.as_ref()?;
+    let mut meso = vec![None; on.elements.len()];
+    for (m, &e) in (0..).zip(&light.elements) {
+        meso[e as usize] = Some(m);
+    }
+    let frame = |&e: &u32| {
+        let e = e as usize;
+        let normal = on.elements.normal[e].as_vec3();
+        [relief.tangent[e], relief.bitangent[e], normal]
+    };
+    Some(SentByDirection {
+        directions: relief.directions,
+        meso,
+        frames: light.elements.iter().map(frame).collect(),
+        exitant: light.exitant.clone(),
+    })
+}
+
+impl<'a> Lit<'a> {
+    /// With the radiosity of the elements, emission included, `[element]`.
+    pub fn new(
+        of: Senders<'a>,
+        radiosity: &[Vec3],
+        by_direction: Option<&'a SentByDirection>,
+    ) -> Self {
+        let outlook = Outlook::new(of.elements, of.sources, of.occluders);
+        let sources = 0..of.sources.len();
+        let sent: Vec<Sent> = (sources.clone().into_par_iter())
+            .map(|s| Sent::of(of.elements, &outlook, s, radiosity, by_direction))
             .collect();
-        let at = |looking: &mut _, place: &Place| {
-            let elements = &on.elements;
-            let p = (place.position - elements.origin) / elements.unit;
+        let surfaces: Vec<usize> = (sources.clone())
+            .filter(|&s| outlook.tree(s).is_some())
+            .collect();
+        let emits = |&s: &usize| of.sources[s].emitted != Vec3::ZERO;
+        Self {
+            emitters: surfaces.iter().copied().filter(emits).collect(),
+            surfaces,
+            of,
+            outlook,
+            sent,
+            by_direction,
+        }
+    }
+
+    /// Irradiance at `places`: form factors to the parts of all sources, in f64, with a ray to each
+    /// part of 1/192 of the view or less, and the light that each part sends. Costs some
+    /// milliseconds a place on one core, and more where there are more elements.
+    ///
+    /// # Errors
+    /// A place that is not finite, a normal that is not of unit length.
+    pub fn at(&self, places: &[Place]) -> Result<Vec<LightAt>> {
+        self.each(places, |looking, p, normal| {
             let (mut direct, mut indirect) = (DVec3::ZERO, DVec3::ZERO);
-            outlook.parts(p, place.normal, looking, |s, part, factor| {
-                direct += factor * sent[s].emitted[part.index];
-                indirect += match (&light.relief, outlook.tree(s)) {
-                    (Some(relief), Some(tree)) if on.sources.relief.contains(&s) => {
+            let surfaces = &self.surfaces;
+            (self.outlook).parts(surfaces, p, normal, looking, |s, part, factor| {
+                let sent = &self.sent[s];
+                let emitted = sent.emitted[part.index];
+                direct += factor * emitted;
+                indirect += match (self.by_direction, self.outlook.tree(s)) {
+                    (Some(by), Some(tree)) if sent.directed => {
                         let members = &tree.members[part.first..part.first + part.count];
-                        let towards = by_direction(elements, relief, members, p);
-                        factor * (towards - sent[s].emitted[part.index])
+                        let towards = self.towards(by, members, p, sent, part.index);
+                        factor * (towards - emitted)
                     }
-                    _ => factor * sent[s].reflected[part.index],
+                    _ => factor * sent.reflected[part.index],
                 };
             });
-            outlook.points(p, place.normal, |s, share| {
-                direct += share * on.sources.list[s].emitted.as_dvec3();
-            });
-            outlook.far(p, place.normal, |s, share| {
-                direct += share * on.sources.list[s].emitted.as_dvec3();
-            });
-            if let Some(sky) = &on.sky {
-                indirect += outlook.sky(sky, p, place.normal);
+            direct += self.of_lights(p, normal);
+            if let Some(sky) = self.of.sky {
+                indirect += self.outlook.sky(sky, p, normal);
             }
             LightAt {
                 direct: direct.as_vec3(),
                 indirect: indirect.max(DVec3::ZERO).as_vec3(),
             }
-        };
+        })
+    }
+
+    /// The direct part of [`Self::at`] alone, in a small part of the time.
+    ///
+    /// # Errors
+    /// As [`Self::at`].
+    pub fn direct_at(&self, places: &[Place]) -> Result<Vec<Vec3>> {
+        self.each(places, |looking, p, normal| {
+            let mut direct = self.of_lights(p, normal);
+            let emitters = &self.emitters;
+            (self.outlook).parts(emitters, p, normal, looking, |s, part, factor| {
+                direct += factor * self.sent[s].emitted[part.index];
+            });
+            direct.as_vec3()
+        })
+    }
+
+    /// Finds a value at each place, internal units.
+    fn each<T: Send>(
+        &self,
+        places: &[Place],
+        find: impl Fn(&mut Looking, DVec3, DVec3) -> T + Sync,
+    ) -> Result<Vec<T>> {
+        check(places)?;
+        let Elements { origin, unit, .. } = *self.of.elements;
         Ok((places.par_iter())
-            .map_init(|| outlook.looking(), at)
+            .map_init(
+                || self.outlook.looking(),
+                |looking, place| find(looking, (place.position - origin) / unit, place.normal),
+            )
             .collect())
     }
+
+    /// Irradiance by point lights, beams and suns.
+    fn of_lights(&self, p: DVec3, normal: DVec3) -> DVec3 {
+        let mut sum = DVec3::ZERO;
+        let mut add = |s: usize, share: f64| sum += share * self.of.sources[s].emitted.as_dvec3();
+        self.outlook.points(p, normal, &mut add);
+        self.outlook.far(p, normal, &mut add);
+        sum
+    }
+
+    /// Mean radiosity that members of a part send towards a place, emission included.
+    fn towards(
+        &self,
+        by: &SentByDirection,
+        members: &[u32],
+        p: DVec3,
+        sent: &Sent,
+        part: usize,
+    ) -> DVec3 {
+        let elements = self.of.elements;
+        let k = by.directions.count();
+        let even = sent.emitted[part] + sent.reflected[part];
+        let (mut power, mut area) = (DVec3::ZERO, 0.0);
+        for &e in members {
+            let e = e as usize;
+            area += elements.area[e];
+            let Some(m) = by.meso[e] else {
+                power += elements.area[e] * even;
+                continue;
+            };
+            let way = (p - elements.centroid[e]).normalize_or_zero();
+            let local = by.frames[m as usize].map(|axis| axis.as_dvec3().dot(way));
+            let first = m as usize * k;
+            let sent: DVec3 = (by.directions.bilinear(DVec3::from_array(local)).into_iter())
+                .map(|(slot, weight)| weight * by.exitant[first + slot].as_dvec3())
+                .sum();
+            power += elements.area[e] * sent;
+        }
+        power / area
+    }
 }
 
-fn sent(on: &Problem, outlook: &Outlook, source: usize, light: &Light) -> Sent {
-    let Some(tree) = outlook.tree(source) else {
-        return Sent {
-            emitted: Vec::new(),
-            reflected: Vec::new(),
+impl Sent {
+    fn of(
+        elements: &Elements,
+        outlook: &Outlook,
+        source: usize,
+        radiosity: &[Vec3],
+        by_direction: Option<&SentByDirection>,
+    ) -> Self {
+        let Some(tree) = outlook.tree(source) else {
+            return Self {
+                emitted: Vec::new(),
+                reflected: Vec::new(),
+                directed: false,
+            };
         };
-    };
-    let elements = &on.elements;
-    let areas = tree.sums(|e| elements.area[e as usize]);
-    let mean = |of: &dyn Fn(usize) -> Vec3| -> Vec<DVec3> {
-        let power = tree.sums(|e| elements.area[e as usize] * of(e as usize).as_dvec3());
-        power
-            .iter()
-            .zip(&areas)
-            .map(|(power, area)| power / area)
-            .collect()
-    };
-    Sent {
-        emitted: mean(&|e| elements.emitted[e]),
-        reflected: mean(&|e| light.radiosity[e] - elements.emitted[e]),
+        let areas = tree.sums(|e| elements.area[e as usize]);
+        let mean = |of: &dyn Fn(usize) -> Vec3| -> Vec<DVec3> {
+            let power = tree.sums(|e| elements.area[e as usize] * of(e as usize).as_dvec3());
+            (power.iter().zip(&areas))
+                .map(|(power, area)| power / area)
+                .collect()
+        };
+        let is_directed =
+            |by: &SentByDirection| tree.members.iter().any(|&e| by.meso[e as usize].is_some());
+        Self {
+            emitted: mean(&|e| elements.emitted[e]),
+            reflected: mean(&|e| radiosity[e] - elements.emitted[e]),
+            directed: by_direction.is_some_and(is_directed),
+        }
     }
-}
-
-/// Mean radiosity that elements with a relief send towards a place, emission included.
-fn by_direction(elements: &Elements, light: &ReliefLight, members: &[u32], p: DVec3) -> DVec3 {
-    let Some(relief) = &elements.relief else {
-        return DVec3::ZERO;
-    };
-    let k = relief.directions.count();
-    let (mut power, mut area) = (DVec3::ZERO, 0.0);
-    for &e in members {
-        let e = e as usize;
-        let way = (p - elements.centroid[e]).normalize_or_zero();
-        let along = |axis: Vec3| axis.as_dvec3().dot(way);
-        let (x, y) = (along(relief.tangent[e]), along(relief.bitangent[e]));
-        let local = DVec3::new(x, y, elements.normal[e].dot(way));
-        let first = (e - light.elements[0] as usize) * k;
-        let sent: DVec3 = (relief.directions.bilinear(local).into_iter())
-            .map(|(slot, weight)| weight * light.exitant[first + slot].as_dvec3())
-            .sum();
-        power += elements.area[e] * sent;
-        area += elements.area[e];
-    }
-    power / area
 }

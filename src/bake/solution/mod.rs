@@ -13,7 +13,7 @@ use crate::mesh::elements::Elements;
 use crate::meso::Relief;
 use crate::scene::contents::Contents;
 use crate::scene::{OnInput, Scene};
-use crate::solver::{Light, ReliefLight, Report};
+use crate::solver::{BY_PAPER, Light, ReliefLight, Report};
 pub use origin::Origin;
 pub use read::{About, Bake};
 pub use write::VERSION;
@@ -141,6 +141,23 @@ impl Solution {
                 .map(|(relief, light)| DirectionalLight::new(elements, relief, light)),
             contents: None,
             report,
+        }
+    }
+
+    /// The bake that a file of this holds.
+    pub fn into_bake(self, origin: Origin) -> Bake {
+        let corners = self.corners.map(|c| (c.irradiance, c.irradiance_direct));
+        let (corner_irradiance, corner_irradiance_direct) = corners.unzip();
+        Bake {
+            origin,
+            irradiance: self.irradiance,
+            irradiance_direct: self.irradiance_direct,
+            radiosity: self.radiosity,
+            corner_irradiance,
+            corner_irradiance_direct,
+            relief: self.relief,
+            on_input: self.on_input,
+            by_paper: self.report.estimator == BY_PAPER,
         }
     }
 

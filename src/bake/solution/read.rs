@@ -21,8 +21,12 @@ pub struct Bake {
     /// W·m⁻², RGB, `[triangle]` in the order of the input.
     pub irradiance: Vec<Vec3>,
     pub irradiance_direct: Vec<Vec3>,
+    /// W·m⁻², RGB: πLe + ρE; of an element with a relief, the mean of what it sends.
+    pub radiosity: Vec<Vec3>,
     /// At the corners, `[triangle][corner]`; none of a bake that was stopped before it had them.
     pub corner_irradiance: Option<Vec<[Vec3; 3]>>,
+    /// Of this the part straight from emitters and point lights.
+    pub corner_irradiance_direct: Option<Vec<[Vec3; 3]>>,
     pub relief: Option<DirectionalLight>,
     /// Where each triangle lies in the scene as it was read.
     pub on_input: Vec<OnInput>,
@@ -43,17 +47,20 @@ impl Bake {
         let bake = Self {
             origin: file.origin()?,
             irradiance_direct: file.vectors("irradiance_direct", &[])?,
+            radiosity: file.vectors("radiosity", &[])?,
             corner_irradiance: file.corners("corner_irradiance", irradiance.len())?,
+            corner_irradiance_direct: file.corners("corner_irradiance_direct", irradiance.len())?,
             relief: file.relief(irradiance.len())?,
             on_input: file.on_input(irradiance.len())?,
             by_paper: file.json::<Value>("report")?["estimator"] == BY_PAPER,
             irradiance,
         };
-        match bake.irradiance.len() == bake.irradiance_direct.len() {
+        let alike = [&bake.irradiance_direct, &bake.radiosity].map(Vec::len);
+        match alike == [bake.irradiance.len(); 2] {
             true => Ok(bake),
             false => Err(Error::file(
                 path,
-                "irradiance and irradiance_direct differ in length",
+                "irradiance, irradiance_direct and radiosity differ in length",
             )),
         }
     }

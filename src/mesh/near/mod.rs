@@ -28,7 +28,7 @@ use crate::mesh::sources::Source;
 use crate::structs::{NearFactor, NearPart, NearVector, ShadowOccluder};
 use pair::Search;
 pub use parts::PartTree;
-pub use places::Outlook;
+pub use places::{Looking, Outlook};
 pub(super) use rays::{blocked, first_met};
 use receivers::Receiver;
 

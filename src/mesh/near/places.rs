@@ -64,17 +64,18 @@ impl<'a> Outlook<'a> {
         self.seen[source].as_ref().map(|seen| &seen.tree)
     }
 
-    /// Each part of a surface that a place with this normal sees any of: source, part and form
+    /// Each part of these surfaces that a place with this normal sees any of: source, part and form
     /// factor. Internal units.
     pub fn parts(
         &self,
+        surfaces: &[usize],
         place: DVec3,
         normal: DVec3,
         looking: &mut Looking,
         mut each: impl FnMut(usize, Part, f64),
     ) {
-        for (s, seen) in self.seen.iter().enumerate() {
-            if let Some(seen) = seen {
+        for &s in surfaces {
+            if let Some(seen) = &self.seen[s] {
                 let factors = &mut looking.0;
                 let part = |part: Part, factor: f64| each(s, part, factor);
                 self.search.seen_from(place, normal, seen, factors, part);

@@ -1,0 +1,168 @@
+//! `mesolux export`.
+
+use std::path::PathBuf;
+
+use clap::{ArgMatches, Args};
+
+use super::bake::{SolveOptions, writable};
+use super::bake_scene::BakeScene;
+use super::baked::Wanted;
+use super::progress::{Bar, catch_interrupts, interrupted};
+use super::{Builtin, DeviceOptions};
+use mesolux::bake::lit_scene::LitScene;
+use mesolux::error::{Error, Result};
+use mesolux::export::sensors::{self, SensorFile, SensorGrid};
+use mesolux::scene::Scene;
+use mesolux::solver::{LightAt, Lit, Place};
+
+/// Write the light of a scene or a bake for other programs
+///
+/// Each output is an option of its own; one command may write several. A SCENE is baked first, with
+/// the options of `bake`, and the bake is kept for the next time.
+#[derive(Args)]
+pub struct Options {
+    /// A scene (see `bake`) or a bake (.safetensors)
+    #[arg(value_name = "SCENE|BAKE")]
+    input: String,
+    #[command(flatten)]
+    sensors: SensorOptions,
+    #[command(flatten)]
+    bake_scene: BakeScene,
+    #[command(flatten)]
+    solve: SolveOptions,
+    #[command(flatten)]
+    builtin: Builtin,
+    #[command(flatten)]
+    device: DeviceOptions,
+}
+
+#[derive(Args)]
+#[command(next_help_heading = "Sensors")]
+struct SensorOptions {
+    /// Points with their normals, `x y z nx ny nz` a line, as Radiance reads them
+    #[arg(long, value_name = "POINTS.pts", requires = "values")]
+    sensors: Option<PathBuf>,
+    /// Sensors on the mesh or material NAME, one each SPACING, HEIGHT above it, scene units; may be
+    /// given several times
+    #[arg(long, value_name = "NAME,SPACING[,HEIGHT]", value_parser = grid, requires = "values")]
+    sensor_grid: Vec<SensorGrid>,
+    /// Where to write the light at the sensors: .csv (lux and W/m², direct and indirect), .dat
+    /// (W/m², red green blue), .ill (lux)
+    #[arg(long, value_name = "OUT.csv|.dat|.ill")]
+    values: Option<PathBuf>,
+    /// Lumens of a watt, by which irradiance becomes lux: 179 as in Radiance; 683 gives the lux of
+    /// lamps that are given in lumens, candelas or lux, and of IES files
+    #[arg(long, value_name = "LM", default_value_t = sensors::RADIANCE_EFFICACY)]
+    lumens_per_watt: f64,
+}
+
+fn grid(text: &str) -> std::result::Result<SensorGrid, String> {
+    let wrong = || "must be like floor,0.5 or floor,0.5,0.85".to_owned();
+    let words: Vec<&str> = text.split(',').collect();
+    let (name, spacing, height) = match words.as_slice() {
+        [name, spacing] => (name, spacing, "0"),
+        [name, spacing, height] => (name, spacing, *height),
+        _ => return Err(wrong()),
+    };
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|n| n.is_finite());
+    let spacing = number(spacing).filter(|&s| s > 0.0).ok_or_else(wrong)?;
+    Ok(SensorGrid {
+        name: (*name).to_owned(),
+        spacing,
+        height: number(height).ok_or_else(wrong)?,
+    })
+}
+
+/// Most sensors of one grid.
+const MOST_SENSORS: usize = 10_000_000;
+
+impl SensorOptions {
+    fn check(&self) -> Result<()> {
+        let Some(values) = &self.values else {
+            return Ok(());
+        };
+        if self.sensors.is_none() && self.sensor_grid.is_empty() {
+            return Err(Error::Usage(format!(
+                "--values {}: of which sensors? --sensors or --sensor-grid says",
+                values.display()
+            )));
+        }
+        if !(self.lumens_per_watt.is_finite() && self.lumens_per_watt > 0.0) {
+            let given = self.lumens_per_watt;
+            let what = format!("--lumens-per-watt {given}: must be a positive number");
+            return Err(Error::Usage(what));
+        }
+        SensorFile::of(values)?;
+        writable(values)
+    }
+
+    fn places(&self, scene: &Scene) -> Result<Vec<Place>> {
+        let mut places = match &self.sensors {
+            Some(path) => sensors::read_points(path)?,
+            None => Vec::new(),
+        };
+        for grid in &self.sensor_grid {
+            places.extend(sensors::on_grid(scene, grid, MOST_SENSORS)?);
+        }
+        Ok(places)
+    }
+}
+
+pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
+    options.sensors.check()?;
+    if options.sensors.values.is_none() {
+        let what = "nothing to write: give --values with --sensors or --sensor-grid";
+        return Err(Error::Usage(what.into()));
+    }
+    let wanted = Wanted {
+        input: &options.input,
+        bake_scene: &options.bake_scene,
+        solve: &options.solve,
+        builtin: &options.builtin,
+    };
+    wanted.check(given)?;
+    let opened = wanted.open()?;
+    let places = options.sensors.places(&opened.scene)?;
+    let device = options.device.open()?;
+    let (scene, bake) = opened.baked(&device)?;
+    if bake.by_paper {
+        let what = "a bake of --preset paper or --estimator pixel has no light at other places";
+        return Err(Error::Usage(what.into()));
+    }
+    let lit_scene = LitScene::new(&scene, &bake)?;
+    let lit = lit_scene.look();
+    if let Some(path) = &options.sensors.values {
+        let light = at_places(&lit, &places)?;
+        let efficacy = options.sensors.lumens_per_watt;
+        sensors::write_light(path, &places[..light.len()], &light, efficacy)?;
+        tracing::info!("{}: {} sensors", path.display(), light.len());
+        if light.len() < places.len() {
+            let missing = places.len() - light.len();
+            tracing::warn!("{missing} sensors are missing: stopped by Ctrl-C");
+        }
+    }
+    options.device.check()
+}
+
+/// Places that are looked at between two looks at the keyboard.
+const AT_ONCE: usize = 512;
+
+/// Light at places, of as many as there is time for before Ctrl-C.
+fn at_places(lit: &Lit<'_>, places: &[Place]) -> Result<Vec<LightAt>> {
+    catch_interrupts();
+    let bar = Bar::new();
+    let mut light = Vec::with_capacity(places.len());
+    for some in places.chunks(AT_ONCE) {
+        light.extend(lit.at(some)?);
+        bar.show(format!(
+            "light at {} of {} places",
+            light.len(),
+            places.len()
+        ));
+        if interrupted() {
+            break;
+        }
+    }
+    bar.finish();
+    Ok(light)
+}

@@ -1,0 +1,3 @@
+//! Light at places in files that other programs read.
+
+pub mod sensors;
