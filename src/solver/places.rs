@@ -57,9 +57,6 @@ pub struct Lit<'a> {
     outlook: Outlook<'a>,
     /// `[source]`
     sent: Vec<Sent>,
-    /// All surfaces, and those that emit.
-    surfaces: Vec<usize>,
-    emitters: Vec<usize>,
     by_direction: Option<&'a SentByDirection>,
 }
 
@@ -139,13 +136,7 @@ impl<'a> Lit<'a> {
         let sent: Vec<Sent> = (sources.clone().into_par_iter())
             .map(|s| Sent::of(of.elements, &outlook, s, radiosity, by_direction))
             .collect();
-        let surfaces: Vec<usize> = (sources.clone())
-            .filter(|&s| outlook.tree(s).is_some())
-            .collect();
-        let emits = |&s: &usize| of.sources[s].emitted != Vec3::ZERO;
         Self {
-            emitters: surfaces.iter().copied().filter(emits).collect(),
-            surfaces,
             of,
             outlook,
             sent,
@@ -154,34 +145,31 @@ impl<'a> Lit<'a> {
     }
 
     /// Irradiance at `places`: form factors to the parts of all sources, in f64, with a ray to each
-    /// part of 1/192 of the view or less, and the light that each part sends. Costs some
-    /// milliseconds a place on one core, and more where there are more elements.
+    /// part of 1/192 of the view or less, and the light that each part sends; of emitters what is
+    /// seen of them up to the edges of shadows. Costs some milliseconds a place on one core, and
+    /// more where there are more elements.
     ///
     /// # Errors
     /// A place that is not finite, a normal that is not of unit length.
     pub fn at(&self, places: &[Place]) -> Result<Vec<LightAt>> {
         self.each(places, |looking, p, normal| {
-            let (mut direct, mut indirect) = (DVec3::ZERO, DVec3::ZERO);
-            let surfaces = &self.surfaces;
-            (self.outlook).parts(surfaces, p, normal, looking, |s, part, factor| {
+            let mut indirect = DVec3::ZERO;
+            self.outlook.parts(p, normal, looking, |s, part, factor| {
                 let sent = &self.sent[s];
-                let emitted = sent.emitted[part.index];
-                direct += factor * emitted;
                 indirect += match (self.by_direction, self.outlook.tree(s)) {
                     (Some(by), Some(tree)) if sent.directed => {
                         let members = &tree.members[part.first..part.first + part.count];
                         let towards = self.towards(by, members, p, sent, part.index);
-                        factor * (towards - emitted)
+                        factor * (towards - sent.emitted[part.index])
                     }
                     _ => factor * sent.reflected[part.index],
                 };
             });
-            direct += self.of_lights(p, normal);
             if let Some(sky) = self.of.sky {
                 indirect += self.outlook.sky(sky, p, normal);
             }
             LightAt {
-                direct: direct.as_vec3(),
+                direct: self.direct(p, normal).as_vec3(),
                 indirect: indirect.max(DVec3::ZERO).as_vec3(),
             }
         })
@@ -192,14 +180,7 @@ impl<'a> Lit<'a> {
     /// # Errors
     /// As [`Self::at`].
     pub fn direct_at(&self, places: &[Place]) -> Result<Vec<Vec3>> {
-        self.each(places, |looking, p, normal| {
-            let mut direct = self.of_lights(p, normal);
-            let emitters = &self.emitters;
-            (self.outlook).parts(emitters, p, normal, looking, |s, part, factor| {
-                direct += factor * self.sent[s].emitted[part.index];
-            });
-            direct.as_vec3()
-        })
+        self.each(places, |_, p, normal| self.direct(p, normal).as_vec3())
     }
 
     /// Finds a value at each place, internal units.
@@ -218,9 +199,12 @@ impl<'a> Lit<'a> {
             .collect())
     }
 
-    /// Irradiance by point lights, beams and suns.
-    fn of_lights(&self, p: DVec3, normal: DVec3) -> DVec3 {
+    /// Irradiance straight from emitters, point lights, beams and suns.
+    fn direct(&self, p: DVec3, normal: DVec3) -> DVec3 {
         let mut sum = DVec3::ZERO;
+        self.outlook.emitters(p, normal, |s, part, factor| {
+            sum += factor * self.sent[s].emitted[part.index];
+        });
         let mut add = |s: usize, share: f64| sum += share * self.of.sources[s].emitted.as_dvec3();
         self.outlook.points(p, normal, &mut add);
         self.outlook.far(p, normal, &mut add);

@@ -6,6 +6,7 @@
 //! where the second sum is over the parts m of the sources that fill much of the view of element j.
 //! The form factors here have their own visibility, by rays to each part.
 
+mod emitters;
 mod lists;
 mod pair;
 mod parts;

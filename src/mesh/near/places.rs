@@ -1,8 +1,9 @@
 //! What any place sees of all sources, part by part.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::emitters::{Emitter, Looker};
 use super::pair::Search;
 use super::parts::Part;
 use super::rays::blocked;
@@ -25,6 +26,8 @@ pub struct Outlook<'a> {
     sources: &'a [Source],
     /// `[source]`; none of a point light.
     seen: Vec<Option<Seen>>,
+    /// `[source]`; none of what does not emit.
+    emitters: Vec<Option<Emitter>>,
     most_parts: usize,
 }
 
@@ -39,6 +42,13 @@ impl<'a> Outlook<'a> {
     ) -> Self {
         let seen = |source: &Source| source.is_surface().then(|| Seen::new(elements, source));
         let seen: Vec<Option<Seen>> = sources.par_iter().map(seen).collect();
+        let emitters = (sources.iter().zip(&seen)).map(|(source, seen)| {
+            let emits = source.emitted != Vec3::ZERO;
+            seen.as_ref()
+                .filter(|_| emits)
+                .map(|seen| Emitter::new(source, seen))
+        });
+        let emitters = emitters.collect();
         let counts = seen.iter().flatten().map(|seen| seen.tree.part_count());
         Self {
             search: Search {
@@ -50,6 +60,7 @@ impl<'a> Outlook<'a> {
                 },
             },
             sources,
+            emitters,
             most_parts: counts.max().unwrap_or(0),
             seen,
         }
@@ -64,21 +75,35 @@ impl<'a> Outlook<'a> {
         self.seen[source].as_ref().map(|seen| &seen.tree)
     }
 
-    /// Each part of these surfaces that a place with this normal sees any of: source, part and form
+    /// Each part of a surface that a place with this normal sees any of: source, part and form
     /// factor. Internal units.
     pub fn parts(
         &self,
-        surfaces: &[usize],
         place: DVec3,
         normal: DVec3,
         looking: &mut Looking,
         mut each: impl FnMut(usize, Part, f64),
     ) {
-        for &s in surfaces {
-            if let Some(seen) = &self.seen[s] {
+        for (s, seen) in self.seen.iter().enumerate() {
+            if let Some(seen) = seen {
                 let factors = &mut looking.0;
                 let part = |part: Part, factor: f64| each(s, part, factor);
                 self.search.seen_from(place, normal, seen, factors, part);
+            }
+        }
+    }
+
+    /// Each part of an emitter that a place with this normal sees any of: source, part, and the form
+    /// factor of what is seen of it, up to the edges of shadows.
+    pub fn emitters(&self, place: DVec3, normal: DVec3, mut each: impl FnMut(usize, Part, f64)) {
+        let looker = Looker {
+            occluders: self.search.occluders,
+            place,
+            normal,
+        };
+        for (s, (emitter, seen)) in self.emitters.iter().zip(&self.seen).enumerate() {
+            if let (Some(emitter), Some(seen)) = (emitter, seen) {
+                looker.look(seen, emitter, |part, factor| each(s, part, factor));
             }
         }
     }

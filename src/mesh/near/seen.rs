@@ -222,6 +222,11 @@ impl Seen {
         part.first
     }
 
+    /// Centroid of a part's area.
+    pub fn centre(&self, part: Part) -> DVec3 {
+        self.far[part.index].centre
+    }
+
     pub fn centroid(&self, member: usize) -> DVec3 {
         centroid(&self.triangles[member])
     }
