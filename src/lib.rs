@@ -35,6 +35,7 @@ pub mod bake;
 pub mod bench;
 pub mod constants;
 pub mod error;
+#[cfg(feature = "export")]
 pub mod export;
 pub mod math;
 pub mod mesh;

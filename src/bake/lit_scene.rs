@@ -26,6 +26,15 @@ pub struct LitScene {
     by_direction: Option<SentByDirection>,
 }
 
+/// Large sources: places find the parts that they need by halving.
+const GROUPING: Grouping = Grouping {
+    max_elements: 4096,
+    max_area: 1.0 / 16.0,
+    max_power: f64::INFINITY,
+    max_unevenness: f64::INFINITY,
+    alone: false,
+};
+
 impl LitScene {
     /// Of a bake and its scene, cut as it was baked.
     ///
@@ -33,8 +42,7 @@ impl LitScene {
     /// Light by directions that no bake has.
     pub fn new(scene: &Scene, bake: &Bake) -> Result<Self> {
         let mut elements = Elements::new(scene);
-        let (sources, connections) =
-            sources::build(&mut elements, &scene.lights, &Grouping::default(), 0);
+        let (sources, connections) = sources::build(&mut elements, &scene.lights, &GROUPING, 0);
         let occluders = Occluders::merged(&elements, &connections);
         let occluders = ShadowTree::new(occluders.casters(&elements, &connections));
         let inputs = elements.input_index.iter().map(|&i| i as usize);

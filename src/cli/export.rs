@@ -1,8 +1,9 @@
 //! `mesolux export`.
 
 use std::path::PathBuf;
+use std::time::Instant;
 
-use clap::{ArgMatches, Args};
+use clap::{ArgMatches, Args, ValueEnum};
 
 use super::bake::{SolveOptions, writable};
 use super::bake_scene::BakeScene;
@@ -11,7 +12,10 @@ use super::progress::{Bar, catch_interrupts, interrupted};
 use super::{Builtin, DeviceOptions};
 use mesolux::bake::lit_scene::LitScene;
 use mesolux::error::{Error, Result};
+use mesolux::export::light_map::LightMap;
+use mesolux::export::map_files::{MapFile, Part};
 use mesolux::export::sensors::{self, SensorFile, SensorGrid};
+use mesolux::export::surface::{Surface, Texels};
 use mesolux::scene::Scene;
 use mesolux::solver::{LightAt, Lit, Place};
 
@@ -25,6 +29,8 @@ pub struct Options {
     #[arg(value_name = "SCENE|BAKE")]
     input: String,
     #[command(flatten)]
+    maps: MapOptions,
+    #[command(flatten)]
     sensors: SensorOptions,
     #[command(flatten)]
     bake_scene: BakeScene,
@@ -34,6 +40,94 @@ pub struct Options {
     builtin: Builtin,
     #[command(flatten)]
     device: DeviceOptions,
+}
+
+#[derive(Args)]
+#[command(next_help_heading = "Light maps")]
+struct MapOptions {
+    /// Write a light map, irradiance in W/m²: .exr (half floats), .hdr, .rgbm.png or .png (sRGB);
+    /// may be given several times. Several pages are OUT-1, OUT-2 and so on
+    #[arg(long, value_name = "OUT.exr|.hdr|.rgbm.png|.png")]
+    light_map: Vec<PathBuf>,
+    /// The light that light maps hold
+    #[arg(long, value_enum, default_value_t = Light::Global)]
+    light: Light,
+    /// Texels a side of a page
+    #[arg(long, value_name = "N", default_value_t = 1024)]
+    page: u32,
+    /// Texels a scene unit, on as many pages as that needs [default: as fit on one page]
+    #[arg(long, value_name = "X")]
+    texels_per_unit: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Light {
+    Global,
+    Direct,
+    Indirect,
+}
+
+/// Smallest and largest page.
+const PAGES: std::ops::RangeInclusive<u32> = 16..=8192;
+
+impl MapOptions {
+    fn is_wanted(&self) -> bool {
+        !self.light_map.is_empty()
+    }
+
+    fn check(&self) -> Result<()> {
+        for path in &self.light_map {
+            MapFile::of(path)?;
+            writable(path)?;
+        }
+        if !PAGES.contains(&self.page) {
+            return Err(Error::Usage(format!(
+                "--page {}: must be in {} to {}",
+                self.page,
+                PAGES.start(),
+                PAGES.end()
+            )));
+        }
+        match self.texels_per_unit {
+            Some(count) if !(count.is_finite() && count > 0.0) => Err(Error::Usage(format!(
+                "--texels-per-unit {count}: must be a positive number"
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    fn texels(&self) -> Texels {
+        match self.texels_per_unit {
+            None => Texels::Page(self.page),
+            Some(count) => Texels::PerUnit {
+                count,
+                page: self.page,
+            },
+        }
+    }
+
+    fn part(&self) -> Part {
+        match self.light {
+            Light::Global => Part::Global,
+            Light::Direct => Part::Direct,
+            Light::Indirect => Part::Indirect,
+        }
+    }
+
+    fn write(&self, map: &LightMap) -> Result<()> {
+        for path in &self.light_map {
+            let written = map.write(path, self.part())?;
+            let kind = MapFile::of(path)?;
+            let scale = match kind {
+                MapFile::Rgbm | MapFile::Srgb => format!(", scale {}", map.scale(self.part())),
+                MapFile::Exr | MapFile::Hdr => String::new(),
+            };
+            for path in written {
+                tracing::info!("{}: light map{scale}", path.display());
+            }
+        }
+        Ok(())
+    }
 }
 
 #[derive(Args)]
@@ -110,8 +204,9 @@ impl SensorOptions {
 
 pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
     options.sensors.check()?;
-    if options.sensors.values.is_none() {
-        let what = "nothing to write: give --values with --sensors or --sensor-grid";
+    options.maps.check()?;
+    if options.sensors.values.is_none() && !options.maps.is_wanted() {
+        let what = "nothing to write: give --light-map, or --values with --sensors";
         return Err(Error::Usage(what.into()));
     }
     let wanted = Wanted {
@@ -131,6 +226,10 @@ pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
     }
     let lit_scene = LitScene::new(&scene, &bake)?;
     let lit = lit_scene.look();
+    if options.maps.is_wanted() {
+        let surface = laid_out(&scene, options.maps.texels())?;
+        options.maps.write(&light_map(&surface, &lit)?)?;
+    }
     if let Some(path) = &options.sensors.values {
         let light = at_places(&lit, &places)?;
         let efficacy = options.sensors.lumens_per_watt;
@@ -142,6 +241,48 @@ pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
         }
     }
     options.device.check()
+}
+
+/// The scene's surface, laid out.
+fn laid_out(scene: &Scene, texels: Texels) -> Result<Surface> {
+    catch_interrupts();
+    let start = Instant::now();
+    let surface = Surface::new(scene, texels, || !interrupted())?;
+    let pages = surface.pages;
+    tracing::info!(
+        "{} charts on {} pages of {} x {}, {:.0} % used, {:.4} texels a unit, in {:.1} s",
+        pages.charts,
+        pages.count,
+        pages.width,
+        pages.height,
+        100.0 * pages.used,
+        pages.texels_per_unit,
+        start.elapsed().as_secs_f64()
+    );
+    Ok(surface)
+}
+
+/// The light at the texels of a surface.
+fn light_map(surface: &Surface, lit: &Lit<'_>) -> Result<LightMap> {
+    catch_interrupts();
+    let bar = Bar::new();
+    let start = Instant::now();
+    let go_on = |looked_at: usize| {
+        bar.show(format!("light map: {looked_at} places"));
+        !interrupted()
+    };
+    let map = LightMap::new(surface, lit, &go_on)?;
+    bar.finish();
+    tracing::info!(
+        "{} texels, light found at {} places in {:.1} s",
+        map.light.len(),
+        map.looked_at,
+        start.elapsed().as_secs_f64()
+    );
+    if map.stopped {
+        tracing::warn!("the light map is interpolated in parts: stopped by Ctrl-C");
+    }
+    Ok(map)
 }
 
 /// Places that are looked at between two looks at the keyboard.

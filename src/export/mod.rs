@@ -1,3 +1,14 @@
 //! Light at places in files that other programs read.
+//!
+//! ```text
+//! scene ─► surface (charts) ─► texels ─► light_map ─► map_files
+//!                                          borders
+//! places ─► sensors
+//! ```
 
+mod borders;
+pub mod light_map;
+pub mod map_files;
 pub mod sensors;
+pub mod surface;
+pub mod texels;

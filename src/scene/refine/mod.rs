@@ -191,6 +191,39 @@ impl Scene {
         }
     }
 
+    /// The scene that this one was refined from.
+    pub fn uncut(&self) -> Self {
+        let mut whole = self.clone();
+        let Some(from) = whole.refined_from.take() else {
+            return whole;
+        };
+        let count = from.on_input.iter().map(|on| on.triangle + 1).max();
+        let none = Triangle {
+            vertices: [0; 3],
+            uv: [[0.0; 2]; 3],
+            emission_uv: None,
+            material: 0,
+        };
+        whole.triangles = vec![none; count.unwrap_or(0) as usize];
+        whole.vertices.truncate(from.vertices);
+        // Each corner of the input is one of some triangle that was cut from it.
+        let corners = OnInput::whole(0).corners;
+        for (part, on) in self.triangles.iter().zip(&from.on_input) {
+            let input = &mut whole.triangles[on.triangle as usize];
+            input.material = part.material;
+            for (k, at) in on.corners.iter().enumerate() {
+                if let Some(corner) = corners.iter().position(|corner| corner == at) {
+                    input.vertices[corner] = part.vertices[k];
+                    input.uv[corner] = part.uv[k];
+                    if let Some(uv) = part.emission_uv {
+                        input.emission_uv.get_or_insert(uv)[corner] = uv[k];
+                    }
+                }
+            }
+        }
+        whole
+    }
+
     /// The triangles of this scene cut as they were in a scene that was refined from it.
     pub fn cut_as(&self, on_input: &[OnInput]) -> Self {
         let mut cut = self.clone();

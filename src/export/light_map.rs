@@ -1,0 +1,277 @@
+//! Light at the texels of a light map.
+//!
+//! Direct light is found at each texel. Indirect light is found on a coarse lattice of each chart,
+//! and on finer ones where it was not what the coarser ones let expect.
+
+use glam::Vec3;
+
+use super::borders;
+use super::surface::{Pages, Surface};
+use super::texels::{Texel, TexelMap, quarters};
+use crate::error::Result;
+use crate::solver::{LightAt, Lit, Place};
+
+/// Light at the texels of all pages.
+pub struct LightMap {
+    pub pages: Pages,
+    pub map: TexelMap,
+    /// `[texel]` of `map`.
+    pub light: Vec<LightAt>,
+    /// Places at which all light was found.
+    pub looked_at: usize,
+    /// Whether it was stopped: finer lattices are then interpolated.
+    pub stopped: bool,
+}
+
+/// Spacing of the coarsest lattice, texels.
+const COARSEST: i64 = 8;
+
+/// Lattices of this spacing and more are looked at as a whole.
+const WHOLE: i64 = 4;
+
+/// A difference from what was expected counts from this share of the light at a texel, and this
+/// share of the mean light, on.
+const UNEXPECTED: [f32; 2] = [0.004, 0.001];
+
+/// Texels whose direct light differs from a neighbour's by more than this share of the larger are
+/// looked at in four places.
+const EDGE: f32 = 0.02;
+
+/// Of the brightest about it, the least light of a texel that is not covered by what stands on it.
+const LEAST_OPEN: f32 = 0.02;
+
+/// Places that are looked at between two calls of `go_on`.
+const AT_ONCE: usize = 2048;
+
+/// Looks at places, and is stopped between.
+pub(super) struct Looking<'a> {
+    pub lit: &'a Lit<'a>,
+    /// Called with what was looked at so far; false stops.
+    pub go_on: &'a dyn Fn(usize) -> bool,
+    pub looked_at: usize,
+    pub stopped: bool,
+}
+
+impl Looking<'_> {
+    /// Of as many places as there is time for.
+    pub fn at(&mut self, places: &[Place]) -> Result<Vec<LightAt>> {
+        let lit = self.lit;
+        self.each(places, |some| lit.at(some))
+    }
+
+    pub fn direct(&mut self, places: &[Place]) -> Result<Vec<Vec3>> {
+        let lit = self.lit;
+        self.each(places, |some| lit.direct_at(some))
+    }
+
+    fn each<T>(
+        &mut self,
+        places: &[Place],
+        find: impl Fn(&[Place]) -> Result<Vec<T>>,
+    ) -> Result<Vec<T>> {
+        let mut found = Vec::with_capacity(places.len());
+        for some in places.chunks(AT_ONCE) {
+            if self.stopped {
+                break;
+            }
+            found.extend(find(some)?);
+            self.looked_at += some.len();
+            self.stopped = !(self.go_on)(self.looked_at);
+        }
+        Ok(found)
+    }
+}
+
+impl LightMap {
+    /// `go_on` is called with how many places have been looked at; false stops, and what is missing
+    /// is interpolated.
+    ///
+    /// # Errors
+    /// None that a surface of [`Surface::new`] can cause.
+    pub fn new(surface: &Surface, lit: &Lit<'_>, go_on: &dyn Fn(usize) -> bool) -> Result<Self> {
+        let map = TexelMap::new(surface);
+        let mut looking = Looking {
+            lit,
+            go_on,
+            looked_at: 0,
+            stopped: false,
+        };
+        let direct = direct(surface, &map, &mut looking)?;
+        let indirect = indirect(surface, &map, &mut looking)?;
+        let mut light: Vec<LightAt> = (direct.into_iter().zip(indirect))
+            .map(|(direct, indirect)| LightAt { direct, indirect })
+            .collect();
+        uncover(surface, &map, &mut light);
+        borders::fit(surface, &map, &mut looking, &mut light)?;
+        Ok(Self {
+            pages: surface.pages,
+            map,
+            light,
+            looked_at: looking.looked_at,
+            stopped: looking.stopped,
+        })
+    }
+}
+
+fn place(surface: &Surface, texel: &Texel) -> Place {
+    surface.place(texel.triangle as usize, texel.weights)
+}
+
+/// The texels of the same chart a step away.
+fn neighbour(surface: &Surface, map: &TexelMap, of: usize, step: [i64; 2]) -> Option<usize> {
+    let texel = &map.texels[of];
+    let [x, y] = [0, 1].map(|k| i64::from(texel.at[k]) + step[k]);
+    let chart = |t: usize| surface.chart[map.texels[t].triangle as usize];
+    let found = map.find(texel.page, x, y);
+    found.filter(|&t| chart(t) == chart(of))
+}
+
+const BESIDE: [[i64; 2]; 4] = [[1, 0], [-1, 0], [0, 1], [0, -1]];
+
+/// Direct light, `[texel]`.
+fn direct(surface: &Surface, map: &TexelMap, looking: &mut Looking<'_>) -> Result<Vec<Vec3>> {
+    let places: Vec<Place> = map.texels.iter().map(|t| place(surface, t)).collect();
+    let mut light = looking.direct(&places)?;
+    light.resize(places.len(), Vec3::ZERO);
+    let is_edge = |&t: &usize| {
+        let beside = BESIDE
+            .into_iter()
+            .filter_map(|step| neighbour(surface, map, t, step));
+        beside.into_iter().any(|other| {
+            let (one, other) = (light[t].max_element(), light[other].max_element());
+            (one - other).abs() > EDGE * one.max(other)
+        })
+    };
+    let edges: Vec<usize> = (0..places.len()).filter(is_edge).collect();
+    let finer: Vec<Place> = (edges.iter())
+        .flat_map(|&t| {
+            let texel = &map.texels[t];
+            quarters(surface, texel).map(|weights| surface.place(texel.triangle as usize, weights))
+        })
+        .collect();
+    let found = looking.direct(&finer)?;
+    for (&t, four) in edges.iter().zip(found.chunks_exact(4)) {
+        light[t] = four.iter().sum::<Vec3>() / 4.0;
+    }
+    Ok(light)
+}
+
+/// Indirect light, `[texel]`.
+fn indirect(surface: &Surface, map: &TexelMap, looking: &mut Looking<'_>) -> Result<Vec<Vec3>> {
+    let count = map.texels.len();
+    let mut light: Vec<Option<Vec3>> = vec![None; count];
+    // What was not expected of each, and of those that are interpolated what may be left.
+    let mut surplus = vec![0.0_f32; count];
+    let is_on = |t: usize, spacing: i64| {
+        let on = |at: u32| i64::from(at) % spacing == 0;
+        map.texels[t].at.iter().all(|&at| on(at))
+    };
+    let mut mean = 0.0;
+    let mut spacing = COARSEST;
+    while spacing >= 1 {
+        let is_coarsest = spacing == COARSEST;
+        let here = |t: &usize| is_on(*t, spacing) && (is_coarsest || !is_on(*t, 2 * spacing));
+        let (mut wanted, mut expected) = (Vec::new(), Vec::new());
+        for t in (0..count).filter(here) {
+            match expect(surface, map, t, spacing, &light, &surplus).filter(|_| !is_coarsest) {
+                Some((value, left)) => {
+                    let least = UNEXPECTED[0] * value.max_element() + UNEXPECTED[1] * mean;
+                    match spacing < WHOLE && left <= least {
+                        true => {
+                            light[t] = Some(value);
+                            surplus[t] = 0.25 * left;
+                        }
+                        false => {
+                            wanted.push(t);
+                            expected.push(Some(value));
+                        }
+                    }
+                }
+                None => {
+                    wanted.push(t);
+                    expected.push(None);
+                }
+            }
+        }
+        let places: Vec<Place> = wanted
+            .iter()
+            .map(|&t| place(surface, &map.texels[t]))
+            .collect();
+        let found = looking.at(&places)?;
+        for ((&t, expected), found) in wanted.iter().zip(&expected).zip(&found) {
+            light[t] = Some(found.indirect);
+            surplus[t] = match expected {
+                Some(expected) => (found.indirect - *expected).abs().max_element(),
+                None => 0.0,
+            };
+        }
+        // Where it was stopped, what was expected.
+        for (&t, expected) in wanted.iter().zip(&expected).skip(found.len()) {
+            light[t] = *expected;
+        }
+        if is_coarsest {
+            let sum: f32 = found.iter().map(|light| light.indirect.max_element()).sum();
+            mean = sum / found.len().max(1) as f32;
+        }
+        spacing /= 2;
+    }
+    Ok(light.into_iter().map(Option::unwrap_or_default).collect())
+}
+
+/// What the lattice of twice this spacing lets expect at a texel between its own, and what was not
+/// expected of these; None at a border.
+fn expect(
+    surface: &Surface,
+    map: &TexelMap,
+    t: usize,
+    spacing: i64,
+    light: &[Option<Vec3>],
+    surplus: &[f32],
+) -> Option<(Vec3, f32)> {
+    let is_odd = |k: usize| i64::from(map.texels[t].at[k]) / spacing % 2 != 0;
+    let s = spacing;
+    let steps: &[[i64; 2]] = match (is_odd(0), is_odd(1)) {
+        (true, true) => &[[s, s], [-s, s], [s, -s], [-s, -s]],
+        (true, false) => &[[s, 0], [-s, 0]],
+        _ => &[[0, s], [0, -s]],
+    };
+    let (mut sum, mut most) = (Vec3::ZERO, 0.0_f32);
+    for &step in steps {
+        let parent = neighbour(surface, map, t, step)?;
+        sum += light[parent]?;
+        most = most.max(surplus[parent]);
+    }
+    Some((sum / steps.len() as f32, most))
+}
+
+/// A texel beneath what stands on its surface is dark; where it lies beside one that is seen, it
+/// takes the light of that, so that no darkness runs out from under.
+fn uncover(surface: &Surface, map: &TexelMap, light: &mut [LightAt]) {
+    let of = |light: &LightAt| (light.direct + light.indirect).max_element();
+    let all = (-1..=1).flat_map(|y| (-1..=1).map(move |x| [x, y]));
+    let around: Vec<[i64; 2]> = all.filter(|step| *step != [0, 0]).collect();
+    let found: Vec<(usize, LightAt)> = (0..light.len())
+        .filter_map(|t| {
+            let beside = around
+                .iter()
+                .filter_map(|&step| neighbour(surface, map, t, step));
+            let beside: Vec<LightAt> = beside.map(|other| light[other]).collect();
+            let brightest = beside.iter().map(of).fold(0.0, f32::max);
+            if of(&light[t]) >= LEAST_OPEN * brightest {
+                return None;
+            }
+            let open = || beside.iter().filter(|other| of(other) >= 0.5 * brightest);
+            let count = open().count() as f32;
+            Some((
+                t,
+                LightAt {
+                    direct: open().map(|light| light.direct).sum::<Vec3>() / count,
+                    indirect: open().map(|light| light.indirect).sum::<Vec3>() / count,
+                },
+            ))
+        })
+        .collect();
+    for (t, value) in found {
+        light[t] = value;
+    }
+}

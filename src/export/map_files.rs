@@ -1,0 +1,253 @@
+//! Light maps as files.
+
+use std::io::{self, Cursor};
+use std::path::{Path, PathBuf};
+
+use exr::prelude::{SpecificChannels, WritableImage, f16};
+use glam::Vec3;
+use image::ImageEncoder;
+use image::codecs::hdr::HdrEncoder;
+use image::codecs::png::PngEncoder;
+
+use super::light_map::LightMap;
+use super::texels::NOTHING;
+use crate::atomic_file::write_atomically;
+use crate::error::{Error, Result};
+use crate::solver::LightAt;
+
+/// Which light a map holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    Global,
+    Direct,
+    Indirect,
+}
+
+impl Part {
+    pub fn of(self, light: &LightAt) -> Vec3 {
+        match self {
+            Self::Global => light.direct + light.indirect,
+            Self::Direct => light.direct,
+            Self::Indirect => light.indirect,
+        }
+    }
+}
+
+/// A kind of file that holds a light map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MapFile {
+    /// OpenEXR of half floats: irradiance, W·m⁻².
+    Exr,
+    /// Radiance RGBE: irradiance, W·m⁻².
+    Hdr,
+    /// 8-bit RGBM: irradiance is RGB · alpha · `scale`.
+    Rgbm,
+    /// 8-bit sRGB: irradiance is the linear value times `scale`; more is cut off.
+    Srgb,
+}
+
+impl MapFile {
+    /// By a path's ending: `.exr`, `.hdr`, `.rgbm.png`, `.png`.
+    ///
+    /// # Errors
+    /// Any other ending.
+    pub fn of(path: &Path) -> Result<Self> {
+        let name = path.to_string_lossy().to_lowercase();
+        let kinds = [
+            (".exr", Self::Exr),
+            (".hdr", Self::Hdr),
+            (".rgbm.png", Self::Rgbm),
+            (".png", Self::Srgb),
+        ];
+        let found = kinds.into_iter().find(|(ending, _)| name.ends_with(ending));
+        found.map(|(_, kind)| kind).ok_or_else(|| {
+            Error::Usage(format!(
+                "light map {}: the name must end in .exr, .hdr, .rgbm.png or .png",
+                path.display()
+            ))
+        })
+    }
+}
+
+/// A page in memory: irradiance, `[row][column]` from the top, W·m⁻², RGB. Texels outside of the
+/// charts hold the light of those beside them.
+pub struct Page {
+    pub width: u32,
+    pub height: u32,
+    pub irradiance: Vec<Vec3>,
+}
+
+impl LightMap {
+    /// A page, filled between its charts.
+    pub fn page(&self, page: u32, part: Part) -> Page {
+        let (width, height) = (self.pages.width, self.pages.height);
+        let count = width as usize * height as usize;
+        let index = &self.map.index[page as usize * count..][..count];
+        let known = index.iter().map(|&t| match t {
+            NOTHING => None,
+            t => Some(part.of(&self.light[t as usize])),
+        });
+        let irradiance = filled(known.collect(), width as usize);
+        Page {
+            width,
+            height,
+            irradiance,
+        }
+    }
+
+    /// The scale of files of 8 bits, a power of two: 99.9 % of the texels are less bright.
+    pub fn scale(&self, part: Part) -> f32 {
+        let mut values: Vec<f32> = (self.light.iter())
+            .map(|light| part.of(light).max_element())
+            .collect();
+        if values.is_empty() {
+            return 1.0;
+        }
+        let at = (values.len() - 1) * 999 / 1000;
+        let (_, value, _) = values.select_nth_unstable_by(at, f32::total_cmp);
+        value.max(f32::MIN_POSITIVE).log2().ceil().exp2()
+    }
+
+    /// Writes each page to a file of its own: `NAME.exr`, or `NAME-1.exr`, `NAME-2.exr` and so on.
+    /// Returns their paths.
+    ///
+    /// # Errors
+    /// An ending that is not of a light map; a file that cannot be written.
+    pub fn write(&self, path: &Path, part: Part) -> Result<Vec<PathBuf>> {
+        let kind = MapFile::of(path)?;
+        let paths = self.paths(path);
+        let scale = self.scale(part);
+        for (number, path) in (0..).zip(&paths) {
+            self.page(number, part).write(path, kind, scale)?;
+        }
+        Ok(paths)
+    }
+
+    /// Paths of the files that [`Self::write`] writes.
+    pub fn paths(&self, path: &Path) -> Vec<PathBuf> {
+        if self.pages.count == 1 {
+            return vec![path.to_owned()];
+        }
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let (stem, ending) = name.split_once('.').unwrap_or((&name, ""));
+        (1..=self.pages.count)
+            .map(|number| path.with_file_name(format!("{stem}-{number}.{ending}")))
+            .collect()
+    }
+}
+
+/// Gives each empty texel the mean of the full ones about it, ring after ring.
+fn filled(mut texels: Vec<Option<Vec3>>, width: usize) -> Vec<Vec3> {
+    let height = texels.len() / width.max(1);
+    let mut empty: Vec<usize> = (0..texels.len()).filter(|&i| texels[i].is_none()).collect();
+    while !empty.is_empty() && empty.len() < texels.len() {
+        let found: Vec<(usize, Vec3)> = (empty.iter())
+            .filter_map(|&i| {
+                let (x, y) = (i % width, i / width);
+                let (mut sum, mut count) = (Vec3::ZERO, 0);
+                for row in y.saturating_sub(1)..(y + 2).min(height) {
+                    for column in x.saturating_sub(1)..(x + 2).min(width) {
+                        if let Some(value) = texels[row * width + column] {
+                            sum += value;
+                            count += 1;
+                        }
+                    }
+                }
+                (count > 0).then(|| (i, sum / count as f32))
+            })
+            .collect();
+        for (i, value) in found {
+            texels[i] = Some(value);
+        }
+        empty.retain(|&i| texels[i].is_none());
+    }
+    texels.into_iter().map(Option::unwrap_or_default).collect()
+}
+
+impl Page {
+    /// Writes the page; `scale` is that of files of 8 bits.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write(&self, path: &Path, kind: MapFile, scale: f32) -> Result<()> {
+        write_atomically(path, |out| {
+            let bytes = self.encoded(kind, scale)?;
+            out.write_all(&bytes)
+        })
+    }
+
+    /// The bytes of a file.
+    ///
+    /// # Errors
+    /// An encoder that fails.
+    pub fn encoded(&self, kind: MapFile, scale: f32) -> io::Result<Vec<u8>> {
+        let mut out = Cursor::new(Vec::new());
+        let (width, height) = (self.width, self.height);
+        match kind {
+            MapFile::Exr => {
+                let at = |at: exr::math::Vec2<usize>| {
+                    let value = self.irradiance[at.y() * width as usize + at.x()];
+                    let [r, g, b] = value.to_array().map(|c| f16::from_f32(c.min(65504.0)));
+                    (r, g, b)
+                };
+                let channels = SpecificChannels::rgb(at);
+                let size = (width as usize, height as usize);
+                exr::image::Image::from_channels(size, channels)
+                    .write()
+                    .to_buffered(&mut out)
+                    .map_err(io::Error::other)?;
+            }
+            MapFile::Hdr => {
+                let texels: Vec<_> = (self.irradiance.iter())
+                    .map(|value| image::Rgb(value.to_array()))
+                    .collect();
+                HdrEncoder::new(&mut out)
+                    .encode(&texels, width as usize, height as usize)
+                    .map_err(io::Error::other)?;
+            }
+            MapFile::Rgbm => {
+                let codes: Vec<u8> = (self.irradiance.iter())
+                    .flat_map(|value| rgbm(*value / scale))
+                    .collect();
+                PngEncoder::new(&mut out)
+                    .write_image(&codes, width, height, image::ExtendedColorType::Rgba8)
+                    .map_err(io::Error::other)?;
+            }
+            MapFile::Srgb => {
+                let codes = self.srgb(scale);
+                PngEncoder::new(&mut out)
+                    .write_image(&codes, width, height, image::ExtendedColorType::Rgb8)
+                    .map_err(io::Error::other)?;
+            }
+        }
+        Ok(out.into_inner())
+    }
+
+    /// 8-bit sRGB codes of the irradiance over `scale`.
+    pub fn srgb(&self, scale: f32) -> Vec<u8> {
+        (self.irradiance.iter())
+            .flat_map(|value| (*value / scale).to_array().map(srgb_code))
+            .collect()
+    }
+}
+
+/// IEC 61966-2-1.
+pub fn srgb_code(linear: f32) -> u8 {
+    let linear = linear.clamp(0.0, 1.0);
+    let coded = match linear <= 0.003_130_8 {
+        true => 12.92 * linear,
+        false => 1.055 * linear.powf(1.0 / 2.4) - 0.055,
+    };
+    (255.0 * coded).round() as u8
+}
+
+/// RGB over the greatest of them, and that as alpha, rounded up.
+fn rgbm(value: Vec3) -> [u8; 4] {
+    let most = value.max_element().clamp(1.0 / 255.0, 1.0);
+    let alpha = (255.0 * most).ceil();
+    let [r, g, b] = value.to_array().map(|c| {
+        let code = 255.0 * c / (alpha / 255.0);
+        code.clamp(0.0, 255.0).round() as u8
+    });
+    [r, g, b, alpha as u8]
+}

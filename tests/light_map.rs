@@ -1,0 +1,242 @@
+//! Light maps: charts that do not overlap, seams that agree, and light against the path tracer at
+//! texels.
+
+mod common;
+
+use std::collections::HashMap;
+
+use common::{assert_silent, device};
+use glam::{DVec2, Vec3};
+use mesolux::bake::lit_scene::LitScene;
+use mesolux::bake::quality::Quality;
+use mesolux::bake::solution::Origin;
+use mesolux::export::light_map::LightMap;
+use mesolux::export::map_files::Part;
+use mesolux::export::surface::{PADDING, Surface, Texels};
+use mesolux::export::texels::{borders, quarters};
+use mesolux::path_tracer::PathTracer;
+use mesolux::render::Light;
+use mesolux::scene::{LoadOptions, Refinement, Scene, displace, load};
+
+fn scene(name: &str, patches: Option<usize>) -> Scene {
+    let options = LoadOptions {
+        patches,
+        ..LoadOptions::default()
+    };
+    load(name, &options).expect("a built-in scene")
+}
+
+/// Bakes a scene, and finds its light map on pages of this size.
+fn mapped(scene: &Scene, texels: Texels) -> (Surface, LightMap) {
+    let settings = Quality::default().settings();
+    let solution =
+        mesolux::bake::bake(&device(), scene, &settings, |_| true).expect("the scene is baked");
+    let bake = solution.into_bake(Origin::default());
+    let lit = LitScene::new(scene, &bake).expect("a lit scene");
+    let surface = Surface::new(scene, texels, || true).expect("it is laid out");
+    let map = LightMap::new(&surface, &lit.look(), &|_| true).expect("a light map");
+    (surface, map)
+}
+
+/// Errors against the path tracer, of texels within charts and on their borders.
+struct Errors {
+    /// rms and bias over the mean, noise subtracted.
+    inside: [f64; 2],
+    border: [f64; 2],
+}
+
+/// At `count` texels of surfaces without relief and emission.
+fn errors(surface: &Surface, map: &LightMap, traced: &Scene, count: usize, paths: u32) -> Errors {
+    let tracer = PathTracer::new(traced).expect("it is traced");
+    let scene = &surface.scene;
+    let is_plain = |t: u32| {
+        let material = &scene.materials[scene.triangles[t as usize].material as usize];
+        !material.has_relief() && !material.emits()
+    };
+    let is_border = |t: usize| {
+        let texel = &map.map.texels[t];
+        let chart = |t: usize| surface.chart[map.map.texels[t].triangle as usize];
+        let [x, y] = texel.at.map(i64::from);
+        [[1, 0], [-1, 0], [0, 1], [0, -1]].iter().any(|[i, j]| {
+            let found = map.map.find(texel.page, x + i, y + j);
+            found.is_none_or(|other| {
+                chart(other) != chart(t) || map.map.texels[other].distance > 0.0
+            })
+        })
+    };
+    let inside = |t: &usize| map.map.texels[*t].distance == 0.0;
+    let all: Vec<usize> = (0..map.light.len())
+        .filter(|t| inside(t) && is_plain(map.map.texels[*t].triangle))
+        .collect();
+    let (border, within): (Vec<usize>, Vec<usize>) = all.iter().partition(|&&t| is_border(t));
+    let mean: f64 = (all.iter())
+        .map(|&t| f64::from(Part::Global.of(&map.light[t]).element_sum()) / 3.0)
+        .sum::<f64>()
+        / all.len() as f64;
+    let of = |texels: &[usize]| -> [f64; 2] {
+        let step = 0.618_033_988_749_895;
+        let (mut square, mut bias, mut seen) = (0.0, 0.0, 0);
+        for i in 0..count {
+            let t = texels[((i as f64 * step).fract() * texels.len() as f64) as usize];
+            let texel = &map.map.texels[t];
+            let found = Part::Global.of(&map.light[t]).element_sum() / 3.0;
+            // Two independent halves, so that noise falls out of their product.
+            let mut halves = [0.0; 2];
+            for (k, weights) in quarters(surface, texel).into_iter().enumerate() {
+                let place = surface.place(texel.triangle as usize, weights);
+                for (half, sum) in halves.iter_mut().enumerate() {
+                    let seed = (i * 8 + k * 2 + half) as u64;
+                    let (p, n) = (place.position, place.normal);
+                    let light = tracer.irradiance(p, n, paths, seed, Light::Global).0;
+                    *sum += f64::from(light.element_sum()) / 12.0;
+                }
+            }
+            // Beneath what stands on a surface there is no light to compare.
+            if halves[0] + halves[1] == 0.0 {
+                continue;
+            }
+            let [a, b] = halves.map(|half| f64::from(found) - half);
+            square += a * b;
+            bias += 0.5 * (a + b);
+            seen += 1;
+        }
+        let seen = f64::from(seen);
+        [(square / seen).max(0.0).sqrt() / mean, bias / seen / mean]
+    };
+    Errors {
+        inside: of(&within),
+        border: of(&border),
+    }
+}
+
+/// What interpolation gives on both sides of the seams: rms of the difference over the mean light.
+fn seams(surface: &Surface, map: &LightMap) -> (usize, f64) {
+    let scene = &surface.scene;
+    let mut sides: HashMap<[u32; 2], Vec<(usize, usize)>> = HashMap::new();
+    for (t, k) in borders(surface) {
+        let [a, b] = [k, (k + 1) % 3].map(|k| scene.triangles[t].vertices[k]);
+        sides.entry([a.min(b), a.max(b)]).or_default().push((t, k));
+    }
+    let at = |t: usize, k: usize, along: f64| -> Option<Vec3> {
+        let ends = [k, (k + 1) % 3].map(|k| surface.texel(t, k));
+        let place: DVec2 = ends[0] + along * (ends[1] - ends[0]);
+        let four = map.map.between(surface.page[t]?, place);
+        four.into_iter()
+            .try_fold(Vec3::ZERO, |sum, (texel, weight)| {
+                Some(sum + Part::Global.of(&map.light[texel?]) * weight as f32)
+            })
+    };
+    let (mut square, mut mean, mut count) = (0.0, 0.0, 0);
+    for pair in sides.values() {
+        let &[(t, k), (u, l)] = pair.as_slice() else {
+            continue;
+        };
+        let normals = |t: usize, k: usize| [k, (k + 1) % 3].map(|k| surface.normals[t][k]);
+        let ([a, b], [c, d]) = (normals(t, k), normals(u, l));
+        // The surface is smooth there: it has one light.
+        if a.dot(d).min(b.dot(c)) < 0.999 {
+            continue;
+        }
+        for i in 0..8 {
+            let along = (f64::from(i) + 0.5) / 8.0;
+            if let (Some(one), Some(other)) = (at(t, k, along), at(u, l, 1.0 - along)) {
+                square += f64::from((one - other).length_squared()) / 3.0;
+                mean += f64::from((one + other).element_sum()) / 6.0;
+                count += 1;
+            }
+        }
+    }
+    let number = f64::from(count);
+    (count as usize, (square / number).sqrt() / (mean / number))
+}
+
+/// No texel within a chart is in another; charts keep their distance.
+fn check_layout(surface: &Surface, least_used: f64) {
+    let pages = surface.pages;
+    let mut owner: HashMap<(u32, i64, i64), u32> = HashMap::new();
+    let mut covered = 0;
+    let reach = i64::from(PADDING);
+    for (t, page) in surface.page.iter().enumerate() {
+        let Some(page) = *page else {
+            continue;
+        };
+        let corners = [0, 1, 2].map(|k| surface.texel(t, k));
+        let low = corners.iter().fold(DVec2::INFINITY, |low, &c| low.min(c));
+        let high = corners
+            .iter()
+            .fold(DVec2::NEG_INFINITY, |high, &c| high.max(c));
+        for y in low.y.floor() as i64..high.y.ceil() as i64 {
+            for x in low.x.floor() as i64..high.x.ceil() as i64 {
+                let p = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
+                let side = |k: usize| {
+                    let (a, b) = (corners[k], corners[(k + 1) % 3]);
+                    (b - a).perp_dot(p - a)
+                };
+                let sides = [0, 1, 2].map(side);
+                if sides.iter().all(|&s| s > 0.0) || sides.iter().all(|&s| s < 0.0) {
+                    let known = owner.insert((page, x, y), surface.chart[t]);
+                    assert!(known.is_none_or(|chart| chart == surface.chart[t]));
+                    covered += 1;
+                }
+            }
+        }
+    }
+    // Padding: between the texels of two charts.
+    for (&(page, x, y), &chart) in &owner {
+        assert!(x >= reach && y >= reach);
+        assert!(x < i64::from(pages.width) - reach && y < i64::from(pages.height) - reach);
+        for j in -2 * reach + 1..2 * reach {
+            for i in -2 * reach + 1..2 * reach {
+                let other = owner.get(&(page, x + i, y + j));
+                assert!(
+                    other.is_none_or(|&other| other == chart),
+                    "{x}, {y}: {i}, {j}"
+                );
+            }
+        }
+    }
+    let all = f64::from(pages.width) * f64::from(pages.height) * f64::from(pages.count);
+    let used = f64::from(covered) / all;
+    println!(
+        "{} charts, {:.1} % of the texels used",
+        pages.charts,
+        100.0 * used
+    );
+    assert!(used >= least_used);
+}
+
+/// Measured by `print`ed lines: rms, bias; inside, on borders.
+fn assert_errors(errors: &Errors, limits: [f64; 2]) {
+    let [inside, border] = [errors.inside, errors.border].map(|[rms, bias]| {
+        println!("rms {:.2} %, bias {:+.2} %", 100.0 * rms, 100.0 * bias);
+        rms
+    });
+    assert!(inside <= limits[0] && border <= limits[1]);
+}
+
+#[test]
+fn cornell_box() {
+    let whole = scene("cornell-box", None);
+    let cut = whole.refined(&Refinement::default());
+    let (surface, map) = mapped(&cut, Texels::Page(256));
+    check_layout(&surface, 0.6);
+    let (count, seam) = seams(&surface, &map);
+    println!("{count} places on seams: {:.2} %", 100.0 * seam);
+    let found = errors(&surface, &map, &whole, 1000, 1000);
+    assert_errors(&found, [0.01, 0.015]);
+    assert_silent();
+}
+
+#[test]
+fn bowl_and_bunny() {
+    let scene = scene("bowl-and-bunny", Some(20_000));
+    let (surface, map) = mapped(&scene, Texels::Page(512));
+    check_layout(&surface, 0.6);
+    let (count, seam) = seams(&surface, &map);
+    println!("{count} places on seams: {:.2} %", 100.0 * seam);
+    let traced = displace(&scene).expect("displaced");
+    let found = errors(&surface, &map, &traced, 1000, 1000);
+    assert_errors(&found, [0.01, 0.015]);
+    assert!(seam <= 0.01);
+    assert_silent();
+}
