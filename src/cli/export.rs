@@ -12,6 +12,8 @@ use super::progress::{Bar, catch_interrupts, interrupted};
 use super::{Builtin, DeviceOptions};
 use mesolux::bake::lit_scene::LitScene;
 use mesolux::error::{Error, Result};
+use mesolux::export::baked_colours;
+use mesolux::export::glb::{self, Shown};
 use mesolux::export::light_map::LightMap;
 use mesolux::export::map_files::{MapFile, Part};
 use mesolux::export::sensors::{self, SensorFile, SensorGrid};
@@ -49,6 +51,16 @@ struct MapOptions {
     /// may be given several times. Several pages are OUT-1, OUT-2 and so on
     #[arg(long, value_name = "OUT.exr|.hdr|.rgbm.png|.png")]
     light_map: Vec<PathBuf>,
+    /// Write the scene as binary glTF with its light map (MOZ_lightmap, TEXCOORD_1)
+    #[arg(long, value_name = "OUT.glb")]
+    glb: Option<PathBuf>,
+    /// Write the scene as binary glTF with light and colour baked together (KHR_materials_unlit),
+    /// which every viewer shows alike
+    #[arg(long, value_name = "OUT.glb")]
+    unlit_glb: Option<PathBuf>,
+    /// Exposure of baked colours: multiplies the light by 2^EV; found from the texels if not given
+    #[arg(long, value_name = "EV", allow_hyphen_values = true)]
+    exposure: Option<f32>,
     /// The light that light maps hold
     #[arg(long, value_enum, default_value_t = Light::Global)]
     light: Light,
@@ -72,13 +84,27 @@ const PAGES: std::ops::RangeInclusive<u32> = 16..=8192;
 
 impl MapOptions {
     fn is_wanted(&self) -> bool {
-        !self.light_map.is_empty()
+        !self.light_map.is_empty() || self.glb.is_some() || self.unlit_glb.is_some()
     }
 
     fn check(&self) -> Result<()> {
         for path in &self.light_map {
             MapFile::of(path)?;
             writable(path)?;
+        }
+        for path in [&self.glb, &self.unlit_glb].into_iter().flatten() {
+            if !path
+                .extension()
+                .is_some_and(|e| e.eq_ignore_ascii_case("glb"))
+            {
+                let what = format!("{}: the name must end in .glb", path.display());
+                return Err(Error::Usage(what));
+            }
+            writable(path)?;
+        }
+        if let Some(ev) = self.exposure.filter(|ev| !(-64.0..=64.0).contains(ev)) {
+            let what = format!("--exposure {ev}: must be in -64 to 64");
+            return Err(Error::Usage(what));
         }
         if !PAGES.contains(&self.page) {
             return Err(Error::Usage(format!(
@@ -112,6 +138,25 @@ impl MapOptions {
             Light::Direct => Part::Direct,
             Light::Indirect => Part::Indirect,
         }
+    }
+
+    /// The scene with its light as glTF.
+    fn write_glb(&self, surface: &Surface, map: &LightMap) -> Result<()> {
+        let part = self.part();
+        let mut said = Vec::new();
+        if let Some(path) = &self.glb {
+            said = glb::write(path, surface, Shown::LightMap(map, part))?;
+            tracing::info!("{}: light map of scale {}", path.display(), map.scale(part));
+        }
+        if let Some(path) = &self.unlit_glb {
+            let (pages, ev) = baked_colours::pages(surface, map, part, self.exposure)?;
+            said = glb::write(path, surface, Shown::Baked(&pages))?;
+            tracing::info!("{}: baked colours, exposure {ev}", path.display());
+        }
+        for what in said {
+            tracing::warn!("{what}");
+        }
+        Ok(())
     }
 
     fn write(&self, map: &LightMap) -> Result<()> {
@@ -228,7 +273,9 @@ pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
     let lit = lit_scene.look();
     if options.maps.is_wanted() {
         let surface = laid_out(&scene, options.maps.texels())?;
-        options.maps.write(&light_map(&surface, &lit)?)?;
+        let map = light_map(&surface, &lit)?;
+        options.maps.write(&map)?;
+        options.maps.write_glb(&surface, &map)?;
     }
     if let Some(path) = &options.sensors.values {
         let light = at_places(&lit, &places)?;

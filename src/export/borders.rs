@@ -4,6 +4,8 @@
 //! which lie outside of their charts; these are chosen so that along the border the interpolated
 //! light is what the surface has there, in the least squares.
 
+use std::collections::HashMap;
+
 use glam::{DVec2, Vec3};
 
 use super::light_map::Looking;
@@ -18,14 +20,15 @@ const POINTS: f64 = 2.0;
 /// Texels along a border from one point at which indirect light is found to the next.
 const SPACING: f64 = 4.0;
 
-/// Weight of a texel's own light against that along the border.
-const OWN: f64 = 0.02;
+/// Weight of a texel's own light against that along the border: of one outside of its chart, and
+/// within.
+const OWN: [f64; 2] = [0.01, 0.2];
 
 /// Sweeps over the texels.
-const SWEEPS: usize = 60;
+const SWEEPS: usize = 200;
 
 /// A texel becomes this many times as bright as it was at most.
-const BRIGHTER: f64 = 2.0;
+const BRIGHTER: f64 = 8.0;
 
 /// Direct and indirect light.
 type Value = [f64; 6];
@@ -34,6 +37,8 @@ type Value = [f64; 6];
 struct Sample {
     texels: [(usize, f64); 4],
     light: Value,
+    /// The sample at the same place on the other side of a smooth seam.
+    other: Option<usize>,
 }
 
 fn value(direct: Vec3, indirect: Vec3) -> Value {
@@ -41,7 +46,7 @@ fn value(direct: Vec3, indirect: Vec3) -> Value {
     [a, b, c, d, e, f].map(f64::from)
 }
 
-/// Changes the texels outside of their charts.
+/// Changes the texels along the borders.
 pub(super) fn fit(
     surface: &Surface,
     map: &TexelMap,
@@ -52,11 +57,10 @@ pub(super) fn fit(
     let own: Vec<Value> = light.iter().map(|l| value(l.direct, l.indirect)).collect();
     let mut values = own.clone();
     // Samples that read each texel that may change.
-    let is_free = |t: usize| map.texels[t].distance > 0.0;
     let mut read_by: Vec<Vec<(usize, f64)>> = vec![Vec::new(); light.len()];
     for (s, sample) in samples.iter().enumerate() {
         for &(t, weight) in &sample.texels {
-            if is_free(t) && weight > 0.0 {
+            if weight > 0.0 {
                 read_by[t].push((s, weight));
             }
         }
@@ -65,13 +69,17 @@ pub(super) fn fit(
         .filter(|&t| !read_by[t].is_empty())
         .collect();
     let mut residual: Vec<Value> = samples.iter().map(|s| s.off(&values)).collect();
-    for _ in 0..SWEEPS {
+    for sweep in 0..SWEEPS {
+        if sweep % SETTLING == 0 {
+            settle(&samples, &mut residual);
+        }
         for &t in &free {
+            let weight = OWN[usize::from(map.texels[t].distance == 0.0)];
             let square: f64 = read_by[t].iter().map(|(_, w)| w * w).sum();
             for c in 0..6 {
                 let pull: f64 = read_by[t].iter().map(|&(s, w)| w * residual[s][c]).sum();
-                let back = OWN * (own[t][c] - values[t][c]);
-                let wanted = values[t][c] + (pull + back) / (square + OWN);
+                let back = weight * (own[t][c] - values[t][c]);
+                let wanted = values[t][c] + (pull + back) / (square + weight);
                 let now = wanted.clamp(0.0, BRIGHTER * own[t][c]);
                 let change = now - values[t][c];
                 values[t][c] = now;
@@ -91,6 +99,23 @@ pub(super) fn fit(
     Ok(())
 }
 
+/// Sweeps after which what is left on the two sides of a seam is made the same.
+const SETTLING: usize = 10;
+
+/// Where the two sides of a seam cannot both have the light there, they agree on what lies between.
+fn settle(samples: &[Sample], residual: &mut [Value]) {
+    for (s, sample) in samples.iter().enumerate() {
+        if let Some(other) = sample.other.filter(|&other| s < other) {
+            for c in 0..6 {
+                // Half of what they disagree by, from each.
+                let apart = residual[s][c] - residual[other][c];
+                residual[s][c] = 0.5 * apart;
+                residual[other][c] = -0.5 * apart;
+            }
+        }
+    }
+}
+
 impl Sample {
     /// What the light there is more than the interpolated one.
     fn off(&self, values: &[Value]) -> Value {
@@ -101,55 +126,133 @@ impl Sample {
     }
 }
 
+/// A piece of a border: an edge of a triangle.
+struct Edge {
+    triangle: usize,
+    corner: usize,
+    page: u32,
+    /// Whether it runs from the vertex of the higher number to that of the lower.
+    reversed: bool,
+    /// The other side of a seam across which the surface is smooth.
+    other: Option<usize>,
+}
+
+/// Cosine of the normals on both sides of a smooth seam, at least.
+const SMOOTH: f64 = 0.999;
+
+/// The edges that end charts.
+fn edges(surface: &Surface) -> Vec<Edge> {
+    let mut edges: Vec<Edge> = Vec::new();
+    let mut known: HashMap<[u32; 2], usize> = HashMap::new();
+    for (t, k) in borders(surface) {
+        let Some(page) = surface.page[t] else {
+            continue;
+        };
+        let [a, b] = [k, (k + 1) % 3].map(|k| surface.scene.triangles[t].vertices[k]);
+        let mut edge = Edge {
+            triangle: t,
+            corner: k,
+            page,
+            reversed: a > b,
+            other: None,
+        };
+        let index = edges.len();
+        if let Some(other) = known.insert([a.min(b), a.max(b)], index) {
+            let ends = |edge: &Edge| {
+                let [a, b] = [0, 1].map(|i| surface.normals[edge.triangle][(edge.corner + i) % 3]);
+                if edge.reversed { [b, a] } else { [a, b] }
+            };
+            let (one, two) = (ends(&edges[other]), ends(&edge));
+            if (0..2).all(|i| one[i].dot(two[i]) >= SMOOTH) && edges[other].other.is_none() {
+                edges[other].other = Some(index);
+                edge.other = Some(other);
+            }
+        }
+        edges.push(edge);
+    }
+    edges
+}
+
 /// A point of a border.
 struct Point {
-    texels: [(usize, f64); 4],
+    texels: Option<[(usize, f64); 4]>,
     place: Place,
     /// The two of those at which indirect light is found that it lies between, and how far.
     knots: [usize; 2],
     along: f64,
 }
 
-/// Points along the borders with their light; none of what was stopped before.
+/// Points along the borders with their light, on both sides of a smooth seam the same; none of what
+/// was stopped before.
 fn samples(surface: &Surface, map: &TexelMap, looking: &mut Looking<'_>) -> Result<Vec<Sample>> {
+    let edges = edges(surface);
+    let ends = |edge: &Edge| [0, 1].map(|i| surface.texel(edge.triangle, (edge.corner + i) % 3));
+    let length = |edge: &Edge| {
+        let [a, b] = ends(edge);
+        a.distance(b)
+    };
     let (mut points, mut knots) = (Vec::new(), Vec::new());
-    for (t, k) in borders(surface) {
-        let Some(page) = surface.page[t] else {
-            continue;
-        };
-        let ends = [k, (k + 1) % 3].map(|k| surface.texel(t, k));
-        let length = ends[0].distance(ends[1]);
-        let pieces = (length / SPACING).ceil().max(1.0) as usize;
+    // Where the points of each edge begin.
+    let mut firsts = Vec::with_capacity(edges.len());
+    for edge in &edges {
+        firsts.push(points.len());
+        let longest = edge
+            .other
+            .map_or(0.0, |other| length(&edges[other]))
+            .max(length(edge));
+        let pieces = (longest / SPACING).ceil().max(1.0) as usize;
+        let count = (POINTS * longest).ceil().max(1.0) as usize;
+        let (t, k) = (edge.triangle, edge.corner);
+        let turned = |along: f64| if edge.reversed { 1.0 - along } else { along };
+        let beside = |along: f64| surface.place(t, on_edge(surface, t, k, turned(along))[1]);
         let first = knots.len();
-        let beside = |along: f64| surface.place(t, on_edge(surface, t, k, along)[1]);
         knots.extend((0..=pieces).map(|i| beside(i as f64 / pieces as f64)));
-        let count = (POINTS * length).ceil().max(1.0) as usize;
+        let [from, to] = ends(edge);
         for i in 0..count {
             let along = (i as f64 + 0.5) / count as f64;
-            let at: DVec2 = ends[0] + along * (ends[1] - ends[0]);
-            let between = map.between(page, at);
-            let known = between.map(|(t, w)| t.map(|t| (t, w)));
-            let [Some(a), Some(b), Some(c), Some(d)] = known else {
-                continue;
-            };
+            let at: DVec2 = from + turned(along) * (to - from);
+            let between = map.between(edge.page, at).map(|(t, w)| t.map(|t| (t, w)));
             let piece = ((along * pieces as f64) as usize).min(pieces - 1);
             points.push(Point {
-                texels: [a, b, c, d],
+                texels: match between {
+                    [Some(a), Some(b), Some(c), Some(d)] => Some([a, b, c, d]),
+                    _ => None,
+                },
                 place: beside(along),
                 knots: [first + piece, first + piece + 1],
                 along: along * pieces as f64 - piece as f64,
             });
         }
     }
+    firsts.push(points.len());
     let indirect = looking.at(&knots)?;
     let places: Vec<Place> = points.iter().map(|point| point.place).collect();
     let direct = looking.direct(&places)?;
-    let sample = |(point, &direct): (&Point, &Vec3)| {
-        let [near, far] = point.knots.map(|k| indirect.get(k).map(|l| l.indirect));
-        Some(Sample {
-            texels: point.texels,
-            light: value(direct, near?.lerp(far?, point.along as f32)),
+    let light: Vec<Option<Value>> = (points.iter().enumerate())
+        .map(|(i, point)| {
+            let [near, far] = point.knots.map(|k| indirect.get(k).map(|l| l.indirect));
+            Some(value(*direct.get(i)?, near?.lerp(far?, point.along as f32)))
         })
-    };
-    Ok(points.iter().zip(&direct).filter_map(sample).collect())
+        .collect();
+    let mut samples = Vec::new();
+    let mut of_point = vec![None; points.len()];
+    for (e, edge) in edges.iter().enumerate() {
+        for i in firsts[e]..firsts[e + 1] {
+            let (Some(texels), Some(own)) = (points[i].texels, light[i]) else {
+                continue;
+            };
+            let beyond = edge.other.map(|other| firsts[other] + i - firsts[e]);
+            let there = beyond.and_then(|i| light[i]).unwrap_or(own);
+            of_point[i] = Some(samples.len());
+            samples.push(Sample {
+                texels,
+                light: std::array::from_fn(|c| 0.5 * (own[c] + there[c])),
+                other: beyond,
+            });
+        }
+    }
+    for sample in &mut samples {
+        sample.other = sample.other.and_then(|point| of_point[point]);
+    }
+    Ok(samples)
 }

@@ -1,7 +1,9 @@
 //! Light at the texels of a light map.
 //!
 //! Direct light is found at each texel. Indirect light is found on a coarse lattice of each chart,
-//! and on finer ones where it was not what the coarser ones let expect.
+//! and on finer ones where it was not what the coarser ones let expect. Texels beneath what stands on
+//! the surface are dark, but for those beside others: these take their light, so that no darkness
+//! runs out from under.
 
 use glam::Vec3;
 
@@ -36,9 +38,6 @@ const UNEXPECTED: [f32; 2] = [0.004, 0.001];
 /// Texels whose direct light differs from a neighbour's by more than this share of the larger are
 /// looked at in four places.
 const EDGE: f32 = 0.02;
-
-/// Of the brightest about it, the least light of a texel that is not covered by what stands on it.
-const LEAST_OPEN: f32 = 0.02;
 
 /// Places that are looked at between two calls of `go_on`.
 const AT_ONCE: usize = 2048;
@@ -89,19 +88,20 @@ impl LightMap {
     /// # Errors
     /// None that a surface of [`Surface::new`] can cause.
     pub fn new(surface: &Surface, lit: &Lit<'_>, go_on: &dyn Fn(usize) -> bool) -> Result<Self> {
-        let map = TexelMap::new(surface);
+        let mut map = TexelMap::new(surface);
         let mut looking = Looking {
             lit,
             go_on,
             looked_at: 0,
             stopped: false,
         };
-        let direct = direct(surface, &map, &mut looking)?;
-        let indirect = indirect(surface, &map, &mut looking)?;
+        let covered = covered(surface, &mut map, lit)?;
+        let direct = direct(surface, &map, &covered, &mut looking)?;
+        let indirect = indirect(surface, &map, &covered, &mut looking)?;
         let mut light: Vec<LightAt> = (direct.into_iter().zip(indirect))
             .map(|(direct, indirect)| LightAt { direct, indirect })
             .collect();
-        uncover(surface, &map, &mut light);
+        uncover(surface, &map, &covered, &mut light);
         borders::fit(surface, &map, &mut looking, &mut light)?;
         Ok(Self {
             pages: surface.pages,
@@ -128,8 +128,38 @@ fn neighbour(surface: &Surface, map: &TexelMap, of: usize, step: [i64; 2]) -> Op
 
 const BESIDE: [[i64; 2]; 4] = [[1, 0], [-1, 0], [0, 1], [0, -1]];
 
+/// Whether all of a texel is covered, `[texel]`. One whose middle is covered is looked at in another
+/// place.
+fn covered(surface: &Surface, map: &mut TexelMap, lit: &Lit<'_>) -> Result<Vec<bool>> {
+    let places: Vec<Place> = map.texels.iter().map(|t| place(surface, t)).collect();
+    let mut covered = lit.covered(&places)?;
+    let doubtful: Vec<usize> = (0..places.len()).filter(|&t| covered[t]).collect();
+    let weights: Vec<_> = (doubtful.iter())
+        .map(|&t| quarters(surface, &map.texels[t]))
+        .collect();
+    let others: Vec<Place> = (doubtful.iter().zip(&weights))
+        .flat_map(|(&t, four)| {
+            let triangle = map.texels[t].triangle as usize;
+            four.map(|weights| surface.place(triangle, weights))
+        })
+        .collect();
+    let found = lit.covered(&others)?;
+    for ((&t, four), found) in doubtful.iter().zip(&weights).zip(found.chunks_exact(4)) {
+        if let Some(open) = found.iter().position(|is_covered| !is_covered) {
+            map.texels[t].weights = four[open];
+            covered[t] = false;
+        }
+    }
+    Ok(covered)
+}
+
 /// Direct light, `[texel]`.
-fn direct(surface: &Surface, map: &TexelMap, looking: &mut Looking<'_>) -> Result<Vec<Vec3>> {
+fn direct(
+    surface: &Surface,
+    map: &TexelMap,
+    covered: &[bool],
+    looking: &mut Looking<'_>,
+) -> Result<Vec<Vec3>> {
     let places: Vec<Place> = map.texels.iter().map(|t| place(surface, t)).collect();
     let mut light = looking.direct(&places)?;
     light.resize(places.len(), Vec3::ZERO);
@@ -137,10 +167,11 @@ fn direct(surface: &Surface, map: &TexelMap, looking: &mut Looking<'_>) -> Resul
         let beside = BESIDE
             .into_iter()
             .filter_map(|step| neighbour(surface, map, t, step));
-        beside.into_iter().any(|other| {
-            let (one, other) = (light[t].max_element(), light[other].max_element());
-            (one - other).abs() > EDGE * one.max(other)
-        })
+        !covered[t]
+            && beside.into_iter().any(|other| {
+                let (one, other) = (light[t].max_element(), light[other].max_element());
+                (one - other).abs() > EDGE * one.max(other)
+            })
     };
     let edges: Vec<usize> = (0..places.len()).filter(is_edge).collect();
     let finer: Vec<Place> = (edges.iter())
@@ -150,14 +181,32 @@ fn direct(surface: &Surface, map: &TexelMap, looking: &mut Looking<'_>) -> Resul
         })
         .collect();
     let found = looking.direct(&finer)?;
-    for (&t, four) in edges.iter().zip(found.chunks_exact(4)) {
-        light[t] = four.iter().sum::<Vec3>() / 4.0;
+    let hidden = looking.lit.covered(&finer)?;
+    let of_edges = edges
+        .iter()
+        .zip(found.chunks_exact(4))
+        .zip(hidden.chunks_exact(4));
+    for ((&t, four), hidden) in of_edges {
+        let open = || {
+            four.iter()
+                .zip(hidden)
+                .filter(|(_, is_hidden)| !**is_hidden)
+        };
+        let count = open().count();
+        if count > 0 {
+            light[t] = open().map(|(light, _)| *light).sum::<Vec3>() / count as f32;
+        }
     }
     Ok(light)
 }
 
 /// Indirect light, `[texel]`.
-fn indirect(surface: &Surface, map: &TexelMap, looking: &mut Looking<'_>) -> Result<Vec<Vec3>> {
+fn indirect(
+    surface: &Surface,
+    map: &TexelMap,
+    covered: &[bool],
+    looking: &mut Looking<'_>,
+) -> Result<Vec<Vec3>> {
     let count = map.texels.len();
     let mut light: Vec<Option<Vec3>> = vec![None; count];
     // What was not expected of each, and of those that are interpolated what may be left.
@@ -170,7 +219,9 @@ fn indirect(surface: &Surface, map: &TexelMap, looking: &mut Looking<'_>) -> Res
     let mut spacing = COARSEST;
     while spacing >= 1 {
         let is_coarsest = spacing == COARSEST;
-        let here = |t: &usize| is_on(*t, spacing) && (is_coarsest || !is_on(*t, 2 * spacing));
+        let here = |t: &usize| {
+            !covered[*t] && is_on(*t, spacing) && (is_coarsest || !is_on(*t, 2 * spacing))
+        };
         let (mut wanted, mut expected) = (Vec::new(), Vec::new());
         for t in (0..count).filter(here) {
             match expect(surface, map, t, spacing, &light, &surplus).filter(|_| !is_coarsest) {
@@ -244,34 +295,21 @@ fn expect(
     Some((sum / steps.len() as f32, most))
 }
 
-/// A texel beneath what stands on its surface is dark; where it lies beside one that is seen, it
-/// takes the light of that, so that no darkness runs out from under.
-fn uncover(surface: &Surface, map: &TexelMap, light: &mut [LightAt]) {
-    let of = |light: &LightAt| (light.direct + light.indirect).max_element();
+/// Gives covered texels beside others the light of these.
+fn uncover(surface: &Surface, map: &TexelMap, covered: &[bool], light: &mut [LightAt]) {
     let all = (-1..=1).flat_map(|y| (-1..=1).map(move |x| [x, y]));
     let around: Vec<[i64; 2]> = all.filter(|step| *step != [0, 0]).collect();
-    let found: Vec<(usize, LightAt)> = (0..light.len())
-        .filter_map(|t| {
-            let beside = around
-                .iter()
-                .filter_map(|&step| neighbour(surface, map, t, step));
-            let beside: Vec<LightAt> = beside.map(|other| light[other]).collect();
-            let brightest = beside.iter().map(of).fold(0.0, f32::max);
-            if of(&light[t]) >= LEAST_OPEN * brightest {
-                return None;
-            }
-            let open = || beside.iter().filter(|other| of(other) >= 0.5 * brightest);
-            let count = open().count() as f32;
-            Some((
-                t,
-                LightAt {
-                    direct: open().map(|light| light.direct).sum::<Vec3>() / count,
-                    indirect: open().map(|light| light.indirect).sum::<Vec3>() / count,
-                },
-            ))
-        })
-        .collect();
-    for (t, value) in found {
-        light[t] = value;
+    for t in (0..light.len()).filter(|&t| covered[t]) {
+        let beside = around
+            .iter()
+            .filter_map(|&step| neighbour(surface, map, t, step));
+        let open: Vec<LightAt> = beside.filter(|&o| !covered[o]).map(|o| light[o]).collect();
+        if !open.is_empty() {
+            let count = open.len() as f32;
+            light[t] = LightAt {
+                direct: open.iter().map(|light| light.direct).sum::<Vec3>() / count,
+                indirect: open.iter().map(|light| light.indirect).sum::<Vec3>() / count,
+            };
+        }
     }
 }

@@ -137,7 +137,7 @@ impl LightMap {
 }
 
 /// Gives each empty texel the mean of the full ones about it, ring after ring.
-fn filled(mut texels: Vec<Option<Vec3>>, width: usize) -> Vec<Vec3> {
+pub(super) fn filled(mut texels: Vec<Option<Vec3>>, width: usize) -> Vec<Vec3> {
     let height = texels.len() / width.max(1);
     let mut empty: Vec<usize> = (0..texels.len()).filter(|&i| texels[i].is_none()).collect();
     while !empty.is_empty() && empty.len() < texels.len() {

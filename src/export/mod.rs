@@ -6,7 +6,9 @@
 //! places ─► sensors
 //! ```
 
+pub mod baked_colours;
 mod borders;
+pub mod glb;
 pub mod light_map;
 pub mod map_files;
 pub mod sensors;

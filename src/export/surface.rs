@@ -83,18 +83,24 @@ impl Surface {
             scene: scene.name.clone(),
             what: format!("no light map can be laid out: {e}"),
         })?;
+        // One page is cropped to its charts: engines want all of it.
+        let height = match texels {
+            Texels::Page(size) => size.max(atlas.height),
+            Texels::PerUnit { .. } => atlas.height,
+        };
+        let whole = DVec2::new(1.0, f64::from(atlas.height) / f64::from(height));
         let pages = Pages {
             count: atlas.page_count,
             width: atlas.width,
-            height: atlas.height,
+            height,
             texels_per_unit: f64::from(atlas.texels_per_unit) / unit,
             charts: atlas.chart_count,
-            used: f64::from(atlas.utilization),
+            used: f64::from(atlas.utilization) * whole.y,
         };
         let laid = &atlas.meshes[0];
         let of = |t: usize| [0, 1, 2].map(|k| &laid.vertices[laid.indices[3 * t + k] as usize]);
         let uv = (0..scene.triangles.len())
-            .map(|t| of(t).map(|v| DVec2::new(f64::from(v.uv[0]), f64::from(v.uv[1]))));
+            .map(|t| of(t).map(|v| whole * DVec2::new(f64::from(v.uv[0]), f64::from(v.uv[1]))));
         let page = (0..scene.triangles.len()).map(|t| {
             let [a, b, c] = of(t).map(|v| v.page.zip(v.chart));
             a.filter(|_| a == b && b == c).map(|(page, _)| page)
@@ -110,7 +116,9 @@ impl Surface {
         })
     }
 
-    /// A place by its barycentric coordinates in a triangle.
+    /// A place by its barycentric coordinates in a triangle: of a surface that its normals curve
+    /// outwards, on the curve, so that its facets do not shade it (Hanika, "Hacking the shadow
+    /// terminator", Ray Tracing Gems II, 2021).
     pub fn place(&self, triangle: usize, weights: [f64; 3]) -> Place {
         let mix = |of: [DVec3; 3]| -> DVec3 {
             weights
@@ -122,8 +130,14 @@ impl Surface {
         let corners = self.scene.corners(&self.scene.triangles[triangle]);
         let [a, b, c] = corners;
         let flat = (b - a).cross(c - a).normalize_or(DVec3::Y);
+        let position = mix(corners);
+        let normals = self.normals[triangle];
+        let lifts = [0, 1, 2].map(|k| {
+            let below = (position - corners[k]).dot(normals[k]).min(0.0);
+            -below * normals[k]
+        });
         Place {
-            position: mix(corners),
+            position: position + mix(lifts),
             normal: mix(self.normals[triangle]).try_normalize().unwrap_or(flat),
         }
     }

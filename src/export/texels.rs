@@ -216,6 +216,11 @@ pub fn quarters(surface: &Surface, texel: &Texel) -> [[f64; 3]; 4] {
     let t = texel.triangle as usize;
     let corners = [0, 1, 2].map(|k| surface.texel(t, k));
     let [x, y] = texel.at.map(f64::from);
-    [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)]
-        .map(|(i, j)| nearest(corners, DVec2::new(x + i, y + j)).0)
+    [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)].map(|(i, j)| {
+        let (weights, distance) = nearest(corners, DVec2::new(x + i, y + j));
+        match distance > 0.0 {
+            true => inset(corners, weights),
+            false => weights,
+        }
+    })
 }

@@ -7,7 +7,7 @@ use super::{Estimator, Problem, ReliefLight, Solver};
 use crate::error::{Error, Result};
 use crate::math::directions::Directions;
 use crate::mesh::elements::Elements;
-use crate::mesh::near::{Looking, Outlook};
+use crate::mesh::near::{Looking, Outlook, Part};
 use crate::mesh::shadow_tree::ShadowTree;
 use crate::mesh::sources::Source;
 use crate::scene::sky::Sky;
@@ -57,13 +57,21 @@ pub struct Lit<'a> {
     outlook: Outlook<'a>,
     /// `[source]`
     sent: Vec<Sent>,
+    /// Of what a part sends to a place, the unevenness that it may have, W·m⁻².
+    allowed: f64,
     by_direction: Option<&'a SentByDirection>,
 }
+
+/// Of the mean reflected radiosity of a scene, the unevenness of what a part sends to a place, at
+/// most: where it is more, near members count for more than others.
+const UNEVEN: f64 = 2e-4;
 
 /// Radiosity of the parts of a source, `[part]`.
 struct Sent {
     emitted: Vec<DVec3>,
     reflected: Vec<DVec3>,
+    /// Standard deviation of what the members reflect, W·m⁻².
+    unevenness: Vec<f64>,
     /// Whether a member sends by direction.
     directed: bool,
 }
@@ -136,7 +144,13 @@ impl<'a> Lit<'a> {
         let sent: Vec<Sent> = (sources.clone().into_par_iter())
             .map(|s| Sent::of(of.elements, &outlook, s, radiosity, by_direction))
             .collect();
+        let areas = || of.elements.area.iter();
+        let reflected = |e: usize| (radiosity[e] - of.elements.emitted[e]).max_element();
+        let power = areas()
+            .enumerate()
+            .map(|(e, area)| area * f64::from(reflected(e)));
         Self {
+            allowed: UNEVEN * power.sum::<f64>() / areas().sum::<f64>(),
             of,
             outlook,
             sent,
@@ -154,17 +168,21 @@ impl<'a> Lit<'a> {
     pub fn at(&self, places: &[Place]) -> Result<Vec<LightAt>> {
         self.each(places, |looking, p, normal| {
             let mut indirect = DVec3::ZERO;
-            self.outlook.parts(p, normal, looking, |s, part, factor| {
-                let sent = &self.sent[s];
-                indirect += match (self.by_direction, self.outlook.tree(s)) {
-                    (Some(by), Some(tree)) if sent.directed => {
-                        let members = &tree.members[part.first..part.first + part.count];
-                        let towards = self.towards(by, members, p, sent, part.index);
-                        factor * (towards - sent.emitted[part.index])
-                    }
-                    _ => factor * sent.reflected[part.index],
-                };
-            });
+            let cut = |s: usize, part: Part, factor: f64| {
+                factor * self.sent[s].unevenness[part.index] > self.allowed
+            };
+            self.outlook
+                .parts(p, normal, looking, cut, |s, part, factor| {
+                    let sent = &self.sent[s];
+                    indirect += match (self.by_direction, self.outlook.tree(s)) {
+                        (Some(by), Some(tree)) if sent.directed => {
+                            let members = &tree.members[part.first..part.first + part.count];
+                            let towards = self.towards(by, members, p, sent, part.index);
+                            factor * (towards - sent.emitted[part.index])
+                        }
+                        _ => factor * sent.reflected[part.index],
+                    };
+                });
             if let Some(sky) = self.of.sky {
                 indirect += self.outlook.sky(sky, p, normal);
             }
@@ -181,6 +199,14 @@ impl<'a> Lit<'a> {
     /// As [`Self::at`].
     pub fn direct_at(&self, places: &[Place]) -> Result<Vec<Vec3>> {
         self.each(places, |_, p, normal| self.direct(p, normal).as_vec3())
+    }
+
+    /// Whether each place lies beneath what stands on its surface, where no one sees it.
+    ///
+    /// # Errors
+    /// As [`Self::at`].
+    pub fn covered(&self, places: &[Place]) -> Result<Vec<bool>> {
+        self.each(places, |_, p, normal| self.outlook.is_covered(p, normal))
     }
 
     /// Finds a value at each place, internal units.
@@ -255,6 +281,7 @@ impl Sent {
             return Self {
                 emitted: Vec::new(),
                 reflected: Vec::new(),
+                unevenness: Vec::new(),
                 directed: false,
             };
         };
@@ -267,9 +294,15 @@ impl Sent {
         };
         let is_directed =
             |by: &SentByDirection| tree.members.iter().any(|&e| by.meso[e as usize].is_some());
+        let reflected = mean(&|e| radiosity[e] - elements.emitted[e]);
+        let square = |e: usize| (radiosity[e] - elements.emitted[e]).powf(2.0);
+        let squares = mean(&square);
+        let deviation =
+            |(square, mean): (&DVec3, &DVec3)| (square - mean * mean).max_element().max(0.0).sqrt();
         Self {
+            unevenness: squares.iter().zip(&reflected).map(deviation).collect(),
             emitted: mean(&|e| elements.emitted[e]),
-            reflected: mean(&|e| radiosity[e] - elements.emitted[e]),
+            reflected,
             directed: by_direction.is_some_and(is_directed),
         }
     }

@@ -28,7 +28,7 @@ use crate::mesh::shadow_tree::ShadowTree;
 use crate::mesh::sources::Source;
 use crate::structs::{NearFactor, NearPart, NearVector, ShadowOccluder};
 use pair::Search;
-pub use parts::PartTree;
+pub use parts::{Part, PartTree};
 pub use places::{Looking, Outlook};
 pub(super) use rays::{blocked, first_met};
 use receivers::Receiver;
@@ -150,6 +150,7 @@ impl NearPairs {
             elements,
             occluders,
             nearness: *nearness,
+            scattered: false,
         };
         let found: Vec<OfSource> = (sources.par_iter())
             .map(|source| match source.is_surface() {

@@ -7,7 +7,7 @@ use super::rays::{blocked, is_clear};
 use super::receivers::Receiver;
 use super::seen::{ABOVE, Before, ROUGH, Seen};
 use super::{Nearness, OfSource, Pair};
-use crate::math::form_factor::{sample_points, to_triangle};
+use crate::math::form_factor::{sample_points, spread_in_triangle, to_triangle};
 use crate::math::kept::{as_kept, direction_code, kept_direction};
 use crate::mesh::elements::Elements;
 use crate::mesh::shadow_tree::ShadowTree;
@@ -22,6 +22,9 @@ const CLOSE: f64 = 4.0;
 /// about an element nearly touches, since a part of it may see what the source's eye does not.
 const BESIDE: f64 = 0.1;
 
+/// Golden ratio's fraction, whose multiples spread evenly.
+const GOLDEN: f64 = 0.618_033_988_749_895;
+
 /// Times that a single member is cut in four for its visibility.
 const CUTS: u32 = 3;
 
@@ -30,6 +33,9 @@ pub(super) struct Search<'a> {
     pub elements: &'a Elements,
     pub occluders: &'a ShadowTree<ShadowOccluder>,
     pub nearness: Nearness,
+    /// Whether a part counts as seen by a place of its own choice on it, not by its middle. Middles
+    /// err to one side near silhouettes; other places cancel out over many parts.
+    pub scattered: bool,
 }
 
 impl Search<'_> {
@@ -173,7 +179,8 @@ impl Search<'_> {
         let (elements, e) = (self.elements, before.element);
         let first = found.entries.len();
         let OfSource { entries, rays, .. } = found;
-        self.seen_parts(seen, before, factors, rays, |part, factor| {
+        let cut = |_: Part, _: f64| false;
+        self.seen_parts(seen, before, factors, rays, cut, |part, factor| {
             let factor = match elements.is_meso(e) {
                 true => self.by_direction(seen, before, part, factor),
                 false => Vec3::new(0.0, 0.0, factor as f32),
@@ -207,13 +214,15 @@ impl Search<'_> {
         });
     }
 
-    /// Each part that a receiver sees any of, with its form factor.
+    /// Each part that a receiver sees any of, with its form factor. `cut` says whether a part is too
+    /// uneven to count as one, by what its form factor would be.
     fn seen_parts(
         &self,
         seen: &Seen,
         before: &Before,
         factors: &mut [f64],
         rays: &mut u64,
+        cut: impl Fn(Part, f64) -> bool,
         mut each: impl FnMut(Part, f64),
     ) {
         let mut stack = vec![seen.tree.whole()];
@@ -225,24 +234,29 @@ impl Search<'_> {
             if all <= 0.0 {
                 continue;
             }
-            if all > self.nearness.part && part.count > 1 {
+            if part.count > 1 && (all > self.nearness.part || cut(part, all)) {
                 stack.extend(part.halves());
                 continue;
             }
             let factor = self.seen_factor(seen, before, part, factors, rays);
             if factor > 0.0 {
-                each(part, factor);
+                match self.scattered {
+                    true => shares(seen, before, part, factor, LEVELS, factors, &mut each),
+                    false => each(part, factor),
+                }
             }
         }
     }
 
-    /// What a place sees of a source: each part with its form factor. `factors` is room, `[part]`.
+    /// What a place sees of a source: each part with its form factor. `factors` is room, `[part]`;
+    /// `cut` as in [`Self::seen_parts`].
     pub fn seen_from(
         &self,
         place: DVec3,
         normal: DVec3,
         seen: &Seen,
         factors: &mut [f64],
+        cut: impl Fn(Part, f64) -> bool,
         each: impl FnMut(Part, f64),
     ) {
         let before = Before {
@@ -252,7 +266,7 @@ impl Search<'_> {
             clear: false,
         };
         seen.note(seen.tree.whole(), &before, factors);
-        self.seen_parts(seen, &before, factors, &mut 0, each);
+        self.seen_parts(seen, &before, factors, &mut 0, cut, each);
     }
 
     /// A form factor to a part as a vector in the frame of an element with relief.
@@ -285,8 +299,13 @@ impl Search<'_> {
         if before.clear {
             return factors[part.index];
         }
-        // A ray to the member that half of the part's form factor lies before.
-        let member = seen.middle_member(part, before, factors);
+        // A ray to the member that half of the part's form factor lies before, or another share.
+        let turn = seen.tree.members[part.first] as usize;
+        let share = match self.scattered {
+            true => (GOLDEN * (turn as f64 + 0.5)).fract(),
+            false => 0.5,
+        };
+        let member = seen.member_at(share, part, before, factors);
         let (triangle, centroid) = (&seen.triangles[member], seen.centroid(member));
         let n = before.normal;
         let open = |&(p, weight): &(DVec3, f64)| {
@@ -295,7 +314,11 @@ impl Search<'_> {
                 _ => seen.factor(part, p, n),
             };
             if part.count == 1 {
-                return weight * self.open_share(p, n, triangle, factor, CUTS, rays);
+                let place = match self.scattered {
+                    true => spread_in_triangle(turn),
+                    false => [1.0 / 3.0; 2],
+                };
+                return weight * self.open_share(p, n, triangle, place, factor, CUTS, rays);
             }
             if factor <= 0.0 {
                 return 0.0;
@@ -309,13 +332,15 @@ impl Search<'_> {
         before.samples.iter().map(open).sum()
     }
 
-    /// What a place sees of a triangle whose whole form factor is this: that of the quarters whose
-    /// middles it sees.
+    /// What a place sees of a triangle whose whole form factor is this: that of the quarters of which
+    /// it sees a place, the same in each.
+    #[allow(clippy::too_many_arguments)] // all of a recursion
     fn open_share(
         &self,
         p: DVec3,
         n: DVec3,
         triangle: &[DVec3; 3],
+        place: [f64; 2],
         factor: f64,
         cuts: u32,
         rays: &mut u64,
@@ -326,8 +351,8 @@ impl Search<'_> {
         let [a, b, c] = *triangle;
         if cuts == 0 || factor <= self.nearness.part {
             *rays += 1;
-            let middle = (a + b + c) / 3.0;
-            return match blocked(self.occluders, p, middle) {
+            let [u, v] = place;
+            return match blocked(self.occluders, p, a + u * (b - a) + v * (c - a)) {
                 true => 0.0,
                 false => factor,
             };
@@ -337,11 +362,55 @@ impl Search<'_> {
             .iter()
             .map(|quarter| {
                 let factor = to_triangle(p, n, quarter).max(0.0);
-                self.open_share(p, n, quarter, factor, cuts - 1, rays)
+                self.open_share(p, n, quarter, place, factor, cuts - 1, rays)
             })
             .sum()
     }
 }
+
+/// Gives the parts of a part, some levels down, their shares of its form factor.
+fn shares(
+    seen: &Seen,
+    before: &Before,
+    part: Part,
+    factor: f64,
+    levels: u32,
+    factors: &mut [f64],
+    each: &mut impl FnMut(Part, f64),
+) {
+    if levels == 0 || part.count == 1 {
+        each(part, factor);
+        return;
+    }
+    let halves = part.halves();
+    let of = halves.map(|half| {
+        if factors[half.index].is_nan() {
+            seen.note(half, before, factors);
+        }
+        factors[half.index]
+    });
+    let sum = of[0] + of[1];
+    if sum <= 0.0 {
+        each(part, factor);
+        return;
+    }
+    for (half, of) in halves.into_iter().zip(of) {
+        if of > 0.0 {
+            shares(
+                seen,
+                before,
+                half,
+                factor * of / sum,
+                levels - 1,
+                factors,
+                each,
+            );
+        }
+    }
+}
+
+/// Levels down a part of which its form factor is shared out: near members count for more.
+const LEVELS: u32 = 2;
 
 /// Sine of the lowest light that a part's direction is taken from.
 const LEAST_HEIGHT: f64 = 1e-3;

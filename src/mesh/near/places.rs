@@ -6,14 +6,14 @@ use rayon::prelude::*;
 use super::emitters::{Emitter, Looker};
 use super::pair::Search;
 use super::parts::Part;
-use super::rays::blocked;
+use super::rays::{blocked, first_met};
 use super::seen::Seen;
 use super::sky_seen::sky_seen;
 use super::{Nearness, PartTree};
 use crate::constants::{KIND_BEAM, KIND_POINT, KIND_SUN};
 use crate::mesh::elements::Elements;
 use crate::mesh::shadow_tree::ShadowTree;
-use crate::mesh::sources::Source;
+use crate::mesh::sources::{FAR, Source};
 use crate::scene::sky::Sky;
 use crate::structs::ShadowOccluder;
 
@@ -58,6 +58,7 @@ impl<'a> Outlook<'a> {
                     source: 0.0,
                     part: PART,
                 },
+                scattered: true,
             },
             sources,
             emitters,
@@ -76,19 +77,23 @@ impl<'a> Outlook<'a> {
     }
 
     /// Each part of a surface that a place with this normal sees any of: source, part and form
-    /// factor. Internal units.
+    /// factor. Internal units. `cut` says whether a part of a source is too uneven to count as one,
+    /// by its form factor as if nothing stood between.
     pub fn parts(
         &self,
         place: DVec3,
         normal: DVec3,
         looking: &mut Looking,
+        cut: impl Fn(usize, Part, f64) -> bool,
         mut each: impl FnMut(usize, Part, f64),
     ) {
         for (s, seen) in self.seen.iter().enumerate() {
             if let Some(seen) = seen {
                 let factors = &mut looking.0;
                 let part = |part: Part, factor: f64| each(s, part, factor);
-                self.search.seen_from(place, normal, seen, factors, part);
+                let cut = |part: Part, factor: f64| cut(s, part, factor);
+                let search = &self.search;
+                search.seen_from(place, normal, seen, factors, cut, part);
             }
         }
     }
@@ -129,6 +134,12 @@ impl<'a> Outlook<'a> {
                 each(s, factor);
             }
         }
+    }
+
+    /// Whether a place lies beneath what stands on its surface: along the normal it sees a back first.
+    pub fn is_covered(&self, place: DVec3, normal: DVec3) -> bool {
+        let met = first_met(self.search.occluders, place, FAR * normal);
+        met.is_some_and(|(_, is_back)| is_back)
     }
 
     /// Irradiance by what a place sees of a sky.

@@ -201,10 +201,15 @@ impl Seen {
         }
     }
 
-    /// The member before and after which lie halves of a part's form factor. Notes in `factors`
-    /// what it finds on the way.
-    pub fn middle_member(&self, mut part: Part, before: &Before, factors: &mut [f64]) -> usize {
-        let mut left = 0.5;
+    /// The member before which lies this share of a part's form factor. Notes in `factors` what it
+    /// finds on the way.
+    pub fn member_at(
+        &self,
+        mut left: f64,
+        mut part: Part,
+        before: &Before,
+        factors: &mut [f64],
+    ) -> usize {
         while part.count > 1 {
             let [of_one, of_other] = part.halves().map(|half| {
                 if factors[half.index].is_nan() {
