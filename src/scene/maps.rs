@@ -42,7 +42,20 @@ impl HeightMap {
         path: &Path,
         channel: Option<Channel>,
     ) -> Result<(Self, Option<String>)> {
-        let mut image = Channels::read(path)?;
+        Self::from_channels(path, Channels::read(path)?, channel)
+    }
+
+    /// As [`Self::load`], of an image that was decoded; `path` names it.
+    #[cfg(feature = "formats")]
+    pub(super) fn from_image(path: &Path, decoded: DynamicImage) -> Result<Self> {
+        Ok(Self::from_channels(path, Channels::of(decoded), None)?.0)
+    }
+
+    fn from_channels(
+        path: &Path,
+        mut image: Channels,
+        channel: Option<Channel>,
+    ) -> Result<(Self, Option<String>)> {
         if let Some(channel) = channel {
             for texel in &mut image.texels {
                 *texel = [channel.of(*texel); 3];

@@ -146,7 +146,8 @@ fn near_samples_are_weighted() {
                 .map(|(p, weight)| weight * seen.factor(seen.tree.whole(), p, before.normal));
             assert!((factor - each.iter().sum::<f64>()).abs() <= MOST);
             assert!(
-                seen.member_at(0.5, seen.tree.whole(), &before, &mut factors) < seen.triangles.len()
+                seen.member_at(0.5, seen.tree.whole(), &before, &mut factors)
+                    < seen.triangles.len()
             );
         }
     }

@@ -9,7 +9,7 @@ use gltf::{Accessor, Document, Semantic};
 use crate::error::{Error, Result};
 
 /// Extensions whose content is used, or whose absence changes nothing that is.
-const KNOWN: [&str; 8] = [
+const KNOWN: [&str; 9] = [
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
@@ -18,6 +18,7 @@ const KNOWN: [&str; 8] = [
     "KHR_materials_clearcoat",
     "KHR_materials_unlit",
     "KHR_texture_transform",
+    "MOZ_lightmap",
 ];
 
 /// Whether an accessor has these dimensions, and one of these types.

@@ -15,7 +15,7 @@ use crate::scene::assemble::free_name;
 use crate::scene::masks::{AlphaMap, AlphaMask, DEFAULT_CUTOFF};
 use crate::scene::material::{DEFAULT_KD, MadeUp};
 use crate::scene::said::Said;
-use crate::scene::{Material, NormalMap, Texture};
+use crate::scene::{HeightMap, Material, NormalMap, Texture};
 
 /// The materials of a file, and after them the one of primitives without any.
 pub(super) struct Materials {
@@ -89,6 +89,7 @@ struct Maps {
     colours: HashMap<usize, Arc<Texture>>,
     normals: HashMap<usize, Arc<NormalMap>>,
     alphas: HashMap<usize, Arc<AlphaMap>>,
+    heights: HashMap<usize, Arc<HeightMap>>,
 }
 
 impl Materials {
@@ -166,6 +167,11 @@ impl Materials {
                     .push(about("the base colour repeats outside 0..1"));
             }
         }
+        if let Some((texture, scale)) = heights(file, from) {
+            material.map_height = Some(maps.heights(file, &texture)?);
+            material.height_scale = scale;
+            place.get_or_insert(Place::FIRST);
+        }
         let mut emission_place = None;
         if let Some(map) = from.emissive_texture() {
             let texture = maps.colours(file, &map.texture())?;
@@ -225,9 +231,23 @@ impl Maps {
         kept(&mut self.alphas, file, texture, alphas)
     }
 
+    fn heights(&mut self, file: &File, texture: &gltf::Texture) -> Result<Arc<HeightMap>> {
+        kept(&mut self.heights, file, texture, HeightMap::from_image)
+    }
+
     fn normals(&mut self, file: &File, texture: &gltf::Texture) -> Result<Arc<NormalMap>> {
         kept(&mut self.normals, file, texture, NormalMap::from_image)
     }
+}
+
+/// Heights that Mesolux itself has written in the extras of a material, and their scale.
+fn heights<'a>(file: &'a File, from: &gltf::Material) -> Option<(gltf::Texture<'a>, f32)> {
+    let extras: serde_json::Value = serde_json::from_str(from.extras().as_ref()?.get()).ok()?;
+    let of = extras.get("mesolux")?;
+    let index = of.get("heightTexture")?.get("index")?.as_u64()?;
+    let scale = of.get("heightScale")?.as_f64()? as f32;
+    let texture = file.document.textures().nth(usize::try_from(index).ok()?)?;
+    Some((texture, scale))
 }
 
 /// The map of a texture, made of its image unless that has been done.
