@@ -18,6 +18,7 @@ use mesolux::export::light_map::LightMap;
 use mesolux::export::map_files::{MapFile, Part};
 use mesolux::export::sensors::{self, SensorFile, SensorGrid};
 use mesolux::export::surface::{Surface, Texels};
+use mesolux::export::web;
 use mesolux::scene::Scene;
 use mesolux::solver::{LightAt, Lit, Place};
 
@@ -58,7 +59,11 @@ struct MapOptions {
     /// which every viewer shows alike
     #[arg(long, value_name = "OUT.glb")]
     unlit_glb: Option<PathBuf>,
-    /// Exposure of baked colours: multiplies the light by 2^EV; found from the texels if not given
+    /// Write a folder with a page that shows the scene with its light in a browser, for any static
+    /// server; it needs nothing from elsewhere
+    #[arg(long, value_name = "DIR")]
+    web: Option<PathBuf>,
+    /// Exposure of baked colours and of the page: multiplies the light by 2^EV; found from the texels if not given
     #[arg(long, value_name = "EV", allow_hyphen_values = true)]
     exposure: Option<f32>,
     /// The light that light maps hold
@@ -84,7 +89,8 @@ const PAGES: std::ops::RangeInclusive<u32> = 16..=8192;
 
 impl MapOptions {
     fn is_wanted(&self) -> bool {
-        !self.light_map.is_empty() || self.glb.is_some() || self.unlit_glb.is_some()
+        let files = [&self.glb, &self.unlit_glb, &self.web];
+        !self.light_map.is_empty() || files.into_iter().any(Option::is_some)
     }
 
     fn check(&self) -> Result<()> {
@@ -152,6 +158,11 @@ impl MapOptions {
             let (pages, ev) = baked_colours::pages(surface, map, part, self.exposure)?;
             said = glb::write(path, surface, Shown::Baked(&pages))?;
             tracing::info!("{}: baked colours, exposure {ev}", path.display());
+        }
+        if let Some(folder) = &self.web {
+            said = web::write(folder, surface, map, self.exposure)?;
+            let folder = folder.display();
+            tracing::info!("{folder}: a page; python3 -m http.server -d {folder} shows it");
         }
         for what in said {
             tracing::warn!("{what}");

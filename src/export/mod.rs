@@ -14,3 +14,4 @@ pub mod map_files;
 pub mod sensors;
 pub mod surface;
 pub mod texels;
+pub mod web;
