@@ -1,0 +1,164 @@
+//! The page of `export --web` in Chromium on a display in memory: its picture beside `render`'s, and
+//! real mouse events.
+#![cfg(all(target_os = "linux", feature = "window"))]
+
+#[allow(dead_code)] // used by the tests of the window as well
+#[path = "../view/harness.rs"]
+mod harness;
+mod server;
+
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use image::RgbImage;
+use mesolux::render::ldr;
+
+use harness::{Display, device, difference, mesolux, picture, told};
+use server::{Server, State};
+
+/// Pixels of the page: the whole display.
+const SIZE: (u32, u32) = (1024, 768);
+
+struct Browser(Child);
+
+impl Browser {
+    fn open(display: &Display, profile: &std::path::Path, address: &str) -> Self {
+        let names = ["chromium", "chromium-browser", "google-chrome"];
+        let child = names.into_iter().find_map(|name| {
+            Command::new(name)
+                .args([
+                    "--no-sandbox",
+                    "--no-first-run",
+                    "--kiosk",
+                    "--hide-scrollbars",
+                ])
+                .args([
+                    "--use-gl=angle",
+                    "--use-angle=swiftshader",
+                    "--enable-unsafe-swiftshader",
+                ])
+                .args([
+                    "--window-position=0,0",
+                    &format!("--window-size={},{}", SIZE.0, SIZE.1),
+                ])
+                .arg(format!("--user-data-dir={}", profile.display()))
+                .arg(address)
+                .env("DISPLAY", &display.name)
+                .stdout(Stdio::null())
+                .stderr(Stdio::null())
+                .spawn()
+                .ok()
+        });
+        Self(child.expect("the test needs Chromium (Debian: chromium)"))
+    }
+}
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// Waits until the page is as wanted.
+#[track_caller]
+fn wait(server: &Server, what: &str, wanted: impl Fn(&State) -> bool) -> State {
+    let begin = Instant::now();
+    loop {
+        match server.state() {
+            Some(state) if wanted(&state) => return state,
+            state => {
+                let title = state.map(|state| state.title);
+                assert!(
+                    begin.elapsed() < Duration::from_secs(120),
+                    "{what}: {title:?}"
+                );
+            }
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+/// Linear values of a picture's codes.
+fn linear(image: &RgbImage) -> Vec<[f32; 3]> {
+    let linear = |code: u8| {
+        let c = f32::from(code) / 255.0;
+        match c <= 0.040_45 {
+            true => c / 12.92,
+            false => ((c + 0.055) / 1.055).powf(2.4),
+        }
+    };
+    image.pixels().map(|p| p.0.map(linear)).collect()
+}
+
+#[test]
+fn the_page_shows_the_light_and_is_moved_by_the_mouse() {
+    let folder = tempfile::tempdir().expect("a folder for the test");
+    let run = |args: &[&str]| {
+        let mut command = mesolux(folder.path(), args);
+        let output = command.args(device()).output().expect("the program runs");
+        assert!(output.status.success(), "{}", told(&output));
+    };
+    run(&["bake", "cornell-box", "-o", "box.safetensors", "--no-cache"]);
+    run(&[
+        "export",
+        "box.safetensors",
+        "--page",
+        "512",
+        "--web",
+        "page",
+        "--exposure",
+        "1",
+    ]);
+    let display = Display::new();
+    let server = Server::start(&folder.path().join("page"));
+    let _browser = Browser::open(&display, &folder.path().join("profile"), &server.address);
+    let first = wait(&server, "the first picture", |s| {
+        s.title == "cornell-box: global, 1.00"
+    });
+    let (width, height) = first.picture.dimensions();
+    let size = format!("{width}x{height}");
+    run(&[
+        "render",
+        "box.safetensors",
+        "-o",
+        "box.png",
+        "--exposure",
+        "1",
+        "--size",
+        &size,
+    ]);
+    let expected = picture(folder.path(), "box.png");
+    let errors = ldr(&linear(&first.picture), &linear(&expected), width);
+    let error = errors.iter().sum::<f32>() / errors.len() as f32;
+    println!("FLIP {error:.4} beside `render`");
+    assert!(error <= FLIP);
+
+    let (x, y) = (SIZE.0 / 2, 2 * SIZE.1 / 3);
+    let to = |x: u32, y: u32| display.xdotool(&["mousemove", &x.to_string(), &y.to_string()]);
+    to(x, y);
+    display.xdotool(&["mousedown", "1"]);
+    to(x + 60, y + 10);
+    to(x + 120, y + 20);
+    display.xdotool(&["mouseup", "1"]);
+    let orbited = wait(&server, "an orbit", |s| {
+        difference(&s.picture, &first.picture) > 4.0
+    });
+    display.xdotool(&["click", "--repeat", "4", "4"]);
+    wait(&server, "a zoom", |s| {
+        difference(&s.picture, &orbited.picture) > 2.0
+    });
+    display.xdotool(&["click", "--repeat", "2", "--delay", "80", "1"]);
+    wait(&server, "back", |s| {
+        difference(&s.picture, &first.picture) < 0.01
+    });
+    let [left, top] = first.indirect;
+    to(left, top);
+    display.xdotool(&["click", "1"]);
+    let indirect = wait(&server, "indirect light", |s| s.title.contains("indirect"));
+    let part = |image: &RgbImage| harness::mean(image).iter().sum::<f64>();
+    assert!(part(&indirect.picture) < 0.8 * part(&first.picture));
+}
+
+/// Mean difference of the two pictures. Measured: 0.0143.
+const FLIP: f32 = 0.03;
