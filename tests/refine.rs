@@ -73,6 +73,12 @@ fn cuts_follow_the_triangles() {
         let corners = cut.corners(a).into_iter().zip(again.corners(b));
         assert!(corners.into_iter().all(|(a, b)| a.distance(b) < 1e-12));
     }
+    // And back.
+    for whole in [cut.uncut(), again.uncut()] {
+        assert_eq!(whole.triangles, scene.triangles);
+        assert_eq!(whole.vertices, scene.vertices);
+        assert_eq!(whole.hash(), scene.hash());
+    }
 }
 
 /// No corner lies on another triangle's edge: every edge is shared as the input's was.

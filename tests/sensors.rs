@@ -185,3 +185,59 @@ fn a_wide_lamp_in_part_shadow() {
 
 /// Of the light at any place. Measured: 2.3e-3, 3.2e-5 in the mean.
 const PART_SHADOW: f64 = 5e-3;
+
+/// What cannot be written is refused with one line and exit code 2, before anything is baked.
+#[test]
+fn wrong_exports_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder for the test");
+    std::fs::write(folder.path().join("a.pts"), "0 0 0 0 1 0\n").expect("written");
+    std::fs::write(folder.path().join("bad.pts"), "0 0 0 0 1\n").expect("written");
+    for (args, said) in [
+        (&[][..], "nothing to write"),
+        (&["--light-map", "a.jpg"], "a.jpg"),
+        (&["--light-map", "none/a.exr"], "none/a.exr"),
+        (&["--glb", "a.gltf"], "a.gltf"),
+        (&["--page", "3", "--glb", "a.glb"], "--page 3"),
+        (
+            &["--texels-per-unit", "-1", "--glb", "a.glb"],
+            "texels-per-unit",
+        ),
+        (&["--sensors", "a.pts"], "--values"),
+        (&["--values", "a.csv"], "--sensors"),
+        (&["--sensors", "a.pts", "--values", "a.txt"], "a.txt"),
+        (&["--sensors", "bad.pts", "--values", "a.csv"], "bad.pts:1"),
+        (&["--sensors", "none.pts", "--values", "a.csv"], "none.pts"),
+        (
+            &["--sensor-grid", "nothing,1", "--values", "a.csv"],
+            "nothing",
+        ),
+        (
+            &["--sensor-grid", "white", "--values", "a.csv"],
+            "floor,0.5",
+        ),
+        (
+            &[
+                "--lumens-per-watt",
+                "0",
+                "--sensors",
+                "a.pts",
+                "--values",
+                "a.csv",
+            ],
+            "lumens",
+        ),
+    ] {
+        let output = Command::new(env!("CARGO_BIN_EXE_mesolux"))
+            .current_dir(folder.path())
+            .args(["export", "cornell-box"])
+            .args(args)
+            .output()
+            .expect("the program runs");
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {text}");
+        assert!(text.contains(said), "{args:?}: {text}");
+        assert!(!text.contains("panicked"), "{text}");
+    }
+    let left = std::fs::read_dir(folder.path()).expect("a folder").count();
+    assert_eq!(left, 2, "nothing is written");
+}

@@ -57,12 +57,13 @@ pub struct Lit<'a> {
     outlook: Outlook<'a>,
     /// `[source]`
     sent: Vec<Sent>,
-    /// Of what a part sends to a place, the unevenness that it may have, W·m⁻².
-    allowed: f64,
+    /// Of what a part sends to a place, the unevenness that it may have, W·m⁻²: of emitted and of
+    /// reflected light.
+    allowed: [f64; 2],
     by_direction: Option<&'a SentByDirection>,
 }
 
-/// Of the mean reflected radiosity of a scene, the unevenness of what a part sends to a place, at
+/// Of the mean radiosity of a scene, emitted or reflected, the unevenness of what a part sends to a place, at
 /// most: where it is more, near members count for more than others.
 const UNEVEN: f64 = 2e-4;
 
@@ -70,8 +71,8 @@ const UNEVEN: f64 = 2e-4;
 struct Sent {
     emitted: Vec<DVec3>,
     reflected: Vec<DVec3>,
-    /// Standard deviation of what the members reflect, W·m⁻².
-    unevenness: Vec<f64>,
+    /// Standard deviations of what the members emit and reflect, W·m⁻².
+    unevenness: [Vec<f64>; 2],
     /// Whether a member sends by direction.
     directed: bool,
 }
@@ -144,13 +145,17 @@ impl<'a> Lit<'a> {
         let sent: Vec<Sent> = (sources.clone().into_par_iter())
             .map(|s| Sent::of(of.elements, &outlook, s, radiosity, by_direction))
             .collect();
-        let areas = || of.elements.area.iter();
-        let reflected = |e: usize| (radiosity[e] - of.elements.emitted[e]).max_element();
-        let power = areas()
-            .enumerate()
-            .map(|(e, area)| area * f64::from(reflected(e)));
+        let elements = of.elements;
+        let whole: f64 = elements.area.iter().sum();
+        let mean = |of: &dyn Fn(usize) -> Vec3| -> f64 {
+            let power =
+                (0..elements.len()).map(|e| elements.area[e] * f64::from(of(e).max_element()));
+            power.sum::<f64>() / whole
+        };
+        let emitted = mean(&|e| elements.emitted[e]);
+        let reflected = mean(&|e| radiosity[e] - elements.emitted[e]);
         Self {
-            allowed: UNEVEN * power.sum::<f64>() / areas().sum::<f64>(),
+            allowed: [emitted, reflected].map(|mean| UNEVEN * mean),
             of,
             outlook,
             sent,
@@ -169,7 +174,7 @@ impl<'a> Lit<'a> {
         self.each(places, |looking, p, normal| {
             let mut indirect = DVec3::ZERO;
             let cut = |s: usize, part: Part, factor: f64| {
-                factor * self.sent[s].unevenness[part.index] > self.allowed
+                factor * self.sent[s].unevenness[1][part.index] > self.allowed[1]
             };
             self.outlook
                 .parts(p, normal, looking, cut, |s, part, factor| {
@@ -228,7 +233,10 @@ impl<'a> Lit<'a> {
     /// Irradiance straight from emitters, point lights, beams and suns.
     fn direct(&self, p: DVec3, normal: DVec3) -> DVec3 {
         let mut sum = DVec3::ZERO;
-        self.outlook.emitters(p, normal, |s, part, factor| {
+        let uneven = |s: usize, part: Part, factor: f64| {
+            factor * self.sent[s].unevenness[0][part.index] > self.allowed[0]
+        };
+        self.outlook.emitters(p, normal, uneven, |s, part, factor| {
             sum += factor * self.sent[s].emitted[part.index];
         });
         let mut add = |s: usize, share: f64| sum += share * self.of.sources[s].emitted.as_dvec3();
@@ -281,7 +289,7 @@ impl Sent {
             return Self {
                 emitted: Vec::new(),
                 reflected: Vec::new(),
-                unevenness: Vec::new(),
+                unevenness: Default::default(),
                 directed: false,
             };
         };
@@ -294,14 +302,23 @@ impl Sent {
         };
         let is_directed =
             |by: &SentByDirection| tree.members.iter().any(|&e| by.meso[e as usize].is_some());
-        let reflected = mean(&|e| radiosity[e] - elements.emitted[e]);
-        let square = |e: usize| (radiosity[e] - elements.emitted[e]).powf(2.0);
-        let squares = mean(&square);
-        let deviation =
-            |(square, mean): (&DVec3, &DVec3)| (square - mean * mean).max_element().max(0.0).sqrt();
+        let emitted = |e: usize| elements.emitted[e];
+        let reflected = |e: usize| radiosity[e] - elements.emitted[e];
+        let deviations = |of: &dyn Fn(usize) -> Vec3, means: &[DVec3]| -> Vec<f64> {
+            let squares = mean(&|e| of(e).powf(2.0));
+            (squares.iter().zip(means))
+                .map(|(square, mean)| (square - mean * mean).max_element().max(0.0).sqrt())
+                .collect()
+        };
+        let means = [mean(&emitted), mean(&reflected)];
+        let unevenness = [
+            deviations(&emitted, &means[0]),
+            deviations(&reflected, &means[1]),
+        ];
+        let [emitted, reflected] = means;
         Self {
-            unevenness: squares.iter().zip(&reflected).map(deviation).collect(),
-            emitted: mean(&|e| elements.emitted[e]),
+            unevenness,
+            emitted,
             reflected,
             directed: by_direction.is_some_and(is_directed),
         }

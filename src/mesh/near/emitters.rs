@@ -94,20 +94,29 @@ fn fill(seen: &Seen, part: Part, directions: &[DVec3], furthest: &mut [DVec3]) {
 }
 
 impl Looker<'_> {
-    /// Each part of the emitter that is seen, with the form factor of what is seen of it.
-    pub fn look(&self, seen: &Seen, emitter: &Emitter, mut each: impl FnMut(Part, f64)) {
+    /// Each part of the emitter that is seen, with the form factor of what is seen of it. `uneven` says
+    /// whether a part emits too unevenly to count as one, by its whole form factor.
+    pub fn look(
+        &self,
+        seen: &Seen,
+        emitter: &Emitter,
+        uneven: impl Fn(Part, f64) -> bool,
+        mut each: impl FnMut(Part, f64),
+    ) {
         let whole = seen.tree.whole();
         let all = self.factor(seen, whole);
         if all <= 0.0 {
             return;
         }
-        if is_clear(self.occluders, &[self.place], &emitter.hull) {
-            each(whole, all);
-            return;
-        }
+        let clear = is_clear(self.occluders, &[self.place], &emitter.hull);
         let most = PART.min(OF_WHOLE * all);
         let mut stack = vec![(whole, all)];
         while let Some((part, factor)) = stack.pop() {
+            let even = part.count == 1 || !uneven(part, factor);
+            if clear && even {
+                each(part, factor);
+                continue;
+            }
             if part.count == 1 {
                 let open = self.open(&seen.triangles[part.first], factor, most, CUTS);
                 if open > 0.0 {
@@ -115,7 +124,7 @@ impl Looker<'_> {
                 }
                 continue;
             }
-            if factor <= most {
+            if factor <= most && even && !clear {
                 let middle = seen.centre(part);
                 let inside = |&corner: &DVec3| middle + INSIDE * (corner - middle);
                 let mut views = emitter.corners(part).iter().map(inside).chain([middle]);

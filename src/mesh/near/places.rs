@@ -99,8 +99,15 @@ impl<'a> Outlook<'a> {
     }
 
     /// Each part of an emitter that a place with this normal sees any of: source, part, and the form
-    /// factor of what is seen of it, up to the edges of shadows.
-    pub fn emitters(&self, place: DVec3, normal: DVec3, mut each: impl FnMut(usize, Part, f64)) {
+    /// factor of what is seen of it, up to the edges of shadows. `uneven` says whether a part of a
+    /// source emits too unevenly to count as one, by its whole form factor.
+    pub fn emitters(
+        &self,
+        place: DVec3,
+        normal: DVec3,
+        uneven: impl Fn(usize, Part, f64) -> bool,
+        mut each: impl FnMut(usize, Part, f64),
+    ) {
         let looker = Looker {
             occluders: self.search.occluders,
             place,
@@ -108,7 +115,8 @@ impl<'a> Outlook<'a> {
         };
         for (s, (emitter, seen)) in self.emitters.iter().zip(&self.seen).enumerate() {
             if let (Some(emitter), Some(seen)) = (emitter, seen) {
-                looker.look(seen, emitter, |part, factor| each(s, part, factor));
+                let uneven = |part: Part, factor: f64| uneven(s, part, factor);
+                looker.look(seen, emitter, uneven, |part, factor| each(s, part, factor));
             }
         }
     }
