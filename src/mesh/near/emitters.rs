@@ -16,6 +16,10 @@ const PART: f64 = 1.0 / 192.0;
 /// The same of what the place would see of the whole emitter.
 const OF_WHOLE: f64 = 1.0 / 8.0;
 
+/// A part is this many of its radii off before it counts as points: then its form factor is within
+/// some 10⁻⁵.
+const POINTS: f64 = 8.0;
+
 /// Times that a member is cut in four.
 const CUTS: u32 = 5;
 
@@ -113,7 +117,8 @@ impl Looker<'_> {
         let mut stack = vec![(whole, all)];
         while let Some((part, factor)) = stack.pop() {
             let even = part.count == 1 || !uneven(part, factor);
-            if clear && even {
+            let small = part.count == 1 || seen.is_beyond(part, self.place, POINTS);
+            if clear && even && small {
                 each(part, factor);
                 continue;
             }
@@ -124,7 +129,7 @@ impl Looker<'_> {
                 }
                 continue;
             }
-            if factor <= most && even && !clear {
+            if factor <= most && even && small && !clear {
                 let middle = seen.centre(part);
                 let inside = |&corner: &DVec3| middle + INSIDE * (corner - middle);
                 let mut views = emitter.corners(part).iter().map(inside).chain([middle]);
@@ -142,7 +147,10 @@ impl Looker<'_> {
     }
 
     fn factor(&self, seen: &Seen, part: Part) -> f64 {
-        seen.factor(part, self.place, self.normal)
+        match part.count {
+            1 => self.of(&seen.triangles[part.first]),
+            _ => seen.factor(part, self.place, self.normal),
+        }
     }
 
     fn sees(&self, at: DVec3) -> bool {

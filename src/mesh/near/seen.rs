@@ -227,6 +227,12 @@ impl Seen {
         part.first
     }
 
+    /// Whether a part is further off than this many of its radii.
+    pub fn is_beyond(&self, part: Part, p: DVec3, radii: f64) -> bool {
+        let far = &self.far[part.index];
+        far.centre.distance(p) > radii * far.radius
+    }
+
     /// Centroid of a part's area.
     pub fn centre(&self, part: Part) -> DVec3 {
         self.far[part.index].centre
