@@ -1,6 +1,6 @@
 //! `mesolux export`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::{ArgMatches, Args, ValueEnum};
@@ -16,6 +16,7 @@ use mesolux::export::baked_colours;
 use mesolux::export::glb::{self, Shown};
 use mesolux::export::light_map::LightMap;
 use mesolux::export::map_files::{MapFile, Part};
+use mesolux::export::probes;
 use mesolux::export::sensors::{self, SensorFile, SensorGrid};
 use mesolux::export::surface::{Surface, Texels};
 use mesolux::export::web;
@@ -35,6 +36,8 @@ pub struct Options {
     maps: MapOptions,
     #[command(flatten)]
     sensors: SensorOptions,
+    #[command(flatten)]
+    probes: ProbeOptions,
     #[command(flatten)]
     bake_scene: BakeScene,
     #[command(flatten)]
@@ -223,6 +226,63 @@ fn grid(text: &str) -> std::result::Result<SensorGrid, String> {
     })
 }
 
+#[derive(Args)]
+#[command(next_help_heading = "Probes")]
+struct ProbeOptions {
+    /// Write light at probes: irradiance in spherical harmonics of the second degree
+    #[arg(long, value_name = "OUT.json")]
+    probes: Option<PathBuf>,
+    /// Probes along x, y and z in the box about the scene
+    #[arg(long, value_name = "NXxNYxNZ", default_value = "8x4x8", value_parser = counts)]
+    probe_grid: [u32; 3],
+}
+
+fn counts(text: &str) -> std::result::Result<[u32; 3], String> {
+    let numbers: Vec<u32> = (text.split(['x', 'X', '×']))
+        .map_while(|n| n.parse().ok().filter(|n| (1..=1024).contains(n)))
+        .collect();
+    match numbers.try_into() {
+        Ok(counts) if text.split(['x', 'X', '×']).count() == 3 => Ok(counts),
+        _ => Err("must be like 8x4x8, each of 1 to 1024".to_owned()),
+    }
+}
+
+impl ProbeOptions {
+    fn check(&self) -> Result<()> {
+        match &self.probes {
+            Some(path)
+                if !path
+                    .extension()
+                    .is_some_and(|e| e.eq_ignore_ascii_case("json")) =>
+            {
+                let what = format!("{}: the name must end in .json", path.display());
+                Err(Error::Usage(what))
+            }
+            Some(path) => writable(path),
+            None => Ok(()),
+        }
+    }
+
+    fn write(&self, path: &Path, scene: &Scene, lit: &Lit<'_>) -> Result<()> {
+        let positions = probes::grid(scene, self.probe_grid);
+        let around = probes::places(&positions);
+        let light = at_places(lit, &around)?;
+        if light.len() < around.len() {
+            let what = format!("{}: stopped by Ctrl-C, and not written", path.display());
+            return Err(Error::Usage(what));
+        }
+        let found = probes::probes(&positions, &light, &lit.covered(&around)?);
+        probes::write(path, self.probe_grid, &found)?;
+        let inside = found.iter().filter(|probe| !probe.valid).count();
+        tracing::info!(
+            "{}: {} probes, {inside} of them within solids",
+            path.display(),
+            found.len()
+        );
+        Ok(())
+    }
+}
+
 /// Most sensors of one grid.
 const MOST_SENSORS: usize = 10_000_000;
 
@@ -261,8 +321,11 @@ impl SensorOptions {
 pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
     options.sensors.check()?;
     options.maps.check()?;
-    if options.sensors.values.is_none() && !options.maps.is_wanted() {
-        let what = "nothing to write: give --light-map, or --values with --sensors";
+    options.probes.check()?;
+    let probes = options.probes.probes.as_deref();
+    if options.sensors.values.is_none() && !options.maps.is_wanted() && probes.is_none() {
+        let what = "nothing to write: give --light-map, --glb, --web, --probes, or --values with \
+                    --sensors";
         return Err(Error::Usage(what.into()));
     }
     let wanted = Wanted {
@@ -287,6 +350,9 @@ pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
         let map = light_map(&surface, &lit)?;
         options.maps.write(&map)?;
         options.maps.write_glb(&surface, &map)?;
+    }
+    if let Some(path) = probes {
+        options.probes.write(path, &scene, &lit)?;
     }
     if let Some(path) = &options.sensors.values {
         let light = at_places(&lit, &places)?;

@@ -21,8 +21,9 @@ const POINTS: f64 = 2.0;
 const SPACING: f64 = 4.0;
 
 /// Weight of a texel's own light against that along the border: of one outside of its chart, and
-/// within.
-const OWN: [f64; 2] = [0.01, 0.2];
+/// within. With a tenth of these, seams agree to 1.3 % in place of 1.5 %, and light on borders is off by
+/// 1.2 % in place of 0.5 %.
+const OWN: [f64; 2] = [0.02, 0.5];
 
 /// Sweeps over the texels.
 const SWEEPS: usize = 200;
@@ -106,12 +107,10 @@ const SETTLING: usize = 10;
 fn settle(samples: &[Sample], residual: &mut [Value]) {
     for (s, sample) in samples.iter().enumerate() {
         if let Some(other) = sample.other.filter(|&other| s < other) {
-            for c in 0..6 {
-                // Half of what they disagree by, from each.
-                let apart = residual[s][c] - residual[other][c];
-                residual[s][c] = 0.5 * apart;
-                residual[other][c] = -0.5 * apart;
-            }
+            // Half of what they disagree by, from each.
+            let apart: Value = std::array::from_fn(|c| residual[s][c] - residual[other][c]);
+            residual[s] = apart.map(|a| 0.5 * a);
+            residual[other] = apart.map(|a| -0.5 * a);
         }
     }
 }

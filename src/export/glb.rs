@@ -51,7 +51,7 @@ pub fn write(path: &Path, surface: &Surface, shown: Shown<'_>) -> Result<Vec<Str
 /// The bytes of the file, and what is left out.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn encode(surface: &Surface, shown: Shown<'_>) -> Result<(Vec<u8>, Vec<String>)> {
     let mut document = Document::default();
     let mut said = Vec::new();

@@ -11,6 +11,7 @@ mod borders;
 pub mod glb;
 pub mod light_map;
 pub mod map_files;
+pub mod probes;
 pub mod sensors;
 pub mod surface;
 pub mod texels;

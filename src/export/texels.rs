@@ -14,7 +14,7 @@ pub struct Texel {
     pub page: u32,
     pub triangle: u32,
     /// Barycentric coordinates of the place nearest to the texel's middle; of one outside the chart,
-    /// [`INSET`] within.
+    /// 0.05 texels within.
     pub weights: [f64; 3],
     /// From the middle to that place, texels; 0 within the chart.
     pub distance: f64,

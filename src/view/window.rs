@@ -137,7 +137,7 @@ impl App {
         match read {
             Err(error) => viewer.fail(error),
             Ok(opened) => {
-                let switches = viewer.switches.clone();
+                let switches = viewer.switches;
                 if let Some(window) = self.close() {
                     self.show(opened, window, since)?;
                 }
