@@ -104,22 +104,23 @@ fn the_detailed_picture_is_that_of_render() {
 fn another_scene_is_opened() {
     let room = Room::new();
     let script = "set detail off\nframes 2\nbake\nset panel off\nscreenshot first.png
-         open relief.toml\nbake\nscreenshot relief.png
-         set panel on\nframes 3\nmove 120 58\nframes 2\npress left\nrelease left\nframes 3
-         screenshot menu.png\nmove 60 83\nframes 2\npress left\nrelease left\nframes 3
-         wait 1\nbake\nset panel off\nscreenshot again.png";
+         open cornell-box\nbake\nscreenshot other.png
+         set panel on\nframes 9\nmove 120 58\nframes 3\npress left\nrelease left\nframes 9
+         move 60 83\nframes 3\npress left\nrelease left\nframes 3
+         bake\nset panel off\nscreenshot again.png";
     let text = view_in("640x480", room.path(), "room.toml", script);
     let lines = text.matches("first picture with light after").count();
     assert_eq!(lines, 3, "one for each scene: {text}");
-    let [first, relief, again] =
-        ["first.png", "relief.png", "again.png"].map(|name| room.picture(name));
-    let found = difference(&first, &relief);
-    println!("relief changes codes by {found:.3} in the mean");
-    assert!(found > 0.05);
-    // Measured: 0, once 9e-4.
-    let found = difference(&first, &again);
-    assert!(found < 2e-3, "{found}");
+    let [first, other, again] =
+        ["first.png", "other.png", "again.png"].map(|name| room.picture(name));
+    let [apart, same] = [&other, &again].map(|picture| difference(&first, picture));
+    println!("codes differ by {apart:.2} from another scene, by {same:.3} from the same");
+    assert!(apart > APART && same < SAME);
 }
+
+/// Mean differences of codes. Measured: 41; 0 to 0.28, by the slices that the bake was solved in.
+const APART: f64 = 20.0;
+const SAME: f64 = 0.6;
 
 /// A part of a picture: left, top, width, height.
 fn part(picture: &RgbImage, [left, top, width, height]: [u32; 4]) -> RgbImage {

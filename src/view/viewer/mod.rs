@@ -210,9 +210,9 @@ impl Viewer {
         !self.progress.done
     }
 
-    /// Whether the light shown is that of a finished bake.
+    /// Whether the light shown is that of a finished bake, and no other scene is to be shown.
     pub fn is_baked(&self) -> bool {
-        self.snapshot.epoch == self.epoch && self.snapshot.progress.done
+        self.opening.is_none() && self.snapshot.epoch == self.epoch && self.snapshot.progress.done
     }
 
     /// Whether there is any light to show.
