@@ -212,11 +212,11 @@ fn check_layout(surface: &Surface, least_used: f64) {
 }
 
 /// rms within charts and on their borders. Measured of 1,000 texels each: 0.35 and 0.69 %; 0.24 and
-/// 0.54 %. Of the 400 here with their noise: see the printed lines.
+/// 0.54 %; of the 400 here: 0.22 and 0.61 %; 0.51 and 0.33 %.
 const CORNELL_BOX: [f64; 2] = [0.007, 0.014];
 const BOWL_AND_BUNNY: [f64; 2] = [0.01, 0.011];
 
-/// Measured: 1.5 % with 512 texels a side, where most charts of the bunny are a few texels wide.
+/// Measured: 1.75 % with 512 texels a side, where most charts of the bunny are a few texels wide.
 const SEAMS: f64 = 0.03;
 
 fn assert_errors(errors: &Errors, limits: [f64; 2]) {
