@@ -42,8 +42,8 @@ fn no_light_leaks_through_a_thin_wall() {
     let positions = grid(&build.scene, [8, 4, 4]);
     let around = places(&positions);
     let light = lit.at(&around).expect("good places");
-    let covered = lit.covered(&around).expect("good places");
-    let found = probes(&positions, &light, &covered);
+    let backs = lit.backs(&around).expect("good places");
+    let found = probes(&positions, &light, &backs);
     let solid = |p: DVec3| p.x > 0.2 && p.x < 0.6 && p.y < 0.5 && p.z > 0.2 && p.z < 0.6;
     let mean = |c: usize| {
         let own = found

@@ -237,13 +237,21 @@ struct ProbeOptions {
     probe_grid: [u32; 3],
 }
 
+/// Most probes of a grid.
+const MOST_PROBES: u32 = 100_000;
+
 fn counts(text: &str) -> std::result::Result<[u32; 3], String> {
     let numbers: Vec<u32> = (text.split(['x', 'X', '×']))
         .map_while(|n| n.parse().ok().filter(|n| (1..=1024).contains(n)))
         .collect();
-    match numbers.try_into() {
-        Ok(counts) if text.split(['x', 'X', '×']).count() == 3 => Ok(counts),
-        _ => Err("must be like 8x4x8, each of 1 to 1024".to_owned()),
+    match <[u32; 3]>::try_from(numbers) {
+        Ok(counts)
+            if text.split(['x', 'X', '×']).count() == 3
+                && counts.iter().product::<u32>() <= MOST_PROBES =>
+        {
+            Ok(counts)
+        }
+        _ => Err(format!("must be like 8x4x8, {MOST_PROBES} probes at most")),
     }
 }
 
@@ -271,7 +279,7 @@ impl ProbeOptions {
             let what = format!("{}: stopped by Ctrl-C, and not written", path.display());
             return Err(Error::Usage(what));
         }
-        let found = probes::probes(&positions, &light, &lit.covered(&around)?);
+        let found = probes::probes(&positions, &light, &lit.backs(&around)?);
         probes::write(path, self.probe_grid, &found)?;
         let inside = found.iter().filter(|probe| !probe.valid).count();
         tracing::info!(

@@ -9,6 +9,7 @@ use clap::Args;
 
 use super::bake::{SolveOptions, beside, writable};
 use super::bake_scene::BakeScene;
+use super::baked::is_bake;
 use super::camera::CameraOptions;
 use super::render::size;
 use super::{Builtin, DeviceOptions};
@@ -97,10 +98,7 @@ struct Reader {
 impl Reader {
     fn open(&self, input: &str) -> Result<Opened> {
         let path = Path::new(input);
-        let is_bake = path
-            .extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("safetensors"));
-        let (scene, bake, kept) = if is_bake {
+        let (scene, bake, kept) = if is_bake(input) {
             let bake = Bake::load(path)?;
             let scene = self.bake_scene.of(path, &bake)?;
             let beside = beside(path);

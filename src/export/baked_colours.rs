@@ -10,11 +10,11 @@ use rayon::prelude::*;
 use super::light_map::LightMap;
 use super::map_files::Part;
 use super::surface::Surface;
-use super::texels::{NOTHING, quarters};
+use super::texels::quarters;
 use crate::error::{Error, Result};
 use crate::picture::Picture;
 
-/// Pages as PNG, exposed and tone-mapped as pictures are, and the exposure that was used: without one
+/// Pages as PNG, exposed and tone-mapped as pictures are, and the exposure that was used: without one,
 /// the brightest tenth of the texels that do not emit is brought to 0.6 and more.
 ///
 /// # Errors
@@ -69,19 +69,11 @@ pub fn pages(
     let meter = Picture::new((count, 1), colours, &metered.collect::<Vec<_>>());
     let exposure = exposure.unwrap_or(meter.automatic_exposure);
     let pages = (0..map.pages.count).map(|page| {
-        let (width, height) = (map.pages.width, map.pages.height);
-        let texels = width as usize * height as usize;
-        let index = &map.map.index[page as usize * texels..][..texels];
-        let known = index.iter().map(|&t| match t {
-            NOTHING => None,
-            t => Some(radiance[t as usize].0),
-        });
-        let filled = super::map_files::filled(known.collect(), width as usize);
-        let picture = Picture::new(
-            (width, height),
-            filled.iter().map(|c| c.to_array()).collect(),
-            &vec![false; texels],
-        );
+        let page = map.page_of(page, |t| radiance[t].0);
+        let (width, height) = (page.width, page.height);
+        let colours: Vec<[f32; 3]> = page.irradiance.iter().map(|c| c.to_array()).collect();
+        let metered = vec![false; colours.len()];
+        let picture = Picture::new((width, height), colours, &metered);
         let mut png = Cursor::new(Vec::new());
         PngEncoder::new(&mut png)
             .write_image(

@@ -1,16 +1,16 @@
 //! Light at the texels of a light map.
 //!
 //! Direct light is found at each texel. Indirect light is found on a coarse lattice of each chart,
-//! and on finer ones where it was not what the coarser ones let expect. Texels beneath what stands on
-//! the surface are dark, but for those beside others: these take their light, so that no darkness
-//! runs out from under.
+//! and on finer ones where it was not what the coarser ones let expect. Texels beneath what stands
+//! on the surface are dark, but for those beside others: these take their light, so that no
+//! darkness runs out from under.
 
 use glam::Vec3;
 
 use super::borders;
 use super::surface::{Pages, Surface};
 use super::texels::{Texel, TexelMap, quarters};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::solver::{LightAt, Lit, Place};
 
 /// Light at the texels of all pages.
@@ -19,7 +19,7 @@ pub struct LightMap {
     pub map: TexelMap,
     /// `[texel]` of `map`.
     pub light: Vec<LightAt>,
-    /// Places at which all light was found.
+    /// Places at which direct light or all light was found.
     pub looked_at: usize,
     /// Whether it was stopped: finer lattices are then interpolated.
     pub stopped: bool,
@@ -82,11 +82,11 @@ impl Looking<'_> {
 }
 
 impl LightMap {
-    /// `go_on` is called with how many places have been looked at; false stops, and what is missing
-    /// is interpolated.
+    /// `go_on` is called with how many places have been looked at; false stops, and the finer
+    /// lattices of indirect light are then interpolated.
     ///
     /// # Errors
-    /// None that a surface of [`Surface::new`] can cause.
+    /// Stopped before the lattices that are looked at as a whole.
     pub fn new(surface: &Surface, lit: &Lit<'_>, go_on: &dyn Fn(usize) -> bool) -> Result<Self> {
         let mut map = TexelMap::new(surface);
         let mut looking = Looking {
@@ -115,6 +115,10 @@ impl LightMap {
 
 fn place(surface: &Surface, texel: &Texel) -> Place {
     surface.place(texel.triangle as usize, texel.weights)
+}
+
+fn too_early() -> Error {
+    Error::Usage("stopped before there was a light map; nothing is written".into())
 }
 
 /// The texels of the same chart a step away.
@@ -162,7 +166,9 @@ fn direct(
 ) -> Result<Vec<Vec3>> {
     let places: Vec<Place> = map.texels.iter().map(|t| place(surface, t)).collect();
     let mut light = looking.direct(&places)?;
-    light.resize(places.len(), Vec3::ZERO);
+    if light.len() < places.len() {
+        return Err(too_early());
+    }
     let is_edge = |&t: &usize| {
         let beside = BESIDE
             .into_iter()
@@ -256,9 +262,15 @@ fn indirect(
                 None => 0.0,
             };
         }
-        // Where it was stopped, what was expected.
+        if found.len() < wanted.len() && spacing >= WHOLE {
+            return Err(too_early());
+        }
+        // Where it was stopped, what was expected; at borders, the light of what lies beside.
         for (&t, expected) in wanted.iter().zip(&expected).skip(found.len()) {
-            light[t] = *expected;
+            let beside = BESIDE.into_iter().flat_map(|[i, j]| {
+                (1..=WHOLE).filter_map(move |far| neighbour(surface, map, t, [far * i, far * j]))
+            });
+            light[t] = expected.or_else(|| beside.into_iter().find_map(|t| light[t]));
         }
         if is_coarsest {
             let sum: f32 = found.iter().map(|light| light.indirect.max_element()).sum();

@@ -13,6 +13,7 @@ use super::light_map::LightMap;
 use super::texels::NOTHING;
 use crate::atomic_file::write_atomically;
 use crate::error::{Error, Result};
+use crate::picture::tone::coded;
 use crate::solver::LightAt;
 
 /// Which light a map holds.
@@ -80,12 +81,17 @@ pub struct Page {
 impl LightMap {
     /// A page, filled between its charts.
     pub fn page(&self, page: u32, part: Part) -> Page {
+        self.page_of(page, |t| part.of(&self.light[t]))
+    }
+
+    /// A page of other values of the texels.
+    pub fn page_of(&self, page: u32, value: impl Fn(usize) -> Vec3) -> Page {
         let (width, height) = (self.pages.width, self.pages.height);
         let count = width as usize * height as usize;
         let index = &self.map.index[page as usize * count..][..count];
         let known = index.iter().map(|&t| match t {
             NOTHING => None,
-            t => Some(part.of(&self.light[t as usize])),
+            t => Some(value(t as usize)),
         });
         let irradiance = filled(known.collect(), width as usize);
         Page {
@@ -137,29 +143,37 @@ impl LightMap {
 }
 
 /// Gives each empty texel the mean of the full ones about it, ring after ring.
-pub(super) fn filled(mut texels: Vec<Option<Vec3>>, width: usize) -> Vec<Vec3> {
+fn filled(mut texels: Vec<Option<Vec3>>, width: usize) -> Vec<Vec3> {
     let height = texels.len() / width.max(1);
-    let mut empty: Vec<usize> = (0..texels.len()).filter(|&i| texels[i].is_none()).collect();
-    while !empty.is_empty() && empty.len() < texels.len() {
-        let found: Vec<(usize, Vec3)> = (empty.iter())
-            .filter_map(|&i| {
-                let (x, y) = (i % width, i / width);
-                let (mut sum, mut count) = (Vec3::ZERO, 0);
-                for row in y.saturating_sub(1)..(y + 2).min(height) {
-                    for column in x.saturating_sub(1)..(x + 2).min(width) {
-                        if let Some(value) = texels[row * width + column] {
-                            sum += value;
-                            count += 1;
-                        }
-                    }
-                }
-                (count > 0).then(|| (i, sum / count as f32))
-            })
-            .collect();
-        for (i, value) in found {
+    let around = |i: usize| {
+        let (x, y) = (i % width, i / width);
+        let rows = y.saturating_sub(1)..(y + 2).min(height);
+        rows.flat_map(move |row| {
+            let columns = x.saturating_sub(1)..(x + 2).min(width);
+            columns.map(move |column| row * width + column)
+        })
+    };
+    let is_empty = |texels: &[Option<Vec3>], i: usize| texels[i].is_none();
+    let borders = |texels: &[Option<Vec3>], i: usize| around(i).any(|j| texels[j].is_some());
+    let mut ring: Vec<usize> = (0..texels.len())
+        .filter(|&i| is_empty(&texels, i) && borders(&texels, i))
+        .collect();
+    while !ring.is_empty() {
+        let mean = |&i: &usize| {
+            let full: Vec<Vec3> = around(i).filter_map(|j| texels[j]).collect();
+            full.iter().sum::<Vec3>() / full.len() as f32
+        };
+        let values: Vec<Vec3> = ring.iter().map(mean).collect();
+        for (&i, value) in ring.iter().zip(values) {
             texels[i] = Some(value);
         }
-        empty.retain(|&i| texels[i].is_none());
+        let mut next: Vec<usize> = (ring.iter())
+            .flat_map(|&i| around(i))
+            .filter(|&j| is_empty(&texels, j))
+            .collect();
+        next.sort_unstable();
+        next.dedup();
+        ring = next;
     }
     texels.into_iter().map(Option::unwrap_or_default).collect()
 }
@@ -226,19 +240,10 @@ impl Page {
     /// 8-bit sRGB codes of the irradiance over `scale`.
     pub fn srgb(&self, scale: f32) -> Vec<u8> {
         (self.irradiance.iter())
-            .flat_map(|value| (*value / scale).to_array().map(srgb_code))
+            .flat_map(|value| (*value / scale).to_array())
+            .map(|linear| (255.0 * coded(linear)).round() as u8)
             .collect()
     }
-}
-
-/// IEC 61966-2-1.
-pub fn srgb_code(linear: f32) -> u8 {
-    let linear = linear.clamp(0.0, 1.0);
-    let coded = match linear <= 0.003_130_8 {
-        true => 12.92 * linear,
-        false => 1.055 * linear.powf(1.0 / 2.4) - 0.055,
-    };
-    (255.0 * coded).round() as u8
 }
 
 /// RGB over the greatest of them, and that as alpha, rounded up.

@@ -74,13 +74,13 @@ pub fn places(positions: &[DVec3]) -> Vec<Place> {
     positions.iter().flat_map(around).collect()
 }
 
-/// Probes of the light at [`places`], and of whether these are covered, in the least squares.
-pub fn probes(positions: &[DVec3], light: &[LightAt], covered: &[bool]) -> Vec<Probe> {
+/// Probes of the light at [`places`], in the least squares, and of where these see backs.
+pub fn probes(positions: &[DVec3], light: &[LightAt], backs: &[bool]) -> Vec<Probe> {
     let fit = fit();
     let count = fit.ncols();
-    let of_each = light.chunks_exact(count).zip(covered.chunks_exact(count));
+    let of_each = light.chunks_exact(count).zip(backs.chunks_exact(count));
     (positions.iter().zip(of_each))
-        .map(|(&position, (light, covered))| {
+        .map(|(&position, (light, backs))| {
             let mut irradiance = [Vec3::ZERO; COEFFICIENTS];
             for (i, coefficient) in irradiance.iter_mut().enumerate() {
                 for (k, light) in light.iter().enumerate() {
@@ -91,7 +91,7 @@ pub fn probes(positions: &[DVec3], light: &[LightAt], covered: &[bool]) -> Vec<P
                 position,
                 irradiance,
                 // A solid's inside sees backs all around.
-                valid: covered.iter().filter(|is_covered| **is_covered).count() * 2 < count,
+                valid: backs.iter().filter(|is_back| **is_back).count() * 2 < count,
             }
         })
         .collect()
@@ -123,6 +123,10 @@ impl Probe {
     }
 }
 
+/// What the file says of its coefficients.
+const HARMONICS: &str = "real, orthonormal: 00, 1-1, 10, 11, 2-2, 2-1, 20, 21, 22; \
+                         E(n) = sum c Y(n), W/m2";
+
 /// Writes probes as JSON: `counts` of the grid (x fastest), and of each `position`, `valid` and
 /// `irradiance`, nine times RGB.
 ///
@@ -141,7 +145,7 @@ pub fn write(path: &Path, counts: [u32; 3], probes: &[Probe]) -> Result<()> {
         .collect();
     let all = json!({
         "format": "mesolux probes 1",
-        "harmonics": "real, orthonormal: 00, 1-1, 10, 11, 2-2, 2-1, 20, 21, 22; E(n) = sum c Y(n), W/m2",
+        "harmonics": HARMONICS,
         "counts": counts,
         "probes": each,
     });

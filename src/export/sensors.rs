@@ -9,14 +9,11 @@ use glam::{DVec3, Vec3};
 use crate::atomic_file::write_atomically;
 use crate::error::{Error, Result};
 use crate::scene::Scene;
+use crate::scene::even_light::luminance;
 use crate::solver::{LightAt, Place};
 
 /// Lumens of a watt as Radiance counts them (its `WHTEFFICACY`).
 pub const RADIANCE_EFFICACY: f64 = 179.0;
-
-/// Weights of red, green and blue in luminance by Rec. 709, whose primaries the colours of a scene
-/// have.
-pub const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
 /// How irradiance is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -103,15 +100,11 @@ pub struct SensorGrid {
 /// # Errors
 /// A name that is of no mesh and no material; a grid without a sensor, or with more than `most`.
 pub fn on_grid(scene: &Scene, grid: &SensorGrid, most: usize) -> Result<Vec<Place>> {
-    let of_mesh = |triangle: u32| {
-        let mut meshes = scene.meshes.iter().rev();
-        let mesh = meshes.find(|mesh| mesh.first <= triangle);
-        mesh.is_some_and(|mesh| mesh.name == grid.name)
-    };
     let on_input = scene.on_input();
     let is_named = |t: usize| {
         let material = scene.triangles[t].material as usize;
-        scene.materials[material].name == grid.name || of_mesh(on_input[t].triangle)
+        scene.materials[material].name == grid.name
+            || scene.mesh_name(on_input[t].triangle) == Some(&grid.name)
     };
     let named: Vec<usize> = (0..scene.triangles.len())
         .filter(|&t| is_named(t))
@@ -124,8 +117,15 @@ pub fn on_grid(scene: &Scene, grid: &SensorGrid, most: usize) -> Result<Vec<Plac
     }
     let mut places = Vec::new();
     for t in named {
-        on_triangle(scene.corners(&scene.triangles[t]), grid, &mut places);
-        if places.len() > most {
+        let corners = scene.corners(&scene.triangles[t]);
+        let (low, high) = (corners[1].min(corners[2]), corners[1].max(corners[2]));
+        let size = (corners[0].max(high) - corners[0].min(low)) / grid.spacing;
+        // A triangle fills half of its box at most where that is plane, and little of it aslant.
+        let lattice = size.max_element() * (size.element_sum() - size.max_element());
+        if lattice <= LATTICE * most as f64 {
+            on_triangle(corners, grid, &mut places);
+        }
+        if lattice > LATTICE * most as f64 || places.len() > most {
             return Err(Error::Usage(format!(
                 "a grid of {} on \"{}\" has more than {most} sensors",
                 grid.spacing, grid.name
@@ -140,6 +140,9 @@ pub fn on_grid(scene: &Scene, grid: &SensorGrid, most: usize) -> Result<Vec<Plac
         ))),
     }
 }
+
+/// Places of a lattice that are looked through for a triangle, over the most sensors.
+const LATTICE: f64 = 16.0;
 
 fn on_triangle([a, b, c]: [DVec3; 3], grid: &SensorGrid, places: &mut Vec<Place>) {
     let Some(normal) = (b - a).cross(c - a).try_normalize() else {
@@ -183,11 +186,7 @@ fn cross(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
 
 /// Illuminance, lux, of an irradiance of Rec. 709 colours.
 pub fn lux(irradiance: Vec3, lumens_per_watt: f64) -> f64 {
-    let weighted = irradiance.to_array().into_iter().zip(LUMINANCE);
-    lumens_per_watt
-        * weighted
-            .map(|(e, weight)| f64::from(e) * weight)
-            .sum::<f64>()
+    lumens_per_watt * luminance(irradiance.to_array())
 }
 
 /// Writes light at sensors, in their order.
@@ -309,6 +308,11 @@ mod tests {
                     .all(|p| (p.position.dot(side) - 0.1).abs() < 1e-12)
             );
             assert!(on_grid(&scene, &grid, 60).is_err());
+            let endless = SensorGrid {
+                spacing: 1e-12,
+                ..grid
+            };
+            assert!(on_grid(&scene, &endless, 1000).is_err());
         }
     }
 }

@@ -19,6 +19,9 @@ pub enum Texels {
     PerUnit { count: f64, page: u32 },
 }
 
+/// Most texels of all pages.
+const MOST_TEXELS: u64 = 1 << 28;
+
 /// Texels between the border of a chart and that of its page; twice as many between charts.
 pub const PADDING: u32 = 2;
 
@@ -83,6 +86,16 @@ impl Surface {
             scene: scene.name.clone(),
             what: format!("no light map can be laid out: {e}"),
         })?;
+        let texels_in_all = u64::from(atlas.page_count) * u64::from(atlas.width).pow(2);
+        if texels_in_all > MOST_TEXELS {
+            return Err(Error::Scene {
+                scene: scene.name.clone(),
+                what: format!(
+                    "a light map of {} pages of {}² has more than {MOST_TEXELS} texels",
+                    atlas.page_count, atlas.width
+                ),
+            });
+        }
         // One page is cropped to its charts: engines want all of it.
         let height = match texels {
             Texels::Page(size) => size.max(atlas.height),

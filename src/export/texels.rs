@@ -201,14 +201,13 @@ pub fn borders(surface: &Surface) -> Vec<(usize, usize)> {
     edges().filter(|&(t, k)| count[&edge(t, k)] == 1).collect()
 }
 
-/// Barycentric coordinates of a point of an edge from corner `k` on: in the chart, and of the place
-/// beside it that is looked at.
-pub fn on_edge(surface: &Surface, t: usize, k: usize, along: f64) -> [[f64; 3]; 2] {
+/// Barycentric coordinates of the place beside a point of an edge, from corner `k` on.
+pub fn beside_edge(surface: &Surface, t: usize, k: usize, along: f64) -> [f64; 3] {
     let mut weights = [0.0; 3];
     weights[k] = 1.0 - along;
     weights[(k + 1) % 3] = along;
     let corners = [0, 1, 2].map(|k| surface.texel(t, k));
-    [weights, inset(corners, weights)]
+    inset(corners, weights)
 }
 
 /// The middle of a texel's part of the surface in the four quarters of the texel.

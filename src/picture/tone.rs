@@ -55,14 +55,18 @@ pub fn luminance([r, g, b]: [f32; 3]) -> f32 {
 /// of half a code about the exact value, which prevents banding and keeps exact codes, such as
 /// black and white, unchanged.
 pub fn code(linear: f32, column: u32, row: u32) -> u8 {
+    // The cast saturates.
+    (255.0 * coded(linear) + threshold(column, row)) as u8
+}
+
+/// The sRGB value (IEC 61966-2-1) of linear light, both in 0..=1; what is outside is cut off.
+pub fn coded(linear: f32) -> f32 {
     let linear = linear.clamp(0.0, 1.0);
-    let coded = if linear <= 0.003_130_8 {
+    if linear <= 0.003_130_8 {
         12.92 * linear
     } else {
         1.055 * linear.powf(1.0 / 2.4) - 0.055
-    };
-    // The cast saturates.
-    (255.0 * coded + threshold(column, row)) as u8
+    }
 }
 
 /// Bayer's 8 × 8 matrix, thresholds strictly between 0 and 1.

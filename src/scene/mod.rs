@@ -110,6 +110,11 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// The mesh that a triangle of the input belongs to.
+    pub fn mesh_name(&self, triangle: u32) -> Option<&str> {
+        meshes::name(&self.meshes, triangle)
+    }
+
     /// The corners of a triangle, scene units.
     pub fn corners(&self, triangle: &Triangle) -> [DVec3; 3] {
         triangle.vertices.map(|v| self.vertices[v as usize])

@@ -214,6 +214,14 @@ impl<'a> Lit<'a> {
         self.each(places, |_, p, normal| self.outlook.is_covered(p, normal))
     }
 
+    /// Whether each place sees a back first along its normal, as it does within a solid.
+    ///
+    /// # Errors
+    /// As [`Self::at`].
+    pub fn backs(&self, places: &[Place]) -> Result<Vec<bool>> {
+        self.each(places, |_, p, normal| self.outlook.sees_a_back(p, normal))
+    }
+
     /// Finds a value at each place, internal units.
     fn each<T: Send>(
         &self,

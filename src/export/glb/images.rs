@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 
 use super::document::Document;
 use crate::error::{Error, Result};
+use crate::picture::tone::coded;
 use crate::scene::{HeightMap, NormalMap, Texture};
 
 #[derive(Default)]
@@ -90,13 +91,5 @@ fn rgb(width: u32, height: u32, codes: Vec<u16>) -> Option<DynamicImage> {
             ImageBuffer::<Rgb<u8>, _>::from_raw(width, height, codes).map(DynamicImage::from)
         }
         false => ImageBuffer::<Rgb<u16>, _>::from_raw(width, height, codes).map(DynamicImage::from),
-    }
-}
-
-/// IEC 61966-2-1, of linear light in 0..=1.
-fn coded(linear: f32) -> f32 {
-    match linear.clamp(0.0, 1.0) {
-        dark if dark <= 0.003_130_8 => 12.92 * dark,
-        bright => 1.055 * bright.powf(1.0 / 2.4) - 0.055,
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::parts::Part;
+use super::parts::{GOLDEN, Part};
 use super::rays::{blocked, is_clear};
 use super::receivers::Receiver;
 use super::seen::{ABOVE, Before, ROUGH, Seen};
@@ -21,9 +21,6 @@ const CLOSE: f64 = 4.0;
 /// Of the share of a view from which on a source is near: from which on a source is that the ball
 /// about an element nearly touches, since a part of it may see what the source's eye does not.
 const BESIDE: f64 = 0.1;
-
-/// Golden ratio's fraction, whose multiples spread evenly.
-const GOLDEN: f64 = 0.618_033_988_749_895;
 
 /// Times that a single member is cut in four for its visibility.
 const CUTS: u32 = 3;

@@ -14,7 +14,7 @@ pub struct PartTree {
 }
 
 /// Golden ratio's fraction, whose multiples spread evenly.
-const GOLDEN: f64 = 0.618_033_988_749_895;
+pub(super) const GOLDEN: f64 = 0.618_033_988_749_895;
 
 /// A part while the tree is walked.
 #[derive(Debug, Clone, Copy)]

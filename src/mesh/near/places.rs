@@ -144,10 +144,19 @@ impl<'a> Outlook<'a> {
         }
     }
 
-    /// Whether a place lies beneath what stands on its surface: along the normal it sees a back first.
-    pub fn is_covered(&self, place: DVec3, normal: DVec3) -> bool {
+    /// Whether a place sees a back first along its normal, as it does within a solid.
+    pub fn sees_a_back(&self, place: DVec3, normal: DVec3) -> bool {
         let met = first_met(self.search.occluders, place, FAR * normal);
         met.is_some_and(|(_, is_back)| is_back)
+    }
+
+    /// Whether a place lies beneath what stands on its surface: it sees backs along its normal and at
+    /// 60° to all sides. Beneath a sheet that has one side, light may come from beside it.
+    pub fn is_covered(&self, place: DVec3, normal: DVec3) -> bool {
+        let (s, t) = normal.any_orthonormal_pair();
+        let aslant = [s, -s, t, -t].map(|side| 0.5 * normal + 0.75_f64.sqrt() * side);
+        let mut ways = [normal].into_iter().chain(aslant);
+        ways.all(|way| self.sees_a_back(place, way))
     }
 
     /// Irradiance by what a place sees of a sky.
