@@ -52,8 +52,8 @@ fn a_plane_receives_what_it_sees_of_an_even_sky() {
     }
 }
 
-/// Light of a lamp, a sun and a sky together is the sum of theirs, with a plate between: what one has
-/// on the device is not taken for another's.
+/// Light of a lamp, a sun and a sky together is the sum of theirs, with a plate between: what one
+/// has on the device is not taken for another's.
 #[test]
 fn lights_of_all_kinds_add_up() {
     let lit = |[point, sun, sky]: [bool; 3]| {
@@ -96,8 +96,8 @@ fn lights_of_all_kinds_add_up() {
     assert!(each.iter().all(|light| light[3].x > none[3].x));
 }
 
-/// What triangles of the scene receive of an even sky of radiance 1 through an opening, by Lambert's
-/// formula at 64 places of each.
+/// What triangles of the scene receive of an even sky of radiance 1 through an opening, by
+/// Lambert's formula at 64 places of each.
 fn through(build: &Build, opening: &[DVec3]) -> Vec<f64> {
     let mean = |t: &mesolux::scene::Triangle| {
         let [a, b, c] = build.scene.corners(t);
@@ -177,8 +177,8 @@ fn a_trench_and_a_groove_receive_an_even_sky_through_their_opening() {
     }
 }
 
-/// A room of 4 by 4 by 3 with a hole of 1 by 1 in its roof, or in a wall, as in CIE 171:2006 5.9 and
-/// 5.11; all places of its floor.
+/// A room of 4 by 4 by 3 with a hole of 1 by 1 in its roof, or in a wall, as in CIE 171:2006 5.9
+/// and 5.11; all places of its floor.
 #[test]
 fn places_and_elements_see_the_sky_through_a_hole() {
     // Of each place; of the elements rms, bias and the worst over the mean.

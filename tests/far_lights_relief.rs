@@ -50,9 +50,9 @@ fn corrugated(rho: f32, texels: u32, height: impl Fn(f64) -> f64) -> Build {
     build
 }
 
-/// What a cavity between level ground sends of an even sky of radiance 1, over π and for each length
-/// of the profile from 0 to 1, by Hottel's crossed strings. `corners` are those of the cavity, whose
-/// pieces all see each other.
+/// What a cavity between level ground sends of an even sky of radiance 1, over π and for each
+/// length of the profile from 0 to 1, by Hottel's crossed strings. `corners` are those of the
+/// cavity, whose pieces all see each other.
 fn sent_by_profile(rho: f64, corners: &[DVec2]) -> f64 {
     const PIECES: usize = 40;
     let mut ends = Vec::new();
@@ -101,8 +101,8 @@ fn grooves_and_trenches_of_relief_send_what_their_geometry_sends() {
     const MOST: f64 = 3e-3;
     let mut worst: f64 = 0.0;
     let groove = |x: f64| (x - 0.5).abs() - 0.5;
-    // Corners at texels' middles; walls of four texels: of one texel, 38 times as high as wide, they
-    // are two facets, and what the trench sends is off by 2.9 %.
+    // Corners at texels' middles; walls of four texels: of one texel, 38 times as high as wide,
+    // they are two facets, and what the trench sends is off by 2.9 %.
     let step = 1.0 / f64::from(TEXELS);
     let (first, last, wide) = (12.5 * step, 51.5 * step, 4.0 * step);
     let trench = |x: f64| {

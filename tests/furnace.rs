@@ -54,8 +54,8 @@ fn radiosity_is_one_everywhere() {
     );
 }
 
-/// Black surfaces that all emit one radiosity receive it everywhere. Each source is a strong emitter,
-/// of which rays find the share that is seen.
+/// Black surfaces that all emit one radiosity receive it everywhere. Each source is a strong
+/// emitter, of which rays find the share that is seen.
 #[test]
 fn irradiance_is_that_of_all_emitters() {
     let mut elements = occluded_elements(20, 3, 0.0);

@@ -1,4 +1,5 @@
-//! A scene written as glTF and read again: the same triangles, materials, lights, cameras, and light.
+//! A scene written as glTF and read again: the same triangles, materials, lights, cameras, and
+//! light.
 
 mod common;
 
@@ -84,8 +85,8 @@ fn scenes_read_back_as_they_were_written() {
     }
 }
 
-/// The light of the scene that was read again is that of the first, whose places are rounded to what
-/// glTF holds.
+/// The light of the scene that was read again is that of the first, whose places are rounded to
+/// what glTF holds.
 #[test]
 fn its_light_is_the_same() {
     let options = LoadOptions {

@@ -240,8 +240,8 @@ fn cornell_box() {
     assert_silent();
 }
 
-/// A sheet that faces up, as a table of one quad: the floor beneath it sees the sheet's back, and has
-/// the light that comes from beside it. And a map that is stopped: refused early, kept later.
+/// A sheet that faces up, as a table of one quad: the floor beneath it sees the sheet's back, and
+/// has the light that comes from beside it. And a map that is stopped: refused early, kept later.
 #[test]
 fn light_comes_in_beneath_a_sheet() {
     let mut build = Build::new();

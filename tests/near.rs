@@ -80,8 +80,8 @@ fn is_within(p: DVec3, low: DVec3, sides: [DVec3; 2]) -> bool {
     along.into_iter().all(|along| (0.0..=1.0).contains(&along))
 }
 
-/// A room with a lamp, and on its floor a box without a bottom, whose sides the floor's cells do not
-/// follow: with the triangles of the floor, and the box's corner and sides.
+/// A room with a lamp, and on its floor a box without a bottom, whose sides the floor's cells do
+/// not follow: with the triangles of the floor, and the box's corner and sides.
 fn room_with_a_bell() -> (Build, std::ops::Range<usize>, DVec3, [DVec3; 2]) {
     let mut build = Build::new();
     let lamp = build.material(0.0, 8.0);
@@ -191,8 +191,8 @@ fn a_thin_wall_keeps_rooms_apart() {
     }
 }
 
-/// A room whose floor is n × n cells, and a box that hovers `gap` above it: the floor, and the box's
-/// underside.
+/// A room whose floor is n × n cells, and a box that hovers `gap` above it: the floor, and the
+/// box's underside.
 fn room_with_a_hovering_box(n: u32, gap: f64) -> (Build, [std::ops::Range<usize>; 2]) {
     let mut build = Build::new();
     let lamp = build.material(0.0, 8.0);
@@ -257,8 +257,8 @@ fn little_leaks_beneath_a_box_that_hovers() {
 /// that lie half beneath it have one light.
 const BENEATH: [f64; 2] = [0.038, 0.0028];
 
-/// Beneath the same box above a floor of two triangles, which are cut along its sides. An element of
-/// the underside lies before several sources of the floor, and its centroid sees one of them.
+/// Beneath the same box above a floor of two triangles, which are cut along its sides. An element
+/// of the underside lies before several sources of the floor, and its centroid sees one of them.
 #[test]
 fn nothing_leaks_beneath_a_box_above_a_floor_that_is_cut() {
     for (gap, most) in [(1e-4, THIN), (1e-3, WIDER)] {
@@ -274,8 +274,8 @@ fn nothing_leaks_beneath_a_box_above_a_floor_that_is_cut() {
     }
 }
 
-/// Measured: underside 0.00004, floor beneath 0.00002; 0.0016 and 0.0009 at the wider gap. Where the
-/// centroid alone decides what is near, the underside has 0.0021 at the first gap.
+/// Measured: underside 0.00004, floor beneath 0.00002; 0.0016 and 0.0009 at the wider gap. Where
+/// the centroid alone decides what is near, the underside has 0.0021 at the first gap.
 const THIN: f64 = 8e-5;
 const WIDER: f64 = 3e-3;
 

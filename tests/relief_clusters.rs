@@ -22,9 +22,9 @@ const SIDE: u32 = 48;
 /// Paths of each pixel. Their noise is known and taken off.
 const PATHS: u32 = 96;
 
-/// relMSE less the reference's noise, by K = 16 and 64; measured: 6.3e-4, 4.0e-4 of all light, 5.5e-3,
-/// 4.2e-3 of direct and 1.4e-3, 7.2e-4 of indirect light. A slot that the relief's horizon cuts is
-/// seen whole or not at all, and a penumbra of the lamp is one edge.
+/// relMSE less the reference's noise, by K = 16 and 64; measured: 6.3e-4, 4.0e-4 of all light,
+/// 5.5e-3, 4.2e-3 of direct and 1.4e-3, 7.2e-4 of indirect light. A slot that the relief's horizon
+/// cuts is seen whole or not at all, and a penumbra of the lamp is one edge.
 fn most_rel_mse(part: Light, k: u32) -> f64 {
     let [few, many] = match part {
         Light::Global => [1.2e-3, 8e-4],

@@ -27,8 +27,8 @@ struct Case {
 }
 
 /// Blinds that lean towards the sun and away from it, and ridges across its way. Their steep sides
-/// are three texels wide: a side of one texel is two facets, each lit alike from its foot to its top
-/// (bias −1.4 %).
+/// are three texels wide: a side of one texel is two facets, each lit alike from its foot to its
+/// top (bias −1.4 %).
 const CASES: [Case; 3] = [
     Case {
         name: "blinds towards the sun",

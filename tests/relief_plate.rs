@@ -216,8 +216,8 @@ fn mean_of_elements(plate: &[([DVec3; 3], Vec<f64>)]) -> Vec<f64> {
         .collect()
 }
 
-/// The mean of the light about the middle of each slot, by the weight of its look-up and its cosine,
-/// of light that is looked up between what is sent into each.
+/// The mean of the light about the middle of each slot, by the weight of its look-up and its
+/// cosine, of light that is looked up between what is sent into each.
 fn looked_up(directions: Directions, sent: &[f64]) -> Vec<f64> {
     let (mut sums, mut weights) = (vec![0.0; sent.len()], vec![0.0; sent.len()]);
     for cell in FineCell::all() {

@@ -87,9 +87,9 @@ fn cie_171_case_5_3_at_sensors() {
 /// Measured: 3.3e-5.
 const CIE_5_3: f64 = 7e-5;
 
-/// CIE 171:2006, case 5.8: an isotropic light of 10,000 lm in the middle of a closed cube of 4 m and
-/// one reflectance ρ. The indirect illuminance is Φρ / (A (1 − ρ)) in the mean; of a wall too, since
-/// all six are alike.
+/// CIE 171:2006, case 5.8: an isotropic light of 10,000 lm in the middle of a closed cube of 4 m
+/// and one reflectance ρ. The indirect illuminance is Φρ / (A (1 − ρ)) in the mean; of a wall too,
+/// since all six are alike.
 #[test]
 fn cie_171_case_5_8_at_sensors() {
     for (reflectance, limit) in CIE_5_8 {
@@ -122,8 +122,8 @@ fn cie_171_case_5_8_at_sensors() {
 /// the mean of direct light.
 const CIE_5_8: [(f32, f64); 3] = [(0.1, 2.4e-3), (0.5, 2e-3), (0.9, 2e-3)];
 
-/// A lamp as large as a wall behind a box as wide as the room, seen from places at random in its part
-/// shadow: against Lambert's formula of what is seen.
+/// A lamp as large as a wall behind a box as wide as the room, seen from places at random in its
+/// part shadow: against Lambert's formula of what is seen.
 #[test]
 fn a_wide_lamp_in_part_shadow() {
     let mut build = Build::new();

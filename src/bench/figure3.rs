@@ -27,8 +27,8 @@ pub struct Options {
 }
 
 /// Bakes, draws, and writes one picture into `folder`: columns of direct, indirect and global
-/// light, a row a scene, each exposed by its global light. `watch` hears how far a bake is; none is written
-/// where it says no.
+/// light, a row a scene, each exposed by its global light. `watch` hears how far a bake is; none is
+/// written where it says no.
 pub fn run(
     device: &Arc<Device>,
     options: &Options,

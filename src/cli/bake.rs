@@ -103,8 +103,8 @@ pub struct SolveOptions {
     /// --quality, 1/32 for normal]
     #[arg(long, value_name = "X")]
     source_power: Option<f64>,
-    /// Leave the form factors of closed rooms as they were found, in place of scaling them so that all
-    /// light arrives; the report gives their sums either way
+    /// Leave the form factors of closed rooms as they were found, in place of scaling them so that
+    /// all light arrives; the report gives their sums either way
     #[arg(long)]
     no_normalise: bool,
     /// Leave the light of sources that are not drawn missing, in place of letting those beside them

@@ -130,7 +130,8 @@ struct IrradianceOptions {
     bakes: Vec<PathBuf>,
     #[command(flatten)]
     bake_scene: BakeScene,
-    /// Folder for irradiance.csv, irradiance.json, and the reference, which is kept for the next run
+    /// Folder for irradiance.csv, irradiance.json, and the reference, which is kept for the next
+    /// run
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Elements that are compared, each at its centroid and at a random point: a number, stratified

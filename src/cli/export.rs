@@ -66,7 +66,8 @@ struct MapOptions {
     /// server; it needs nothing from elsewhere
     #[arg(long, value_name = "DIR")]
     web: Option<PathBuf>,
-    /// Exposure of baked colours and of the page: multiplies the light by 2^EV; found from the texels if not given
+    /// Exposure of baked colours and of the page: multiplies the light by 2^EV; found from the
+    /// texels if not given
     #[arg(long, value_name = "EV", allow_hyphen_values = true)]
     exposure: Option<f32>,
     /// The light that light maps hold

@@ -38,9 +38,9 @@ use tracing_subscriber::prelude::*;
 /// buffers.
 ///
 /// SCENE is a built-in name (cornell, cornell-box, cornell-relief, bowl-and-bunny, fruit-platter,
-/// brick-court, brick-wall, woven-cloth, embossed-plate), an .obj, .gltf or .glb file,
-/// or a scene.toml. Results go to files and stdout, everything else to stderr. Exit code 2 means that
-/// an input was wrong; nothing is written then.
+/// brick-court, brick-wall, woven-cloth, embossed-plate), an .obj, .gltf or .glb file, or a
+/// scene.toml. Results go to files and stdout, everything else to stderr. Exit code 2 means that an
+/// input was wrong; nothing is written then.
 #[derive(Parser)]
 #[command(version, about)]
 struct Cli {
@@ -105,8 +105,8 @@ struct Builtin {
     #[arg(long, value_name = "MESH.obj")]
     statue: Option<PathBuf>,
     /// Cut triangles whose edges are longer than this, in scene units, and shorter ones where
-    /// surfaces are close or shadows end [default: by the scene's area; built-in scenes are cut only
-    /// where this or --fineness asks for it]
+    /// surfaces are close or shadows end [default: by the scene's area; built-in scenes are cut
+    /// only where this or --fineness asks for it]
     #[arg(long, value_name = "X")]
     element_size: Option<f64>,
     /// Cut to triangles this much smaller than by default, 1 to 16, and built-in scenes too from

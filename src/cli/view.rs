@@ -48,7 +48,8 @@ pub struct Options {
     /// Do what a script says, one step a line, then close: move X Y, press|release
     /// left|middle|right, wheel N, key NAME [down|up], see front|right|top, resize W H, minimise,
     /// restore W H, set SWITCH VALUE, set lamp NAME colour|strength|position N..., frames N, wait
-    /// SECONDS, open SCENE|BAKE, bake, relit, detail, overlays, screenshot FILE, save FILE, lose-surface, close
+    /// SECONDS, open SCENE|BAKE, bake, relit, detail, overlays, screenshot FILE, save FILE,
+    /// lose-surface, close
     #[arg(long, value_name = "FILE")]
     script: Option<PathBuf>,
     #[command(flatten)]

@@ -14,8 +14,8 @@ use super::texels::quarters;
 use crate::error::{Error, Result};
 use crate::picture::Picture;
 
-/// Pages as PNG, exposed and tone-mapped as pictures are, and the exposure that was used: without one,
-/// the brightest tenth of the texels that do not emit is brought to 0.6 and more.
+/// Pages as PNG, exposed and tone-mapped as pictures are, and the exposure that was used: without
+/// one, the brightest tenth of the texels that do not emit is brought to 0.6 and more.
 ///
 /// # Errors
 /// A page that cannot be encoded.

@@ -1,7 +1,7 @@
 //! Texels along the borders of charts, so that interpolation there gives the light of the surface.
 //!
-//! Across a seam a surface continues in another chart. Both sides interpolate between texels some of
-//! which lie outside of their charts; these are chosen so that along the border the interpolated
+//! Across a seam a surface continues in another chart. Both sides interpolate between texels some
+//! of which lie outside of their charts; these are chosen so that along the border the interpolated
 //! light is what the surface has there, in the least squares.
 
 use std::collections::HashMap;
@@ -21,8 +21,8 @@ const POINTS: f64 = 2.0;
 const SPACING: f64 = 4.0;
 
 /// Weight of a texel's own light against that along the border: of one outside of its chart, and
-/// within. With a tenth of these, `test light_map` has seams that agree to 1.3 % in place of 1.75, and
-/// light on borders that is 1.2 % off in place of 0.3.
+/// within. With a tenth of these, `test light_map` has seams that agree to 1.3 % in place of 1.75,
+/// and light on borders that is 1.2 % off in place of 0.3.
 const OWN: [f64; 2] = [0.02, 0.5];
 
 /// Sweeps over the texels.

@@ -37,8 +37,8 @@ pub const EXTRAS: &str = "mesolux";
 /// Writes a scene; returns what of it glTF cannot hold, one sentence each.
 ///
 /// Triangles keep their order, but for those of a mesh with many materials. Light maps hold
-/// irradiance in 8-bit sRGB times the extension's `intensity`; `TEXCOORD_1` says where. A height map
-/// is in the extras of its material: `mesolux.heightTexture` and `mesolux.heightScale`.
+/// irradiance in 8-bit sRGB times the extension's `intensity`; `TEXCOORD_1` says where. A height
+/// map is in the extras of its material: `mesolux.heightTexture` and `mesolux.heightScale`.
 ///
 /// # Errors
 /// A map that cannot be encoded; a file that cannot be written.

@@ -132,8 +132,8 @@ fn neighbour(surface: &Surface, map: &TexelMap, of: usize, step: [i64; 2]) -> Op
 
 const BESIDE: [[i64; 2]; 4] = [[1, 0], [-1, 0], [0, 1], [0, -1]];
 
-/// Whether all of a texel is covered, `[texel]`. One whose middle is covered is looked at in another
-/// place.
+/// Whether all of a texel is covered, `[texel]`. One whose middle is covered is looked at in
+/// another place.
 fn covered(surface: &Surface, map: &mut TexelMap, lit: &Lit<'_>) -> Result<Vec<bool>> {
     let places: Vec<Place> = map.texels.iter().map(|t| place(surface, t)).collect();
     let mut covered = lit.covered(&places)?;

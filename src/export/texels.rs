@@ -13,8 +13,8 @@ pub struct Texel {
     pub at: [u32; 2],
     pub page: u32,
     pub triangle: u32,
-    /// Barycentric coordinates of the place nearest to the texel's middle; of one outside the chart,
-    /// 0.05 texels within.
+    /// Barycentric coordinates of the place nearest to the texel's middle; of one outside the
+    /// chart, 0.05 texels within.
     pub weights: [f64; 3],
     /// From the middle to that place, texels; 0 within the chart.
     pub distance: f64,
@@ -32,8 +32,8 @@ pub struct TexelMap {
     pub height: u32,
 }
 
-/// Places at the edge of a chart are this far within it, texels: at the edge itself they would lie in
-/// the plane of the surface that begins there, and see nothing of it.
+/// Places at the edge of a chart are this far within it, texels: at the edge itself they would lie
+/// in the plane of the surface that begins there, and see nothing of it.
 const INSET: f64 = 0.05;
 
 /// Interpolation at a place reads texels whose middles are less than one texel off each way.
@@ -178,7 +178,8 @@ fn inset([a, b, c]: [DVec2; 3], weights: [f64; 3]) -> [f64; 3] {
     weights.map(|w| w + share * (1.0 / 3.0 - w))
 }
 
-/// Triangles of a surface whose edges end a chart: `(triangle, edge)`, from each corner to the next.
+/// Triangles of a surface whose edges end a chart: `(triangle, edge)`, from each corner to the
+/// next.
 pub fn borders(surface: &Surface) -> Vec<(usize, usize)> {
     let key = |t: usize, k: usize| {
         let uv = surface.uv[t][k];

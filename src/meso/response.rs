@@ -2,9 +2,9 @@
 //! slot.
 //!
 //! A facet q of the tile receives E_q = V_q(ω)(n_q·ω)⁺ / ω_z for light from ω that brings the tile
-//! an irradiance of 1, with V the relief's visibility. Light bounces inside, B = ρ(E + G B) + e, and
-//! towards ω' leaves the mean Σ_q W_q(ω') B_q of the facets seen from there. What is sent is kept
-//! by slot, bilinear between the slots' centres and fitted so that the sum over all directions
+//! an irradiance of 1, with V the relief's visibility. Light bounces inside, B = ρ(E + G B) + e,
+//! and towards ω' leaves the mean Σ_q W_q(ω') B_q of the facets seen from there. What is sent is
+//! kept by slot, bilinear between the slots' centres and fitted so that the sum over all directions
 //! stays (W_jq); what arrives, by the functions u_r of a [`Basis`]. The response is thus one small
 //! matrix, R_jr, the coefficients of W (1 − ρG)⁻¹ ρ E(ω), and H = W (1 − ρG)⁻¹ 1 for light that the
 //! relief emits.

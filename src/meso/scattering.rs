@@ -3,8 +3,8 @@
 //!
 //! Light that leaves a part of the mesh's plane towards ω comes from the facets seen through it:
 //! facet q at height h is seen through the place shifted by h tan θ. A footprint's response is
-//! therefore W' (1 − ρG)⁻¹ ρ E(ω), where the rows of W are restricted to the facets seen through the
-//! footprint and normalised to sum to 1. Light enters at all facets, as if the footprint's
+//! therefore W' (1 − ρG)⁻¹ ρ E(ω), where the rows of W are restricted to the facets seen through
+//! the footprint and normalised to sum to 1. Light enters at all facets, as if the footprint's
 //! neighbours were lit as it is: light that falls on one footprint may leave through another. Under
 //! even light the power of the tile is conserved, but not that of each footprint.
 //!
@@ -47,8 +47,8 @@ pub struct Scattering<'a> {
     facets: Facets,
     /// Of the tile.
     basis: Basis,
-    /// Over the mean of each colour, `[facet]`: how colours differ from place to place, not which is
-    /// the strongest, matters to a basis.
+    /// Over the mean of each colour, `[facet]`: how colours differ from place to place, not which
+    /// is the strongest, matters to a basis.
     relative: Vec<Vec3>,
     /// One over that mean.
     over_mean: Vec3,
@@ -294,8 +294,8 @@ struct Seen {
     area: f32,
 }
 
-/// Weights of the fine cells by which each slot is fitted, `[fine cell][slot]`: light f(ω) is
-/// Σ_j f_j h_j(ω) with h_j the weights of the bilinear look-up, and f_j = Σ_i fits_ij z_i f(ω_i) are
+/// Weights of the fine cells by which each slot is fitted, `[fine cell][slot]`: light f(ω) is Σ_j
+/// f_j h_j(ω) with h_j the weights of the bilinear look-up, and f_j = Σ_i fits_ij z_i f(ω_i) are
 /// the values closest to it under the weights z. The power Σ_i z_i f(ω_i) stays. A mean over the
 /// directions that look a slot up would blur f by as much as the look-up does again.
 fn fits(directions: &Directions) -> DMatrix<f32> {
@@ -345,14 +345,14 @@ fn seen(facets: &Facets, fits: &DMatrix<f32>) -> DMatrix<f32> {
 struct View {
     /// In order.
     facets: Vec<usize>,
-    /// Their projected areas, and the share of the whole tile that is mixed in, `[facet][fine cell]`
-    /// and `[fine cell]`: together the z of the cell.
+    /// Their projected areas, and the share of the whole tile that is mixed in, `[facet][fine
+    /// cell]` and `[fine cell]`: together the z of the cell.
     areas: DMatrix<f32>,
     of_tile: DMatrix<f32>,
 }
 
-/// Shares of facets, `[facet][slot]`, times their reflectance: each slot takes one colour, all three
-/// in turn, so that a basis knows them all.
+/// Shares of facets, `[facet][slot]`, times their reflectance: each slot takes one colour, all
+/// three in turn, so that a basis knows them all.
 fn reflected(seen: &DMatrix<f32>, reflectance: &[Vec3]) -> DMatrix<f32> {
     let mut reflected = seen.clone();
     for (slot, mut column) in reflected.column_iter_mut().enumerate() {

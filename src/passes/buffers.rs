@@ -154,8 +154,8 @@ impl SceneBuffers {
     }
 }
 
-/// Places on each source but point lights, which follow those on surfaces, with the packed normals of
-/// curved ones, `[source][SOURCE_EYES]`.
+/// Places on each source but point lights, which follow those on surfaces, with the packed normals
+/// of curved ones, `[source][SOURCE_EYES]`.
 fn eyes(sources: &[sources::Source]) -> Vec<[f32; 4]> {
     let of_source = |source: &sources::Source| {
         let texel = |k| {

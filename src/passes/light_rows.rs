@@ -1,6 +1,6 @@
-//! The form factor from every element to each light without a surface of a batch: suns, parts of the
-//! sky, beams. A few rays find the elements that an edge cuts a light for, and more rays what these
-//! see of it. Shaders: `light_survey.comp`, `light_rows.comp`, and where a scene has relief
+//! The form factor from every element to each light without a surface of a batch: suns, parts of
+//! the sky, beams. A few rays find the elements that an edge cuts a light for, and more rays what
+//! these see of it. Shaders: `light_survey.comp`, `light_rows.comp`, and where a scene has relief
 //! `_relief.comp` of each; twin: [`crate::reference::light_rows`].
 
 use std::sync::Arc;

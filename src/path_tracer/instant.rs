@@ -29,8 +29,8 @@ struct Light {
     power: DVec3,
 }
 
-/// Virtual point lights of a scene: of its surfaces and point lights, which it takes to shine evenly.
-/// Suns and skies are left out.
+/// Virtual point lights of a scene: of its surfaces and point lights, which it takes to shine
+/// evenly. Suns and skies are left out.
 pub struct VirtualLights<'a> {
     tracer: &'a PathTracer<'a>,
     lights: Vec<Light>,

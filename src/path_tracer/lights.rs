@@ -191,9 +191,9 @@ impl Lights {
         }
     }
 
-    /// One sample of the irradiance at `place` from point lights and suns, and of that from emitters
-    /// weighted by the balance heuristic (Veach 1997) against sampling directions with density cos
-    /// θ / π.
+    /// One sample of the irradiance at `place` from point lights and suns, and of that from
+    /// emitters weighted by the balance heuristic (Veach 1997) against sampling directions with
+    /// density cos θ / π.
     pub fn sample(
         &self,
         geometry: &Geometry,

@@ -14,8 +14,8 @@ pub struct Sent {
     pub kept: Vec<DVec3>,
 }
 
-/// What `source` sends of its unshot emitted and reflected radiosity, W·m⁻². `coefficients` are those of
-/// its members, `[member][rank]`; `before` is [`Sent::kept`] of its last turn,
+/// What `source` sends of its unshot emitted and reflected radiosity, W·m⁻². `coefficients` are
+/// those of its members, `[member][rank]`; `before` is [`Sent::kept`] of its last turn,
 /// `[direction]`.
 pub fn send_relief(
     elements: &Elements,

@@ -1,8 +1,8 @@
 //! Heights whose slopes come nearest to those of a normal map (Frankot and Chellappa 1988).
 //!
 //! A map repeats, so its slopes are sums of waves. A derivative multiplies a wave by a number, D_x
-//! along x and D_y along y. For slopes with the waves P and Q, the height that leaves the least mean
-//! square of |P − D_x H|² + |Q − D_y H|² has H = (D̄_x P + D̄_y Q) / (|D_x|² + |D_y|²).
+//! along x and D_y along y. For slopes with the waves P and Q, the height that leaves the least
+//! mean square of |P − D_x H|² + |Q − D_y H|² has H = (D̄_x P + D̄_y Q) / (|D_x|² + |D_y|²).
 //!
 //! Most normal maps are made from heights by differences of texels, which is a D other than the
 //! derivative's. The one that explains most of the map is used.
@@ -18,8 +18,8 @@ use rustfft::num_complex::Complex64;
 use super::tile::tile_size;
 use super::{HeightMap, NormalMap, Scene};
 
-/// Gives materials that have normals and no heights the heights of the normals, with a note for each
-/// that a triangle uses.
+/// Gives materials that have normals and no heights the heights of the normals, with a note for
+/// each that a triangle uses.
 pub(super) fn add_to(scene: &mut Scene) {
     let mut known: Vec<Known> = Vec::new();
     for index in 0..scene.materials.len() {

@@ -148,8 +148,8 @@ fn power(
     })
 }
 
-/// The mesh with a black material that emits. A flux is spread over the area of the triangles, which
-/// is less than that of what they stand for, so that the power is exact.
+/// The mesh with a black material that emits. A flux is spread over the area of the triangles,
+/// which is less than that of what they stand for, so that the power is exact.
 fn emitting(mut mesh: Mesh, power: &Power) -> Mesh {
     let area = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|v| mesh.positions[v as usize]);

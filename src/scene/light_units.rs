@@ -9,8 +9,8 @@ pub const LUMENS_OF_A_WATT: f64 = 683.0;
 /// Temperatures, kelvins, at which [`planckian`] holds.
 pub const KELVINS: std::ops::RangeInclusive<f64> = 1000.0..=15000.0;
 
-/// Linear sRGB of luminance 1 with the chromaticity of a black body; colours outside the gamut, below
-/// some 1,900 K, lose their negative blue.
+/// Linear sRGB of luminance 1 with the chromaticity of a black body; colours outside the gamut,
+/// below some 1,900 K, lose their negative blue.
 pub fn planckian(kelvin: f64) -> [f64; 3] {
     let (x, y) = planckian_xy(kelvin);
     let (x, y, z) = (x / y, 1.0, (1.0 - x - y) / y);

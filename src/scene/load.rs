@@ -17,7 +17,8 @@ use crate::error::{Error, Result};
 pub struct LoadOptions {
     /// Of a built-in scene: the exact number of elements.
     pub patches: Option<usize>,
-    /// Of a built-in scene: an OBJ mesh, y up, head towards −z, in place of the statue made by code.
+    /// Of a built-in scene: an OBJ mesh, y up, head towards −z, in place of the statue made by
+    /// code.
     pub statue: Option<PathBuf>,
     pub import: ImportOptions,
 }

@@ -48,8 +48,8 @@ impl Placement {
         Ok(Self(DAffine3::from_mat3_translation(matrix, translation)))
     }
 
-    /// Moves a mesh with its lights and cameras. A mirroring placement turns the winding as well, so
-    /// that fronts stay fronts; `reverse` turns it a second time.
+    /// Moves a mesh with its lights and cameras. A mirroring placement turns the winding as well,
+    /// so that fronts stay fronts; `reverse` turns it a second time.
     pub fn apply(&self, file: &mut MeshFile, reverse: bool) -> Result<(), String> {
         let mesh = &mut file.mesh;
         if self.0 != DAffine3::IDENTITY {

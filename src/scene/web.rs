@@ -23,9 +23,9 @@ impl Web {
     /// the outer, and ((cos θ − cos outer) / (cos inner − cos outer))² between; radians, 0 ≤ inner
     /// ≤ outer ≤ π.
     ///
-    /// The linear interpolation is off by 10⁻⁴ at most where both angles are whole degrees more than
-    /// 1° apart, and by 3·10⁻³ at an inner edge between two rows; edges are never sharper than a row
-    /// of 0.05°.
+    /// The linear interpolation is off by 10⁻⁴ at most where both angles are whole degrees more
+    /// than 1° apart, and by 3·10⁻³ at an inner edge between two rows; edges are never sharper than
+    /// a row of 0.05°.
     pub fn spot(inner: f64, outer: f64) -> Self {
         let (cos_inner, cos_outer) = (inner.cos(), outer.cos());
         let range = (cos_inner - cos_outer).max(LEAST_EDGE);

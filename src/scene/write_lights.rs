@@ -1,4 +1,5 @@
-//! Lights of a scene that is written out: tables, with a file for each beam and for a sky's picture.
+//! Lights of a scene that is written out: tables, with a file for each beam and for a sky's
+//! picture.
 
 use std::path::Path;
 

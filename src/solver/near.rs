@@ -20,8 +20,8 @@ pub(super) struct Sent {
 
 /// Irradiance from near sources beyond what their means bring.
 pub(super) struct NearLight {
-    /// Of elements without relief, `[element]`, W·m⁻², RGB: of what the members reflect, and of what
-    /// they emit.
+    /// Of elements without relief, `[element]`, W·m⁻², RGB: of what the members reflect, and of
+    /// what they emit.
     pub indirect: Vec<DVec3>,
     pub direct: Vec<DVec3>,
     /// What elements with a relief, `[meso element]`, received of it since it was last measured:

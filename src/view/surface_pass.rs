@@ -174,8 +174,8 @@ impl SurfacePass {
         Ok(())
     }
 
-    /// Sets the emission to that of `scene`, which is otherwise the same scene; of textured emission
-    /// the mean.
+    /// Sets the emission to that of `scene`, which is otherwise the same scene; of textured
+    /// emission the mean.
     pub fn set_emission(&mut self, scene: &Scene) {
         self.emitted = (scene.materials.iter())
             .map(|m| m.mean_emission().into())

@@ -68,7 +68,8 @@ struct App {
     /// Kept until the window is open, with the time at which the program started.
     first: Option<(Opened, Instant)>,
     runner: Option<Runner>,
-    /// The scene that is to be shown next, while another thread reads it, and when it was asked for.
+    /// The scene that is to be shown next, while another thread reads it, and when it was asked
+    /// for.
     reading: Option<(Receiver<Result<Opened>>, Instant)>,
     open: Option<(Viewer, Arc<Window>)>,
     lines: Vec<String>,

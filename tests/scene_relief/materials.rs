@@ -224,7 +224,8 @@ fn maps_lie_where_their_options_say() {
     assert!(heights("disp -imfchan g a.png")[4..] == [20.0 / 255.0; 4]);
 }
 
-/// Faces without texture coordinates are projected as without `-s` and `-o`: a warning with the line.
+/// Faces without texture coordinates are projected as without `-s` and `-o`: a warning with the
+/// line.
 #[test]
 fn places_of_maps_need_texture_coordinates() {
     let dir = folder(&[("a.png", &ramp())]);

@@ -1,5 +1,5 @@
-//! The page of `export --web` in Chromium on a display in memory: its picture beside `render`'s, and
-//! real mouse events.
+//! The page of `export --web` in Chromium on a display in memory: its picture beside `render`'s,
+//! and real mouse events.
 #![cfg(all(target_os = "linux", feature = "window"))]
 
 #[allow(dead_code)] // used by the tests of the window as well

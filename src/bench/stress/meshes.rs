@@ -45,8 +45,8 @@ pub(super) const NON_MANIFOLD: Case = Case {
 /// Two solutions with another order of their last shots differ by their unshot light, and sources
 /// cut at other triangles have other hemicubes, of 64² pixels here.
 const REORDERED: f64 = 1e-5;
-/// Bias and rms against paths, squares of an eighth of the room having penumbrae within them. Measured:
-/// 1.2e-3, 1.04e-2.
+/// Bias and rms against paths, squares of an eighth of the room having penumbrae within them.
+/// Measured: 1.2e-3, 1.04e-2.
 const BIAS: f64 = 2.5e-3;
 const RMS: f64 = 0.02;
 

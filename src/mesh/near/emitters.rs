@@ -98,8 +98,8 @@ fn fill(seen: &Seen, part: Part, directions: &[DVec3], furthest: &mut [DVec3]) {
 }
 
 impl Looker<'_> {
-    /// Each part of the emitter that is seen, with the form factor of what is seen of it. `uneven` says
-    /// whether a part emits too unevenly to count as one, by its whole form factor.
+    /// Each part of the emitter that is seen, with the form factor of what is seen of it. `uneven`
+    /// says whether a part emits too unevenly to count as one, by its whole form factor.
     pub fn look(
         &self,
         seen: &Seen,

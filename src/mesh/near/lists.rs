@@ -28,8 +28,8 @@ impl NearPairs {
         ]
     }
 
-    /// Those of [`Self::lists`], with the point lights after the surfaces; none if they cannot be of
-    /// these elements and sources.
+    /// Those of [`Self::lists`], with the point lights after the surfaces; none if they cannot be
+    /// of these elements and sources.
     pub fn from_lists(elements: &Elements, sources: &[Source], lists: &[Vec<u32>]) -> Option<Self> {
         let [
             first_part,

@@ -211,8 +211,8 @@ impl Search<'_> {
         });
     }
 
-    /// Each part that a receiver sees any of, with its form factor. `cut` says whether a part is too
-    /// uneven to count as one, by what its form factor would be.
+    /// Each part that a receiver sees any of, with its form factor. `cut` says whether a part is
+    /// too uneven to count as one, by what its form factor would be.
     fn seen_parts(
         &self,
         seen: &Seen,
@@ -329,8 +329,8 @@ impl Search<'_> {
         before.samples.iter().map(open).sum()
     }
 
-    /// What a place sees of a triangle whose whole form factor is this: that of the quarters of which
-    /// it sees a place, the same in each.
+    /// What a place sees of a triangle whose whole form factor is this: that of the quarters of
+    /// which it sees a place, the same in each.
     #[allow(clippy::too_many_arguments)] // all of a recursion
     fn open_share(
         &self,

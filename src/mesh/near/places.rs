@@ -98,9 +98,9 @@ impl<'a> Outlook<'a> {
         }
     }
 
-    /// Each part of an emitter that a place with this normal sees any of: source, part, and the form
-    /// factor of what is seen of it, up to the edges of shadows. `uneven` says whether a part of a
-    /// source emits too unevenly to count as one, by its whole form factor.
+    /// Each part of an emitter that a place with this normal sees any of: source, part, and the
+    /// form factor of what is seen of it, up to the edges of shadows. `uneven` says whether a part
+    /// of a source emits too unevenly to count as one, by its whole form factor.
     pub fn emitters(
         &self,
         place: DVec3,
@@ -150,8 +150,8 @@ impl<'a> Outlook<'a> {
         met.is_some_and(|(_, is_back)| is_back)
     }
 
-    /// Whether a place lies beneath what stands on its surface: it sees backs along its normal and at
-    /// 60° to all sides. Beneath a sheet that has one side, light may come from beside it.
+    /// Whether a place lies beneath what stands on its surface: it sees backs along its normal and
+    /// at 60° to all sides. Beneath a sheet that has one side, light may come from beside it.
     pub fn is_covered(&self, place: DVec3, normal: DVec3) -> bool {
         let (s, t) = normal.any_orthonormal_pair();
         let aslant = [s, -s, t, -t].map(|side| 0.5 * normal + 0.75_f64.sqrt() * side);

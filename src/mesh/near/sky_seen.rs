@@ -132,8 +132,8 @@ impl Look<'_> {
         corners.map(|corner| self.sees(self.sky.towards(corner)))
     }
 
-    /// By four places within the part, no two in one row or column, and what it sees of its corners:
-    /// a straight edge across the part leaves some of these on either side.
+    /// By four places within the part, no two in one row or column, and what it sees of its
+    /// corners: a straight edge across the part leaves some of these on either side.
     fn at(&self, part: &SkyPart, corners: [Option<View>; 4]) -> Seen {
         let inner = INNER.map(|(x, y)| self.sky.towards(part.at(DVec2::new(x, y) / 8.0)));
         let views = inner.map(|towards| self.sees(towards));

@@ -1,8 +1,8 @@
-//! Sources at an infinite distance: suns, and parts of the sky; and beams, whose intensity depends on
-//! the direction.
+//! Sources at an infinite distance: suns, and parts of the sky; and beams, whose intensity depends
+//! on the direction.
 //!
-//! A far source sends radiosity πL from a solid angle Ω: a surface that faces it receives L Ω, as by
-//! a form factor Ω/π. It holds directions that stand for even shares of its light.
+//! A far source sends radiosity πL from a solid angle Ω: a surface that faces it receives L Ω, as
+//! by a form factor Ω/π. It holds directions that stand for even shares of its light.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;

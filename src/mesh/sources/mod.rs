@@ -46,8 +46,8 @@ pub struct Grouping {
     /// Most unevenness of the light on a source of the most area, as far as it can be foreseen: the
     /// root mean square of what it reflects more or less than its mean, as a share of what the
     /// scene reflects. Smaller ones may be as much less even. Cornell box of 17,708 elements, rms
-    /// and bias at random points: 1.20 and −0.56 % with 502 sources uncut; 0.94 and −0.31 % with 577
-    /// at 0.05; 0.83 and −0.22 % with 724 at 0.025; 0.77 and −0.13 % with 1,032 at 0.0125.
+    /// and bias at random points: 1.20 and −0.56 % with 502 sources uncut; 0.94 and −0.31 % with
+    /// 577 at 0.05; 0.83 and −0.22 % with 724 at 0.025; 0.77 and −0.13 % with 1,032 at 0.0125.
     pub max_unevenness: f64,
     /// Whether every element is a source of its own, whatever it is.
     pub alone: bool,

@@ -1,6 +1,6 @@
-//! The Cornell box as it was built and measured, with its two blocks: the coordinates and the camera
-//! of the data that Cornell's Program of Computer Graphics has published, in metres. Reflectances
-//! and the light's colour are RGB approximations of the measured spectra.
+//! The Cornell box as it was built and measured, with its two blocks: the coordinates and the
+//! camera of the data that Cornell's Program of Computer Graphics has published, in metres.
+//! Reflectances and the light's colour are RGB approximations of the measured spectra.
 
 use glam::DVec3;
 

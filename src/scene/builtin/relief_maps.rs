@@ -110,8 +110,8 @@ fn make(name: &str, size: u32, height: impl Fn(f64, f64) -> f64) -> HeightMap {
     stretched(name, size, size, &heights).0
 }
 
-/// A height map of heights `[row][column]` from the top, stretched to 0..=1 in steps of 1/65535, and
-/// its height scale: the range of the heights.
+/// A height map of heights `[row][column]` from the top, stretched to 0..=1 in steps of 1/65535,
+/// and its height scale: the range of the heights.
 pub(super) fn stretched(name: &str, width: u32, height: u32, heights: &[f64]) -> (HeightMap, f32) {
     let low = heights.iter().copied().fold(f64::INFINITY, f64::min);
     let high = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);

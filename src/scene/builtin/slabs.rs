@@ -18,8 +18,8 @@ pub(super) struct Slabs {
     known: HashMap<[u64; 3], u32>,
 }
 
-/// A plane and the lines that it is cut along: place (a, b) is at `origin + a · along + b · up`, and
-/// its front looks along `along × up`.
+/// A plane and the lines that it is cut along: place (a, b) is at `origin + a · along + b · up`,
+/// and its front looks along `along × up`.
 pub(super) struct Panel<'a> {
     pub origin: DVec3,
     pub along: DVec3,

@@ -1,7 +1,7 @@
 //! Cubics between points that rise and fall only where the points do.
 
-/// The piecewise cubic of F. N. Fritsch and J. Butland (1984), SIAM J. Sci. Stat. Comput. 5, through
-/// points of ascending places.
+/// The piecewise cubic of F. N. Fritsch and J. Butland (1984), SIAM J. Sci. Stat. Comput. 5,
+/// through points of ascending places.
 pub(super) struct Curve {
     places: Vec<f64>,
     values: Vec<f64>,

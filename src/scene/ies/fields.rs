@@ -68,8 +68,8 @@ impl Photometry {
         None
     }
 
-    /// The horizontal angles of a whole circle, ascending, with the places of their values; the last
-    /// is the first plus 360. One without a dependence on φ. None where they make no circle.
+    /// The horizontal angles of a whole circle, ascending, with the places of their values; the
+    /// last is the first plus 360. One without a dependence on φ. None where they make no circle.
     fn all_around(&self) -> Option<Vec<(f64, usize)>> {
         let angles = || self.horizontals.iter().copied().zip(0..);
         let (first, last) = (*self.horizontals.first()?, *self.horizontals.last()?);
@@ -178,7 +178,8 @@ impl Photometry {
             let values = (0..rows).map(|row| curve.at(theta(row)).unwrap_or(0.0));
             return (rows, 1, values.collect());
         }
-        // The circle closes: two angles more on either side, the last of the own is the first again.
+        // The circle closes: two angles more on either side, the last of the own is the first
+        // again.
         let own = angles.len() as isize - 1;
         let wrapped = |i: isize| {
             let (turns, index) = (i.div_euclid(own), i.rem_euclid(own) as usize);

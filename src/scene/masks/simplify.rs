@@ -1,5 +1,6 @@
-//! Lines with fewer corners: two neighbours become one that keeps the area (Kronenfeld, Stanislawski,
-//! Buttenfield and Brockmeyer 2020, "Simplification of polylines by segment collapse").
+//! Lines with fewer corners: two neighbours become one that keeps the area (Kronenfeld,
+//! Stanislawski, Buttenfield and Brockmeyer 2020, "Simplification of polylines by segment
+//! collapse").
 
 use std::collections::HashMap;
 

@@ -244,8 +244,8 @@ pub(super) fn length(corners: [DVec3; 3], k: usize) -> f64 {
     corners[k].distance(corners[(k + 1) % 3])
 }
 
-/// The longest edge, from corner k to the next; of equals the one with the highest vertices, so that
-/// both triangles of an edge agree.
+/// The longest edge, from corner k to the next; of equals the one with the highest vertices, so
+/// that both triangles of an edge agree.
 pub(super) fn longest(corners: [DVec3; 3], vertices: [u32; 3]) -> usize {
     let key = |k: usize| (length(corners, k), edge(vertices[k], vertices[(k + 1) % 3]));
     (0..3).fold(0, |best, k| {

@@ -25,8 +25,8 @@ impl<'a> Glow<'a> {
         (power > 0.0).then_some(Self { input, power })
     }
 
-    /// Power that the four quarters of a triangle emit more or less than its mean, as a share of the
-    /// scene's.
+    /// Power that the four quarters of a triangle emit more or less than its mean, as a share of
+    /// the scene's.
     pub fn error(&self, cut: &Cutting, t: usize) -> f64 {
         let triangle = &cut.scene.triangles[t];
         let material = &self.input.materials[triangle.material as usize];

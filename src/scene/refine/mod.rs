@@ -23,8 +23,8 @@ use surroundings::Surroundings;
 /// How finely a scene is cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Refinement {
-    /// Longest edge of a triangle, scene units; where other surfaces are close, less. None: as if all
-    /// were cut to 6,000 triangles of one size, over `fineness`.
+    /// Longest edge of a triangle, scene units; where other surfaces are close, less. None: as if
+    /// all were cut to 6,000 triangles of one size, over `fineness`.
     pub element_size: Option<f64>,
     /// By which the sizes beside other surfaces, and the error that is left where shadows end, are
     /// divided; 1 or more.
@@ -94,8 +94,8 @@ const MOST_FOR_SHADOWS: f64 = 5.0;
 /// Of the size that is asked for: the least that the ends of shadows lead to.
 const LEAST_AT_SHADOWS: f64 = 1.0 / 64.0;
 
-/// Squared error of a triangle for the end of a shadow, over that of the scene: where 10,000 of them
-/// have as much, the scene is half a percent off.
+/// Squared error of a triangle for the end of a shadow, over that of the scene: where 10,000 of
+/// them have as much, the scene is half a percent off.
 const SHADOW: f64 = 0.005 * 0.005 / 10_000.0;
 
 /// Power that a triangle emits on the wrong side of its middle, over that of the scene.

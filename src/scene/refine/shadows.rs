@@ -11,8 +11,8 @@ use crate::scene::even_light::{EvenLight, Surface, far_lights, luminance};
 /// Places on the lights, evenly by power, and on all surfaces, evenly by what they reflect.
 const PLACES: usize = 48;
 
-/// Of so many places one is asked for first; the others where a triangle's corners do not all see the
-/// same of those.
+/// Of so many places one is asked for first; the others where a triangle's corners do not all see
+/// the same of those.
 const FEW: usize = 4;
 
 /// How far from a triangle's corners it is looked from, as a share of the way to its middle.

@@ -52,8 +52,8 @@ const WITHOUT_SUN: [u32; 3] = [1, 3, 5];
 
 impl Gradation {
     /// Of a form and its coefficients a to e, with the zenith and the directions towards it and the
-    /// sun, unit vectors. Where the zenith would be black the luminance is that of the formula. None
-    /// where it is beyond every number.
+    /// sun, unit vectors. Where the zenith would be black the luminance is that of the formula.
+    /// None where it is beyond every number.
     pub fn new(form: Form, coefficients: [f64; 5], up: DVec3, sun: DVec3) -> Option<Self> {
         let mut gradation = Self {
             form,
@@ -98,8 +98,8 @@ impl Gradation {
         self.sun
     }
 
-    /// The luminance over the zenith's, from a direction of unit length whose cosine with the zenith
-    /// is 0 or more.
+    /// The luminance over the zenith's, from a direction of unit length whose cosine with the
+    /// zenith is 0 or more.
     pub fn relative(&self, cos_zenith: f64, towards: DVec3) -> f64 {
         let [a, b, c, d, e] = self.coefficients;
         // At the horizon exp(b / 0) is 0 for every b below 0.

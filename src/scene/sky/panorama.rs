@@ -4,8 +4,8 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::DVec3;
 
-/// A picture of all directions, W·m⁻²·sr⁻¹, linear RGB: columns by azimuth, of which the first begins
-/// at 0; rows from the zenith to the nadir.
+/// A picture of all directions, W·m⁻²·sr⁻¹, linear RGB: columns by azimuth, of which the first
+/// begins at 0; rows from the zenith to the nadir.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panorama {
     pub width: u32,

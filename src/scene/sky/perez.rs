@@ -101,8 +101,8 @@ impl Perez {
     pub fn coefficients(&self) -> [f64; 5] {
         let (epsilon, z) = (self.clearness(), self.zenith_angle());
         let class = CLASSES.partition_point(|&end| end <= epsilon);
-        // In the middle classes b rises above 0 where the sky is darker than those measured, and the
-        // horizon would be endlessly bright.
+        // In the middle classes b rises above 0 where the sky is darker than those measured, and
+        // the horizon would be endlessly bright.
         let delta = self
             .brightness()
             .clamp(*BRIGHTNESS.start(), *BRIGHTNESS.end());

@@ -29,12 +29,13 @@ impl SunAngles {
     }
 }
 
-/// Seconds that uniform time is ahead of UTC, about 2000 to 2030. The sun moves 10⁻⁵ degrees a second
-/// among the stars, so that a few do not matter.
+/// Seconds that uniform time is ahead of UTC, about 2000 to 2030. The sun moves 10⁻⁵ degrees a
+/// second among the stars, so that a few do not matter.
 const TIME_AHEAD: f64 = 69.0;
 
-/// The sun's true place, without the refraction of the air, which lifts it by 0.1° at a height of 10°
-/// and by half a degree at the horizon. Latitude north and longitude east are positive, degrees.
+/// The sun's true place, without the refraction of the air, which lifts it by 0.1° at a height of
+/// 10° and by half a degree at the horizon. Latitude north and longitude east are positive,
+/// degrees.
 pub fn sun_angles(instant: Instant, latitude: f64, longitude: f64) -> SunAngles {
     let days = days_since_2000(instant);
     let (right_ascension, declination) = apparent_place(days + TIME_AHEAD / 86400.0);
@@ -124,9 +125,9 @@ mod tests {
 
     #[test]
     fn solstices_and_equinoxes() {
-        // The sun is highest at 90° − latitude + declination; at the June solstice of 2024 (20 June,
-        // 20:51 UTC) the declination is the obliquity, 23.4383°. Noon is searched for.
-        // Steps of a minute miss noon by 0.0001° and the year's obliquity by its nutation, 0.003°.
+        // The sun is highest at 90° − latitude + declination; at the June solstice of 2024 (20
+        // June, 20:51 UTC) the declination is the obliquity, 23.4383°. Noon is searched for. Steps
+        // of a minute miss noon by 0.0001° and the year's obliquity by its nutation, 0.003°.
         const OBLIQUITY: f64 = 0.006;
         let highest = |month: u32, day: f64, latitude: f64| {
             let minutes = (0..1440).map(|minute| Instant {
@@ -149,8 +150,8 @@ mod tests {
             (december.height - (40.0 - 23.4383)).abs() < OBLIQUITY,
             "{december:?}"
         );
-        // At the equinox (20 March, 03:06 UTC) it rises in the east; at the equator it stands at the
-        // zenith a little later.
+        // At the equinox (20 March, 03:06 UTC) it rises in the east; at the equator it stands at
+        // the zenith a little later.
         let minutes = (0..1440).map(|minute| Instant {
             year: 2024,
             month: 3,

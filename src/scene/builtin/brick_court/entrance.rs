@@ -17,7 +17,8 @@ pub(super) const FRAME: Arch = Arch {
 };
 const FRAME_STANDS_OUT: f64 = 0.045;
 const DOOR_Z: f64 = -0.24;
-/// Height and depth of the upper step, which is as wide as the frame; the lower one is half as high.
+/// Height and depth of the upper step, which is as wide as the frame; the lower one is half as
+/// high.
 pub(super) const STEP: f64 = 0.30;
 const STEP_DEPTH: f64 = 0.36;
 pub(super) const LOWER_STEP_DEPTH: f64 = 0.70;

@@ -147,7 +147,8 @@ fn lights() -> Lights {
     }
 }
 
-/// An oil jar of one metre, (radius, height): foot, belly, shoulder, neck and lip, then down inside.
+/// An oil jar of one metre, (radius, height): foot, belly, shoulder, neck and lip, then down
+/// inside.
 fn jar_profile() -> Vec<DVec2> {
     let outside = [
         [0.0, 0.0],
