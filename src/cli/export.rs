@@ -13,6 +13,8 @@ use super::{Builtin, DeviceOptions};
 use mesolux::bake::lit_scene::LitScene;
 use mesolux::error::{Error, Result};
 use mesolux::export::baked_colours;
+use mesolux::export::directional::files::Encoding;
+use mesolux::export::directional::{Basis, Directional};
 use mesolux::export::glb::{self, Shown};
 use mesolux::export::light_map::LightMap;
 use mesolux::export::map_files::{MapFile, Part};
@@ -20,6 +22,7 @@ use mesolux::export::probes;
 use mesolux::export::sensors::{self, SensorFile, SensorGrid};
 use mesolux::export::surface::{Surface, Texels};
 use mesolux::export::web;
+use mesolux::math::directions;
 use mesolux::scene::Scene;
 use mesolux::solver::{LightAt, Lit, Place};
 
@@ -70,6 +73,10 @@ struct MapOptions {
     /// texels if not given
     #[arg(long, value_name = "EV", allow_hyphen_values = true)]
     exposure: Option<f32>,
+    /// What light maps say of the directions from which light comes, for surfaces with normal maps;
+    /// .exr only
+    #[arg(long, value_enum, default_value_t = Encoded::Irradiance)]
+    encoding: Encoded,
     /// The light that light maps hold
     #[arg(long, value_enum, default_value_t = Light::Global)]
     light: Light,
@@ -88,6 +95,48 @@ enum Light {
     Indirect,
 }
 
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Encoded {
+    /// Irradiance alone
+    Irradiance,
+    /// Layers L0, L1x, L1y, L1z: E(n) = L0 + n · L1
+    L1,
+    /// Irradiance, and a layer with the dominant direction and how much of the light has it
+    Dominant,
+    /// A layer for each of 16 directions about the surface
+    Slots16,
+    /// For each of 32
+    Slots32,
+    /// For each of 64
+    Slots64,
+    /// For each of 128
+    Slots128,
+    /// Unity's: OUT.exr and OUT_dir.png
+    Unity,
+    /// Bakery's SH for Unity: OUT_L0.exr, OUT_L1x.png, OUT_L1y.png, OUT_L1z.png
+    Bakery,
+    /// Godot's: one image of four below each other
+    Godot,
+}
+
+impl Encoded {
+    fn of(self) -> Result<Option<Encoding>> {
+        let slots = |count| Ok(Some(Encoding::Slots(directions::Directions::new(count)?)));
+        match self {
+            Self::Irradiance => Ok(None),
+            Self::L1 => Ok(Some(Encoding::L1)),
+            Self::Dominant => Ok(Some(Encoding::Dominant)),
+            Self::Slots16 => slots(16),
+            Self::Slots32 => slots(32),
+            Self::Slots64 => slots(64),
+            Self::Slots128 => slots(128),
+            Self::Unity => Ok(Some(Encoding::Unity)),
+            Self::Bakery => Ok(Some(Encoding::Bakery)),
+            Self::Godot => Ok(Some(Encoding::Godot)),
+        }
+    }
+}
+
 /// Smallest and largest page.
 const PAGES: std::ops::RangeInclusive<u32> = 16..=8192;
 
@@ -99,8 +148,18 @@ impl MapOptions {
 
     fn check(&self) -> Result<()> {
         for path in &self.light_map {
-            MapFile::of(path)?;
+            let kind = MapFile::of(path)?;
+            if self.encoding != Encoded::Irradiance && kind != MapFile::Exr {
+                return Err(Error::Usage(format!(
+                    "light map {}: with --encoding the name must end in .exr",
+                    path.display()
+                )));
+            }
             writable(path)?;
+        }
+        if self.encoding != Encoded::Irradiance && self.light_map.is_empty() {
+            let what = "--encoding is of a --light-map, and none is asked for";
+            return Err(Error::Usage(what.into()));
         }
         for path in [&self.glb, &self.unlit_glb].into_iter().flatten() {
             if !path
@@ -174,7 +233,16 @@ impl MapOptions {
         Ok(())
     }
 
-    fn write(&self, map: &LightMap) -> Result<()> {
+    fn write(&self, surface: &Surface, map: &LightMap, lit: &Lit<'_>) -> Result<()> {
+        if let Some(encoding) = self.encoding.of()? {
+            let light = by_direction(surface, map, lit, encoding.basis(), self.part())?;
+            for path in &self.light_map {
+                for path in encoding.write(path, surface, map, &light)? {
+                    tracing::info!("{}: light map by direction", path.display());
+                }
+            }
+            return Ok(());
+        }
         for path in &self.light_map {
             let written = map.write(path, self.part())?;
             let kind = MapFile::of(path)?;
@@ -357,7 +425,7 @@ pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
     if options.maps.is_wanted() {
         let surface = laid_out(&scene, options.maps.texels())?;
         let map = light_map(&surface, &lit)?;
-        options.maps.write(&map)?;
+        options.maps.write(&surface, &map, &lit)?;
         options.maps.write_glb(&surface, &map)?;
     }
     if let Some(path) = probes {
@@ -416,6 +484,27 @@ fn light_map(surface: &Surface, lit: &Lit<'_>) -> Result<LightMap> {
         tracing::warn!("the light map is interpolated in parts: stopped by Ctrl-C");
     }
     Ok(map)
+}
+
+/// Light by direction at the texels.
+fn by_direction(
+    surface: &Surface,
+    map: &LightMap,
+    lit: &Lit<'_>,
+    basis: Basis,
+    part: Part,
+) -> Result<Directional> {
+    let bar = Bar::new();
+    let start = Instant::now();
+    let go_on = |looked_at: usize| {
+        bar.show(format!("light by direction: {looked_at} places"));
+        !interrupted()
+    };
+    let found = Directional::new(surface, map, lit, basis, part, &go_on);
+    bar.finish();
+    let seconds = start.elapsed().as_secs_f64();
+    tracing::info!("light by direction in {seconds:.1} s");
+    found
 }
 
 /// Places that are looked at between two looks at the keyboard.

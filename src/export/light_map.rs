@@ -8,9 +8,10 @@
 use glam::Vec3;
 
 use super::borders;
+use super::lattice::{BESIDE, Lattice, neighbour, too_early};
 use super::surface::{Pages, Surface};
 use super::texels::{Texel, TexelMap, quarters};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::solver::{LightAt, Lit, Place};
 
 /// Light at the texels of all pages.
@@ -23,13 +24,9 @@ pub struct LightMap {
     pub looked_at: usize,
     /// Whether it was stopped: finer lattices are then interpolated.
     pub stopped: bool,
+    /// Texels that lie beneath what stands on their surface, `[texel]`.
+    pub(super) covered: Vec<bool>,
 }
-
-/// Spacing of the coarsest lattice, texels.
-const COARSEST: i64 = 8;
-
-/// Lattices of this spacing and more are looked at as a whole.
-const WHOLE: i64 = 4;
 
 /// A difference from what was expected counts from this share of the light at a texel, and this
 /// share of the mean light, on.
@@ -109,6 +106,7 @@ impl LightMap {
             light,
             looked_at: looking.looked_at,
             stopped: looking.stopped,
+            covered,
         })
     }
 }
@@ -116,21 +114,6 @@ impl LightMap {
 fn place(surface: &Surface, texel: &Texel) -> Place {
     surface.place(texel.triangle as usize, texel.weights)
 }
-
-fn too_early() -> Error {
-    Error::Usage("stopped before there was a light map; nothing is written".into())
-}
-
-/// The texels of the same chart a step away.
-fn neighbour(surface: &Surface, map: &TexelMap, of: usize, step: [i64; 2]) -> Option<usize> {
-    let texel = &map.texels[of];
-    let [x, y] = [0, 1].map(|k| i64::from(texel.at[k]) + step[k]);
-    let chart = |t: usize| surface.chart[map.texels[t].triangle as usize];
-    let found = map.find(texel.page, x, y);
-    found.filter(|&t| chart(t) == chart(of))
-}
-
-const BESIDE: [[i64; 2]; 4] = [[1, 0], [-1, 0], [0, 1], [0, -1]];
 
 /// Whether all of a texel is covered, `[texel]`. One whose middle is covered is looked at in
 /// another place.
@@ -213,98 +196,21 @@ fn indirect(
     covered: &[bool],
     looking: &mut Looking<'_>,
 ) -> Result<Vec<Vec3>> {
-    let count = map.texels.len();
-    let mut light: Vec<Option<Vec3>> = vec![None; count];
-    // What was not expected of each, and of those that are interpolated what may be left.
-    let mut surplus = vec![0.0_f32; count];
-    let is_on = |t: usize, spacing: i64| {
-        let on = |at: u32| i64::from(at) % spacing == 0;
-        map.texels[t].at.iter().all(|&at| on(at))
+    let lattice = Lattice {
+        surface,
+        map,
+        covered,
+        unexpected: UNEXPECTED,
     };
-    let mut mean = 0.0;
-    let mut spacing = COARSEST;
-    while spacing >= 1 {
-        let is_coarsest = spacing == COARSEST;
-        let here = |t: &usize| {
-            !covered[*t] && is_on(*t, spacing) && (is_coarsest || !is_on(*t, 2 * spacing))
-        };
-        let (mut wanted, mut expected) = (Vec::new(), Vec::new());
-        for t in (0..count).filter(here) {
-            match expect(surface, map, t, spacing, &light, &surplus).filter(|_| !is_coarsest) {
-                Some((value, left)) => {
-                    let least = UNEXPECTED[0] * value.max_element() + UNEXPECTED[1] * mean;
-                    match spacing < WHOLE && left <= least {
-                        true => {
-                            light[t] = Some(value);
-                            surplus[t] = 0.25 * left;
-                        }
-                        false => {
-                            wanted.push(t);
-                            expected.push(Some(value));
-                        }
-                    }
-                }
-                None => {
-                    wanted.push(t);
-                    expected.push(None);
-                }
-            }
-        }
-        let places: Vec<Place> = wanted
+    let light = lattice.values(|texels| {
+        let places: Vec<Place> = texels
             .iter()
             .map(|&t| place(surface, &map.texels[t]))
             .collect();
         let found = looking.at(&places)?;
-        for ((&t, expected), found) in wanted.iter().zip(&expected).zip(&found) {
-            light[t] = Some(found.indirect);
-            surplus[t] = match expected {
-                Some(expected) => (found.indirect - *expected).abs().max_element(),
-                None => 0.0,
-            };
-        }
-        if found.len() < wanted.len() && spacing >= WHOLE {
-            return Err(too_early());
-        }
-        // Where it was stopped, what was expected; at borders, the light of what lies beside.
-        for (&t, expected) in wanted.iter().zip(&expected).skip(found.len()) {
-            let beside = BESIDE.into_iter().flat_map(|[i, j]| {
-                (1..=WHOLE).filter_map(move |far| neighbour(surface, map, t, [far * i, far * j]))
-            });
-            light[t] = expected.or_else(|| beside.into_iter().find_map(|t| light[t]));
-        }
-        if is_coarsest {
-            let sum: f32 = found.iter().map(|light| light.indirect.max_element()).sum();
-            mean = sum / found.len().max(1) as f32;
-        }
-        spacing /= 2;
-    }
+        Ok(found.iter().map(|light| light.indirect).collect())
+    })?;
     Ok(light.into_iter().map(Option::unwrap_or_default).collect())
-}
-
-/// What the lattice of twice this spacing lets expect at a texel between its own, and what was not
-/// expected of these; None at a border.
-fn expect(
-    surface: &Surface,
-    map: &TexelMap,
-    t: usize,
-    spacing: i64,
-    light: &[Option<Vec3>],
-    surplus: &[f32],
-) -> Option<(Vec3, f32)> {
-    let is_odd = |k: usize| i64::from(map.texels[t].at[k]) / spacing % 2 != 0;
-    let s = spacing;
-    let steps: &[[i64; 2]] = match (is_odd(0), is_odd(1)) {
-        (true, true) => &[[s, s], [-s, s], [s, -s], [-s, -s]],
-        (true, false) => &[[s, 0], [-s, 0]],
-        _ => &[[0, s], [0, -s]],
-    };
-    let (mut sum, mut most) = (Vec3::ZERO, 0.0_f32);
-    for &step in steps {
-        let parent = neighbour(surface, map, t, step)?;
-        sum += light[parent]?;
-        most = most.max(surplus[parent]);
-    }
-    Some((sum / steps.len() as f32, most))
 }
 
 /// Gives covered texels beside others the light of these.

@@ -2,13 +2,15 @@
 //!
 //! ```text
 //! scene ─► surface (charts) ─► texels ─► light_map ─► map_files
-//!                                          borders
+//!                                          borders, directional
 //! places ─► sensors
 //! ```
 
 pub mod baked_colours;
 mod borders;
+pub mod directional;
 pub mod glb;
+mod lattice;
 pub mod light_map;
 pub mod map_files;
 pub mod probes;

@@ -47,7 +47,7 @@ use crate::vk::Device;
 pub use ambient::Ambient;
 pub use devices::{check_devices, open_devices};
 pub use look::ItemPicture;
-pub use places::{LightAt, Lit, Place, Senders, SentByDirection};
+pub use places::{Arriving, LightAt, Lit, Place, Senders, SentByDirection};
 pub use problem::Problem;
 pub use progress::Update;
 use progress::{Bound, Watch};

@@ -7,7 +7,7 @@ use super::{Estimator, Problem, ReliefLight, Solver};
 use crate::error::{Error, Result};
 use crate::math::directions::Directions;
 use crate::mesh::elements::Elements;
-use crate::mesh::near::{Looking, Outlook, Part};
+use crate::mesh::near::{Looking, Outlook, PART, Part};
 use crate::mesh::shadow_tree::ShadowTree;
 use crate::mesh::sources::Source;
 use crate::scene::sky::Sky;
@@ -29,6 +29,15 @@ pub struct LightAt {
     pub direct: Vec3,
     /// From the sky, and after one reflection and more.
     pub indirect: Vec3,
+}
+
+/// Light that comes to a place along a way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Arriving {
+    /// From the place towards where it comes from, unit.
+    pub way: DVec3,
+    /// Irradiance of a facet that faces it, W·m⁻², RGB.
+    pub light: DVec3,
 }
 
 /// What can send and stop light: elements in the order of their sources.
@@ -62,6 +71,9 @@ pub struct Lit<'a> {
     allowed: [f64; 2],
     by_direction: Option<&'a SentByDirection>,
 }
+
+/// Sine of the lowest light that counts by the way on which it arrives.
+const LEAST_HEIGHT: f64 = 1e-4;
 
 /// Of the mean radiosity of a scene, emitted or reflected, the unevenness of what a part sends to a
 /// place, at most: where it is more, near members count for more than others.
@@ -173,23 +185,9 @@ impl<'a> Lit<'a> {
     pub fn at(&self, places: &[Place]) -> Result<Vec<LightAt>> {
         self.each(places, |looking, p, normal| {
             let mut indirect = DVec3::ZERO;
-            let cut = |s: usize, part: Part, factor: f64| {
-                factor * self.sent[s].unevenness[1][part.index] > self.allowed[1]
-            };
-            self.outlook
-                .parts(p, normal, looking, cut, |s, part, factor| {
-                    let sent = &self.sent[s];
-                    indirect += match (self.by_direction, self.outlook.tree(s)) {
-                        (Some(by), Some(tree)) if sent.directed => {
-                            let members = &tree.members[part.first..part.first + part.count];
-                            let towards = self.towards(by, members, p, sent, part.index);
-                            factor * (towards - sent.emitted[part.index])
-                        }
-                        _ => factor * sent.reflected[part.index],
-                    };
-                });
+            self.reflected(p, normal, looking, false, |_, _, light| indirect += light);
             if let Some(sky) = self.of.sky {
-                indirect += self.outlook.sky(sky, p, normal);
+                (self.outlook).sky(sky, p, normal, |_, light| indirect += light);
             }
             LightAt {
                 direct: self.direct(p, normal).as_vec3(),
@@ -204,6 +202,53 @@ impl<'a> Lit<'a> {
     /// As [`Self::at`].
     pub fn direct_at(&self, places: &[Place]) -> Result<Vec<Vec3>> {
         self.each(places, |_, p, normal| self.direct(p, normal).as_vec3())
+    }
+
+    /// Light by the way on which it arrives, direct or indirect: what `add` makes of it at each
+    /// place, beginning with `start` of its index. The sum of `light · (way · normal)` is what
+    /// [`Self::at`] finds.
+    ///
+    /// # Errors
+    /// As [`Self::at`].
+    pub fn arriving<T: Send>(
+        &self,
+        places: &[Place],
+        direct: bool,
+        start: impl Fn(usize) -> T + Sync,
+        add: impl Fn(&mut T, Arriving) + Sync,
+    ) -> Result<Vec<T>> {
+        check(places)?;
+        let Elements { origin, unit, .. } = *self.of.elements;
+        let at = |looking: &mut Looking, (i, place): (usize, &Place)| {
+            let (p, normal) = ((place.position - origin) / unit, place.normal);
+            let mut found = start(i);
+            let mut along = |way: DVec3, light: DVec3| {
+                let height = way.dot(normal);
+                if height > LEAST_HEIGHT {
+                    let light = light / height;
+                    add(&mut found, Arriving { way, light });
+                }
+            };
+            match direct {
+                true => self.emitted(p, normal, true, |s, part, vector| {
+                    let way = vector.normalize_or(normal);
+                    along(way, vector.dot(normal) * self.emission(s, part));
+                }),
+                false => {
+                    self.reflected(p, normal, looking, true, |s, part, light| {
+                        let towards = self.outlook.towards(s, part, p, normal);
+                        along(towards.normalize_or(normal), light);
+                    });
+                    if let Some(sky) = self.of.sky {
+                        self.outlook.sky(sky, p, normal, &mut along);
+                    }
+                }
+            }
+            found
+        };
+        Ok((places.par_iter().enumerate())
+            .map_init(|| self.outlook.looking(), at)
+            .collect())
     }
 
     /// Whether each place lies beneath what stands on its surface, where no one sees it.
@@ -241,16 +286,68 @@ impl<'a> Lit<'a> {
     /// Irradiance straight from emitters, point lights, beams and suns.
     fn direct(&self, p: DVec3, normal: DVec3) -> DVec3 {
         let mut sum = DVec3::ZERO;
+        self.emitted(p, normal, false, |s, part, vector| {
+            sum += vector.dot(normal) * self.emission(s, part);
+        });
+        sum
+    }
+
+    /// What is seen of each light: source, part of an emitter, and form factor as a vector; see
+    /// [`Outlook::emitters`].
+    fn emitted(
+        &self,
+        p: DVec3,
+        normal: DVec3,
+        by_direction: bool,
+        mut each: impl FnMut(usize, Option<Part>, DVec3),
+    ) {
         let uneven = |s: usize, part: Part, factor: f64| {
             factor * self.sent[s].unevenness[0][part.index] > self.allowed[0]
         };
-        self.outlook.emitters(p, normal, uneven, |s, part, factor| {
-            sum += factor * self.sent[s].emitted[part.index];
+        let outlook = &self.outlook;
+        outlook.emitters(p, normal, by_direction, uneven, |s, part, vector| {
+            each(s, Some(part), vector);
         });
-        let mut add = |s: usize, share: f64| sum += share * self.of.sources[s].emitted.as_dvec3();
-        self.outlook.points(p, normal, &mut add);
-        self.outlook.far(p, normal, &mut add);
-        sum
+        outlook.points(p, normal, |s, vector| each(s, None, vector));
+        outlook.far(p, normal, |s, vector| each(s, None, vector));
+    }
+
+    /// Radiosity of a part of an emitter; of a light without parts what it emits.
+    fn emission(&self, s: usize, part: Option<Part>) -> DVec3 {
+        match part {
+            Some(part) => self.sent[s].emitted[part.index],
+            None => self.of.sources[s].emitted.as_dvec3(),
+        }
+    }
+
+    /// Each part of a source that is seen, and irradiance by what it reflects; `by_direction`, of
+    /// parts that are small for facets that are tilted towards them too.
+    fn reflected(
+        &self,
+        p: DVec3,
+        normal: DVec3,
+        looking: &mut Looking,
+        by_direction: bool,
+        mut each: impl FnMut(usize, Part, DVec3),
+    ) {
+        let cut = |s: usize, part: Part, factor: f64| {
+            let most = match by_direction {
+                true => self.outlook.towards(s, part, p, normal).length(),
+                false => factor,
+            };
+            most > PART || most * self.sent[s].unevenness[1][part.index] > self.allowed[1]
+        };
+        (self.outlook).parts(p, normal, looking, cut, |s, part, factor| {
+            let sent = &self.sent[s];
+            let radiosity = match (self.by_direction, self.outlook.tree(s)) {
+                (Some(by), Some(tree)) if sent.directed => {
+                    let members = &tree.members[part.first..part.first + part.count];
+                    self.towards(by, members, p, sent, part.index) - sent.emitted[part.index]
+                }
+                _ => sent.reflected[part.index],
+            };
+            each(s, part, factor * radiosity);
+        });
     }
 
     /// Mean radiosity that members of a part send towards a place, emission included.

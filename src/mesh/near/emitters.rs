@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::parts::Part;
 use super::rays::{blocked, is_clear};
 use super::seen::Seen;
-use crate::math::form_factor::to_triangle;
+use crate::math::form_factor::vector_to_triangle;
 use crate::mesh::shadow_tree::ShadowTree;
 use crate::mesh::sources::Source;
 use crate::structs::ShadowOccluder;
@@ -44,6 +44,8 @@ pub(super) struct Looker<'a> {
     pub occluders: &'a ShadowTree<ShadowOccluder>,
     pub place: DVec3,
     pub normal: DVec3,
+    /// Whether each piece is to fill no more than [`PART`] of the view, for its direction.
+    pub by_direction: bool,
 }
 
 impl Emitter {
@@ -98,35 +100,46 @@ fn fill(seen: &Seen, part: Part, directions: &[DVec3], furthest: &mut [DVec3]) {
 }
 
 impl Looker<'_> {
-    /// Each part of the emitter that is seen, with the form factor of what is seen of it. `uneven`
-    /// says whether a part emits too unevenly to count as one, by its whole form factor.
+    /// Each part of the emitter that is seen, with the form factor of what is seen of it as a
+    /// vector, in one piece or several. `uneven` says whether a part emits too unevenly to count as
+    /// one, by its whole form factor.
     pub fn look(
         &self,
         seen: &Seen,
         emitter: &Emitter,
         uneven: impl Fn(Part, f64) -> bool,
-        mut each: impl FnMut(Part, f64),
+        mut each: impl FnMut(Part, DVec3),
     ) {
         let whole = seen.tree.whole();
-        let all = self.factor(seen, whole);
-        if all <= 0.0 {
+        let all = seen.facing(whole, self.place, self.normal);
+        let height = |vector: DVec3| vector.dot(self.normal);
+        if height(all) <= 0.0 {
             return;
         }
         let clear = is_clear(self.occluders, &[self.place], &emitter.hull);
-        let most = PART.min(OF_WHOLE * all);
+        let most = PART.min(OF_WHOLE * height(all));
         let mut stack = vec![(whole, all)];
-        while let Some((part, factor)) = stack.pop() {
+        while let Some((part, vector)) = stack.pop() {
+            let factor = height(vector);
             let even = part.count == 1 || !uneven(part, factor);
+            let narrow = !self.by_direction || factor <= PART;
             let small = part.count == 1 || seen.is_beyond(part, self.place, POINTS);
-            if clear && even && small {
-                each(part, factor);
+            if clear && even && small && narrow {
+                each(part, vector);
                 continue;
             }
             if part.count == 1 {
-                let open = self.open(&seen.triangles[part.first], factor, most, CUTS);
-                if open > 0.0 {
-                    each(part, open);
-                }
+                let triangle = seen.triangles[part.first];
+                let cuts = if narrow { 0 } else { CUTS };
+                self.pieces(triangle, vector, cuts, &mut |piece, vector| {
+                    let open = match clear {
+                        true => vector,
+                        false => self.open(piece, vector, most, CUTS),
+                    };
+                    if height(open) > 0.0 {
+                        each(part, open);
+                    }
+                });
                 continue;
             }
             if factor <= most && even && small && !clear {
@@ -136,20 +149,35 @@ impl Looker<'_> {
                 let first = views.next().is_some_and(|at| self.sees(at));
                 if views.all(|at| self.sees(at) == first) {
                     if first {
-                        each(part, factor);
+                        each(part, vector);
                     }
                     continue;
                 }
             }
-            let halves = part.halves().map(|half| (half, self.factor(seen, half)));
-            stack.extend(halves.into_iter().filter(|(_, factor)| *factor > 0.0));
+            let halves = part.halves();
+            let halves = halves.map(|half| (half, seen.facing(half, self.place, self.normal)));
+            stack.extend(
+                halves
+                    .into_iter()
+                    .filter(|(_, vector)| height(*vector) > 0.0),
+            );
         }
     }
 
-    fn factor(&self, seen: &Seen, part: Part) -> f64 {
-        match part.count {
-            1 => self.of(&seen.triangles[part.first]),
-            _ => seen.factor(part, self.place, self.normal),
+    /// A triangle cut in four until each piece fills [`PART`] of the view or less, or so often.
+    fn pieces(
+        &self,
+        triangle: [DVec3; 3],
+        vector: DVec3,
+        cuts: u32,
+        each: &mut impl FnMut(&[DVec3; 3], DVec3),
+    ) {
+        if cuts == 0 || vector.dot(self.normal) <= PART {
+            each(&triangle, vector);
+            return;
+        }
+        for quarter in quarters(&triangle) {
+            self.pieces(quarter, self.of(&quarter), cuts - 1, each);
         }
     }
 
@@ -157,17 +185,16 @@ impl Looker<'_> {
         !blocked(self.occluders, self.place, at)
     }
 
-    /// Form factor of what is seen of a triangle, whose whole form factor this is.
-    fn open(&self, triangle: &[DVec3; 3], factor: f64, most: f64, cuts: u32) -> f64 {
+    /// Form factor of what is seen of a triangle, whose whole form factor this is, as vectors.
+    fn open(&self, triangle: &[DVec3; 3], all: DVec3, most: f64, cuts: u32) -> DVec3 {
+        let factor = all.dot(self.normal);
         if factor <= 0.0 {
-            return 0.0;
+            return DVec3::ZERO;
         }
         let quarters = || {
-            let [a, b, c] = *triangle;
-            let [ab, bc, ca] = [0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)];
-            [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
-                .iter()
-                .map(|quarter| self.open(quarter, self.of(quarter), most, cuts - 1))
+            let each = quarters(triangle);
+            each.map(|quarter| self.open(&quarter, self.of(&quarter), most, cuts - 1))
+                .into_iter()
                 .sum()
         };
         if cuts > 0 && factor > most {
@@ -182,11 +209,11 @@ impl Looker<'_> {
             .find(|&k| views[(k + 1) % 3] == views[(k + 2) % 3] && views[k] != views[(k + 1) % 3]);
         let Some(odd) = odd else {
             return match (views[0] == of_middle, of_middle) {
-                (true, true) => factor,
-                (true, false) => 0.0,
+                (true, true) => all,
+                (true, false) => DVec3::ZERO,
                 (false, _) if cuts > 0 => quarters(),
-                (false, true) => 0.25 * factor,
-                (false, false) => 0.75 * factor,
+                (false, true) => 0.25 * all,
+                (false, false) => 0.75 * all,
             };
         };
         let tip = corners[odd];
@@ -211,13 +238,25 @@ impl Looker<'_> {
             return quarters();
         }
         let of_tip = self.of(&[triangle[odd], place(1), place(2)]);
-        match views[odd] {
-            true => of_tip.min(factor),
-            false => (factor - of_tip).max(0.0),
+        match (views[odd], of_tip.dot(self.normal) < factor) {
+            (true, true) => of_tip,
+            (true, false) => all,
+            (false, true) => all - of_tip,
+            (false, false) => DVec3::ZERO,
         }
     }
 
-    fn of(&self, triangle: &[DVec3; 3]) -> f64 {
-        to_triangle(self.place, self.normal, triangle).max(0.0)
+    /// Of a triangle that shows its front; else zero.
+    fn of(&self, triangle: &[DVec3; 3]) -> DVec3 {
+        let vector = vector_to_triangle(self.place, self.normal, triangle);
+        match vector.dot(self.normal) > 0.0 {
+            true => vector,
+            false => DVec3::ZERO,
+        }
     }
+}
+
+fn quarters(&[a, b, c]: &[DVec3; 3]) -> [[DVec3; 3]; 4] {
+    let [ab, bc, ca] = [0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)];
+    [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
 }

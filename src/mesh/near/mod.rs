@@ -29,7 +29,7 @@ use crate::mesh::sources::Source;
 use crate::structs::{NearFactor, NearPart, NearVector, ShadowOccluder};
 use pair::Search;
 pub use parts::{Part, PartTree};
-pub use places::{Looking, Outlook};
+pub use places::{Looking, Outlook, PART};
 pub(super) use rays::{blocked, first_met};
 use receivers::Receiver;
 

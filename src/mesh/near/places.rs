@@ -18,7 +18,7 @@ use crate::scene::sky::Sky;
 use crate::structs::ShadowOccluder;
 
 /// Of the view of a place: the share that a part fills at most, unless it is one member.
-const PART: f64 = 1.0 / 192.0;
+pub const PART: f64 = 1.0 / 192.0;
 
 /// The sources of a scene, to be looked at from places.
 pub struct Outlook<'a> {
@@ -98,48 +98,53 @@ impl<'a> Outlook<'a> {
         }
     }
 
+    /// The form factor to a part as if nothing stood between, as a vector along which its light
+    /// comes.
+    pub fn towards(&self, source: usize, part: Part, place: DVec3, normal: DVec3) -> DVec3 {
+        let seen = self.seen[source].as_ref();
+        seen.map_or(DVec3::ZERO, |seen| seen.facing(part, place, normal))
+    }
+
     /// Each part of an emitter that a place with this normal sees any of: source, part, and the
-    /// form factor of what is seen of it, up to the edges of shadows. `uneven` says whether a part
-    /// of a source emits too unevenly to count as one, by its whole form factor.
+    /// form factor of what is seen of it as a vector, up to the edges of shadows; where it is asked
+    /// `by_direction`, in narrow pieces. `uneven` says whether a part of a source emits too
+    /// unevenly to count as one, by its whole form factor.
     pub fn emitters(
         &self,
         place: DVec3,
         normal: DVec3,
+        by_direction: bool,
         uneven: impl Fn(usize, Part, f64) -> bool,
-        mut each: impl FnMut(usize, Part, f64),
+        mut each: impl FnMut(usize, Part, DVec3),
     ) {
         let looker = Looker {
             occluders: self.search.occluders,
             place,
             normal,
+            by_direction,
         };
         for (s, (emitter, seen)) in self.emitters.iter().zip(&self.seen).enumerate() {
             if let (Some(emitter), Some(seen)) = (emitter, seen) {
                 let uneven = |part: Part, factor: f64| uneven(s, part, factor);
-                looker.look(seen, emitter, uneven, |part, factor| each(s, part, factor));
+                looker.look(seen, emitter, uneven, |part, vector| each(s, part, vector));
             }
         }
     }
 
-    /// Each sun and beam that a place sees any of: source, and form factor, or of a beam irradiance
-    /// for a unit of intensity.
-    pub fn far(&self, place: DVec3, normal: DVec3, mut each: impl FnMut(usize, f64)) {
+    /// What a place sees of each sun and beam: source, and form factor as a vector, or of a beam
+    /// irradiance for a unit of intensity; of a sun in many pieces.
+    pub fn far(&self, place: DVec3, normal: DVec3, mut each: impl FnMut(usize, DVec3)) {
         for (s, source) in self.sources.iter().enumerate() {
             if source.kind != KIND_SUN && source.kind != KIND_BEAM {
                 continue;
             }
             let count = source.places.len().max(1);
-            let along = |i: usize| {
+            for i in 0..count {
                 let way = source.way_from(place, i);
-                let factor = source.factor_along(way, normal);
-                match factor > 0.0 && !blocked(self.search.occluders, place, place + way) {
-                    true => factor,
-                    false => 0.0,
+                let factor = source.factor_along(way, normal) / count as f64;
+                if factor > 0.0 && !blocked(self.search.occluders, place, place + way) {
+                    each(s, way * (factor / way.dot(normal)));
                 }
-            };
-            let factor = (0..count).map(along).sum::<f64>() / count as f64;
-            if factor > 0.0 {
-                each(s, factor);
             }
         }
     }
@@ -159,13 +164,14 @@ impl<'a> Outlook<'a> {
         ways.all(|way| self.sees_a_back(place, way))
     }
 
-    /// Irradiance by what a place sees of a sky.
-    pub fn sky(&self, sky: &Sky, place: DVec3, normal: DVec3) -> DVec3 {
-        sky_seen(sky, self.search.occluders, place, normal)
+    /// Irradiance by each part of a sky that a place sees, and the way to it.
+    pub fn sky(&self, sky: &Sky, place: DVec3, normal: DVec3, each: impl FnMut(DVec3, DVec3)) {
+        sky_seen(sky, self.search.occluders, place, normal, each);
     }
 
-    /// Each point light that a place sees: source, and irradiance for a unit of intensity.
-    pub fn points(&self, place: DVec3, normal: DVec3, mut each: impl FnMut(usize, f64)) {
+    /// Each point light that a place sees: source, and irradiance for a unit of intensity as a
+    /// vector.
+    pub fn points(&self, place: DVec3, normal: DVec3, mut each: impl FnMut(usize, DVec3)) {
         for (s, source) in self.sources.iter().enumerate() {
             let way = source.eye - place;
             let cosine = way.dot(normal);
@@ -179,7 +185,7 @@ impl<'a> Outlook<'a> {
                 && cosine > 0.0
                 && !blocked(self.search.occluders, place, source.eye)
             {
-                each(s, cosine / way.length().powi(3));
+                each(s, way / way.length().powi(3));
             }
         }
     }

@@ -177,6 +177,23 @@ impl Seen {
         }
     }
 
+    /// [`Self::factor`] as a vector: without the members that turn their backs.
+    pub fn facing(&self, part: Part, p: DVec3, n: DVec3) -> DVec3 {
+        let vector = match (self.far[part.index].vector(p, n), part.count) {
+            (Some(vector), _) => vector,
+            (None, 1) => vector_to_triangle(p, n, &self.triangles[part.first]),
+            (None, _) => {
+                return (part.halves().into_iter())
+                    .map(|half| self.facing(half, p, n))
+                    .sum();
+            }
+        };
+        match vector.dot(n) > 0.0 {
+            true => vector,
+            false => DVec3::ZERO,
+        }
+    }
+
     /// The least distance from a place to the ball about a member other than element `but`, where
     /// it is less than `most`.
     pub fn nearest(&self, part: Part, p: DVec3, but: usize, most: f64) -> f64 {

@@ -46,13 +46,16 @@ struct Look<'a> {
     normal: DVec3,
 }
 
-/// Irradiance by the sky at a place with this normal, internal units, W·m⁻², RGB.
+/// Irradiance by each part of the sky that a place with this normal sees, and the way to the middle
+/// of the part; internal units, W·m⁻², RGB.
 pub fn sky_seen(
     sky: &Sky,
     occluders: &ShadowTree<ShadowOccluder>,
     place: DVec3,
     normal: DVec3,
-) -> DVec3 {
+    mut each: impl FnMut(DVec3, DVec3),
+) {
+    let middle = |part: &SkyPart| sky.towards(part.at(DVec2::splat(0.5)));
     let look = Look {
         sky,
         occluders,
@@ -96,11 +99,15 @@ pub fn sky_seen(
         };
         match seen.gap || bands.into_iter().any(is_mixed) {
             true => parts.extend(part(i).quarters().map(|part| (part, look.corners(&part)))),
-            false => sum += seen.light,
+            false => {
+                sum += seen.light;
+                each(middle(&part(i)), seen.light);
+            }
         }
     }
     for cut in 0..MOST_CUTS {
         let (mut mixed, mut of_mixed) = (Vec::new(), DVec3::ZERO);
+        let mut whole = Vec::new();
         let mut gaps = false;
         for (part, corners) in parts {
             let seen = look.at(&part, corners);
@@ -109,21 +116,26 @@ pub fn sky_seen(
             match seen.mixed || gap {
                 true => {
                     of_mixed += seen.light;
+                    whole.push((middle(&part), seen.light));
                     let quarters = part.quarters().into_iter();
                     mixed.extend(quarters.map(|part| (part, look.corners(&part))));
                 }
-                false => sum += seen.light,
+                false => {
+                    sum += seen.light;
+                    each(middle(&part), seen.light);
+                }
             }
         }
         let is_little = of_mixed.element_sum() <= MIXED * (sum + of_mixed).element_sum();
         if is_little && !gaps {
-            return sum + of_mixed;
+            (whole.into_iter()).for_each(|(way, light)| each(way, light));
+            return;
         }
         parts = mixed;
     }
-    // The last parts by their middles.
-    let left = parts.iter().map(|(part, _)| look.at(part, [None; 4]).light);
-    sum + left.sum::<DVec3>()
+    for (part, _) in parts {
+        each(middle(&part), look.at(&part, [None; 4]).light);
+    }
 }
 
 impl Look<'_> {
