@@ -196,18 +196,16 @@ impl Builtin {
     }
 
     fn refined(&self, name: &str, scene: Scene, quality: Quality) -> Scene {
-        use mesolux::scene::builtin::{COARSE, NAMES};
-        let named = NAMES.contains(&name) && !COARSE.contains(&name);
-        let fineness = self.fineness.unwrap_or(quality.fineness());
-        if self.no_refine || named && self.element_size.is_none() && fineness <= 1.0 {
+        let refinement = Refinement {
+            element_size: self.element_size,
+            fineness: self.fineness.unwrap_or(quality.fineness()),
+            max_elements: self.max_elements,
+        };
+        if self.no_refine || !refinement.is_for(name) {
             return scene;
         }
         let before = scene.triangles.len();
-        let scene = scene.refined(&Refinement {
-            element_size: self.element_size,
-            fineness,
-            max_elements: self.max_elements,
-        });
+        let scene = scene.refined(&refinement);
         let now = scene.triangles.len();
         if now > before {
             tracing::info!("{before} triangles are cut to {now} elements; --no-refine leaves them");

@@ -5,7 +5,8 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use glam::Vec3;
-use safetensors::{Dtype, tensor::TensorView};
+pub use safetensors::Dtype;
+use safetensors::tensor::TensorView;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
@@ -16,13 +17,14 @@ use crate::error::{Error, Result};
 /// Version of the file's layout.
 pub const VERSION: &str = "2";
 
-/// One tensor to be written.
-struct Tensor {
-    name: &'static str,
-    dtype: Dtype,
-    shape: Vec<usize>,
+/// One tensor of a bake's file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tensor {
+    pub name: &'static str,
+    pub dtype: Dtype,
+    pub shape: Vec<usize>,
     /// Little-endian.
-    bytes: Vec<u8>,
+    pub bytes: Vec<u8>,
 }
 
 impl Tensor {
@@ -100,7 +102,9 @@ impl Solution {
             .collect())
     }
 
-    fn tensors(&self) -> Vec<Tensor> {
+    /// What is written, in scene units and in the order of the input; `docs/bake-format.md` says
+    /// what each tensor is.
+    pub fn tensors(&self) -> Vec<Tensor> {
         let n = self.area.len();
         let vertices = self.vertices.iter().flatten();
         let mut tensors = vec![

@@ -111,7 +111,7 @@ impl Looker<'_> {
         mut each: impl FnMut(Part, DVec3),
     ) {
         let whole = seen.tree.whole();
-        let all = seen.facing(whole, self.place, self.normal);
+        let all = self.towards(seen, whole);
         let height = |vector: DVec3| vector.dot(self.normal);
         if height(all) <= 0.0 {
             return;
@@ -155,12 +155,20 @@ impl Looker<'_> {
                 }
             }
             let halves = part.halves();
-            let halves = halves.map(|half| (half, seen.facing(half, self.place, self.normal)));
+            let halves = halves.map(|half| (half, self.towards(seen, half)));
             stack.extend(
                 halves
                     .into_iter()
                     .filter(|(_, vector)| height(*vector) > 0.0),
             );
+        }
+    }
+
+    /// Form factor to a part as if nothing stood between, as a vector.
+    fn towards(&self, seen: &Seen, part: Part) -> DVec3 {
+        match part.count {
+            1 => self.of(&seen.triangles[part.first]),
+            _ => seen.facing(part, self.place, self.normal),
         }
     }
 

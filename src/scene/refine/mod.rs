@@ -36,6 +36,14 @@ pub struct Refinement {
 impl Refinement {
     /// Triangles of the whole scene if all were cut to one size.
     const EVEN: f64 = 6000.0;
+
+    /// Whether a scene of this name is cut: built-in ones, unless they are coarse, are not, but
+    /// where a size or more fineness is asked for.
+    pub fn is_for(&self, name: &str) -> bool {
+        use crate::scene::builtin::{COARSE, NAMES};
+        let is_fine = NAMES.contains(&name) && !COARSE.contains(&name);
+        !is_fine || self.element_size.is_some() || self.fineness > 1.0
+    }
 }
 
 impl Default for Refinement {
