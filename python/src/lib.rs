@@ -188,8 +188,8 @@ impl Bake {
 /// Bakes a scene: a built-in name, an .obj, .gltf or .glb file, or a scene.toml.
 ///
 /// Settings are those of `mesolux bake`. `progress` is True for a line on stderr, False for none,
-/// or a function that is called with a Progress and stops the bake, whose light is kept, by returning
-/// False. Ctrl-C raises KeyboardInterrupt.
+/// or a function that is called with a Progress and stops the bake, whose light is kept, by
+/// returning False. Ctrl-C raises KeyboardInterrupt.
 #[pyfunction]
 #[pyo3(signature = (scene, *, quality = "normal", residual = None, patches = None, statue = None,
     directions = 64, transport = "physical", element_size = None, fineness = None,

@@ -2,82 +2,19 @@
 //! and real mouse events.
 #![cfg(all(target_os = "linux", feature = "window"))]
 
+mod browser;
 #[allow(dead_code)] // used by the tests of the window as well
 #[path = "../view/harness.rs"]
 mod harness;
+mod loaders;
 mod server;
-
-use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
 
 use image::RgbImage;
 use mesolux::render::ldr;
 
+use browser::{Browser, SIZE, wait};
 use harness::{Display, device, difference, mesolux, picture, told};
-use server::{Server, State};
-
-/// Pixels of the page: the whole display.
-const SIZE: (u32, u32) = (1024, 768);
-
-struct Browser(Child);
-
-impl Browser {
-    fn open(display: &Display, profile: &std::path::Path, address: &str) -> Self {
-        let names = ["chromium", "chromium-browser", "google-chrome"];
-        let child = names.into_iter().find_map(|name| {
-            Command::new(name)
-                .args([
-                    "--no-sandbox",
-                    "--no-first-run",
-                    "--kiosk",
-                    "--hide-scrollbars",
-                ])
-                .args([
-                    "--use-gl=angle",
-                    "--use-angle=swiftshader",
-                    "--enable-unsafe-swiftshader",
-                ])
-                .args([
-                    "--window-position=0,0",
-                    &format!("--window-size={},{}", SIZE.0, SIZE.1),
-                ])
-                .arg(format!("--user-data-dir={}", profile.display()))
-                .arg(address)
-                .env("DISPLAY", &display.name)
-                .stdout(Stdio::null())
-                .stderr(Stdio::null())
-                .spawn()
-                .ok()
-        });
-        Self(child.expect("the test needs Chromium (Debian: chromium)"))
-    }
-}
-
-impl Drop for Browser {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-/// Waits until the page is as wanted.
-#[track_caller]
-fn wait(server: &Server, what: &str, wanted: impl Fn(&State) -> bool) -> State {
-    let begin = Instant::now();
-    loop {
-        match server.state() {
-            Some(state) if wanted(&state) => return state,
-            state => {
-                let title = state.map(|state| state.title);
-                assert!(
-                    begin.elapsed() < Duration::from_secs(120),
-                    "{what}: {title:?}"
-                );
-            }
-        }
-        std::thread::sleep(Duration::from_millis(50));
-    }
-}
+use server::Server;
 
 /// Linear values of a picture's codes.
 fn linear(image: &RgbImage) -> Vec<[f32; 3]> {
@@ -89,6 +26,12 @@ fn linear(image: &RgbImage) -> Vec<[f32; 3]> {
         }
     };
     image.pixels().map(|p| p.0.map(linear)).collect()
+}
+
+/// LDR-FLIP in the mean.
+fn apart(one: &RgbImage, other: &RgbImage) -> f32 {
+    let errors = ldr(&linear(one), &linear(other), one.width());
+    errors.iter().sum::<f32>() / errors.len() as f32
 }
 
 #[test]
@@ -129,8 +72,7 @@ fn the_page_shows_the_light_and_is_moved_by_the_mouse() {
         &size,
     ]);
     let expected = picture(folder.path(), "box.png");
-    let errors = ldr(&linear(&first.picture), &linear(&expected), width);
-    let error = errors.iter().sum::<f32>() / errors.len() as f32;
+    let error = apart(&first.picture, &expected);
     println!("FLIP {error:.4} beside `render`");
     assert!(error <= FLIP);
 
