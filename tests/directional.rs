@@ -231,11 +231,6 @@ fn tilted_normals_are_lit_as_the_path_tracer_has_them() {
         Frame::of(&surface, texel.triangle, texel.weights)
     };
     // A tilt and four azimuths at each.
-    let around = |t: usize| -> [Place; 4] {
-        let texel = &map.map.texels[t];
-        let each = quarters(&surface, texel);
-        each.map(|weights| surface.place(texel.triangle as usize, weights))
-    };
     let facets = |frame: &Frame| -> Vec<DVec3> {
         let (sin, cos) = (PI / 4.0).sin_cos();
         // From texel to texel at other azimuths.

@@ -106,16 +106,12 @@ fn others_load_the_gltf() {
         ]);
         let error = apart(&state.picture, &picture(folder.path(), &file));
         println!("{name}: FLIP {error:.4} in three.js beside `render`");
-        if let Some(kept) = std::env::var_os("MESOLUX_KEEP_PICTURES") {
-            let kept = Path::new(&kept).join(format!("three-{name}.png"));
-            state.picture.save(kept).expect("a picture");
-        }
         assert!(error <= limit);
     }
 }
 
-/// Mean LDR-FLIP with the light map. Measured:
-const MAPPED: f32 = 0.09;
+/// Mean LDR-FLIP with the light map. Measured: 0.0424.
+const MAPPED: f32 = 0.085;
 
-/// With baked colours. Measured:
-const UNLIT: f32 = 0.035;
+/// With baked colours. Measured: 0.0154.
+const UNLIT: f32 = 0.031;
