@@ -79,8 +79,8 @@ def test_an_error_of_progress_is_raised() -> None:
 def test_ctrl_c_raises_keyboard_interrupt() -> None:
     program = (
         "import mesolux, sys\n"
-        "def tell(state): print('begun', flush=True)\n"
-        f"try: mesolux.bake('cornell', patches=60000, device={DEVICE!r}, progress=tell)\n"
+        "def report(state): print('begun', flush=True)\n"
+        f"try: mesolux.bake('cornell', patches=60000, device={DEVICE!r}, progress=report)\n"
         "except KeyboardInterrupt: sys.exit(42)\n"
     )
     child = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)

@@ -1,4 +1,4 @@
-//! Light maps that tell from where the light comes, for surfaces with normal maps of their own.
+//! Light maps that say from where the light comes, for surfaces with normal maps of their own.
 //!
 //! ```text
 //! light at a place by the way it arrives ─► response ─► scaled to the light map ─► files
