@@ -195,6 +195,8 @@ fn wrong_exports_are_refused() {
     for (args, said) in [
         (&[][..], "nothing to write"),
         (&["--light-map", "a.jpg"], "a.jpg"),
+        (&["--light-map", "a.hdr", "--encoding", "l1"], ".exr"),
+        (&["--encoding", "l1", "--web", "a"], "--light-map"),
         (&["--light-map", "none/a.exr"], "none/a.exr"),
         (&["--glb", "a.gltf"], "a.gltf"),
         (&["--page", "3", "--glb", "a.glb"], "--page 3"),

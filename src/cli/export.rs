@@ -424,9 +424,13 @@ pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
     let lit = lit_scene.look();
     if options.maps.is_wanted() {
         let surface = laid_out(&scene, options.maps.texels())?;
+        if let Some(encoding) = options.maps.encoding.of()? {
+            encoding.basis().check(&surface.pages)?;
+        }
         let map = light_map(&surface, &lit)?;
-        options.maps.write(&surface, &map, &lit)?;
+        // First what is quick, lest Ctrl-C take it along.
         options.maps.write_glb(&surface, &map)?;
+        options.maps.write(&surface, &map, &lit)?;
     }
     if let Some(path) = probes {
         options.probes.write(path, &scene, &lit)?;

@@ -14,7 +14,7 @@ use glam::{DVec3, Vec3};
 use super::lattice::{Lattice, Value, too_early};
 use super::light_map::LightMap;
 use super::map_files::Part;
-use super::surface::Surface;
+use super::surface::{Pages, Surface};
 use super::texels::quarters;
 use crate::error::{Error, Result};
 use crate::math::directions::Directions;
@@ -47,7 +47,7 @@ pub struct Directional {
 const UNEXPECTED: [f32; 2] = [0.01, 0.002];
 
 /// Most values of all texels.
-const MOST_VALUES: usize = 1 << 27;
+const MOST_VALUES: u64 = 1 << 27;
 
 /// Places that are looked at between two calls of `go_on`.
 const AT_ONCE: usize = 2048;
@@ -90,6 +90,22 @@ impl Basis {
             Self::L1 => 4,
             Self::Slots(directions) => directions.count(),
         }
+    }
+
+    /// Whether the texels of these pages are few enough.
+    ///
+    /// # Errors
+    /// They are not.
+    pub fn check(self, pages: &Pages) -> Result<()> {
+        let texels = u64::from(pages.count) * u64::from(pages.width) * u64::from(pages.height);
+        let count = self.count();
+        if texels * count as u64 > MOST_VALUES {
+            return Err(Error::Usage(format!(
+                "light of {texels} texels in {count} values each is more than {MOST_VALUES} \
+                 values; use a smaller --page, or fewer --texels-per-unit"
+            )));
+        }
+        Ok(())
     }
 
     /// Direct or indirect light at places, `[place][value]`.
@@ -137,7 +153,7 @@ impl Directional {
     /// false stops.
     ///
     /// # Errors
-    /// Stopped.
+    /// Those of [`Basis::check`]; stopped.
     pub fn new(
         surface: &Surface,
         map: &LightMap,
@@ -146,6 +162,7 @@ impl Directional {
         part: Part,
         go_on: &dyn Fn(usize) -> bool,
     ) -> Result<Self> {
+        basis.check(&surface.pages)?;
         let mut look = Look {
             surface,
             map,
@@ -156,12 +173,6 @@ impl Directional {
         };
         let count = basis.count();
         let texels = map.map.texels.len();
-        if texels * count > MOST_VALUES {
-            return Err(Error::Usage(format!(
-                "light of {texels} texels in {count} directions is more than {MOST_VALUES} values; \
-                 use a smaller --page, or fewer texels a unit"
-            )));
-        }
         let of = |light: &LightAt, direct: bool| match (part, direct) {
             (Part::Indirect, true) | (Part::Direct, false) => Vec3::ZERO,
             (_, true) => light.direct,
