@@ -1,7 +1,7 @@
 //! The instance, its validation messages, and the devices it offers.
 
-use std::ffi::{CStr, CString, FromBytesUntilNulError, c_void};
-use std::sync::{Arc, Mutex};
+use std::ffi::{CStr, FromBytesUntilNulError, c_void};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use ash::{ext, vk};
 
@@ -12,16 +12,18 @@ const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 /// Messages of warning severity or above that the validation layer has sent in this process.
 static VALIDATION_MESSAGES: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
-/// The instances of this process, which live as long as it does, and what each was made for. To
-/// destroy one unloads its driver, whose code some drivers still run as threads end; and loaders
-/// fail where threads create and destroy instances side by side.
-static INSTANCES: Mutex<Vec<(Wanted, Arc<Instance>)>> = Mutex::new(Vec::new());
+/// An instance that is never destroyed, so that drivers stay loaded until the process ends: some
+/// run code as threads end, and crash where that code is gone. None where there is no Vulkan.
+static ANCHOR: OnceLock<Option<(ash::Instance, ash::Entry)>> = OnceLock::new();
 
-/// What an instance is made for.
-#[derive(Debug, Clone, PartialEq, Eq)]
-struct Wanted {
-    validation: bool,
-    extensions: Vec<CString>,
+fn anchor() -> Option<(ash::Instance, ash::Entry)> {
+    // SAFETY: the loader is a well-behaved system library, which is never unloaded here.
+    let entry = unsafe { ash::Entry::load() }.ok()?;
+    let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
+    let info = vk::InstanceCreateInfo::default().application_info(&application);
+    // SAFETY: every pointer in `info` outlives the call.
+    let raw = unsafe { entry.create_instance(&info, None) }.ok()?;
+    Some((raw, entry))
 }
 
 /// The number of validation messages (warnings and errors) in this process; anything but 0 is a
@@ -43,6 +45,7 @@ pub struct Instance {
     pub(super) debug_utils: bool,
     /// Whether devices of this instance are to show pictures on windows.
     pub(super) presents: bool,
+    messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     pub(super) entry: ash::Entry,
 }
 
@@ -112,8 +115,8 @@ impl Installed {
 }
 
 impl Instance {
-    /// The process's instance, made on the first call. With `validation`, a missing layer is an
-    /// error: a silent run must mean that the layer checked it.
+    /// Loads Vulkan. With `validation`, a missing layer is an error: a silent run must mean that
+    /// the layer checked it.
     ///
     /// # Errors
     /// No Vulkan; no validation layer.
@@ -122,21 +125,8 @@ impl Instance {
     }
 
     /// With the extensions that a window's surface needs, if any.
-    pub(super) fn with_extensions(validation: bool, extensions: &[&CStr]) -> Result<Arc<Self>> {
-        let wanted = Wanted {
-            validation,
-            extensions: extensions.iter().map(|&name| name.to_owned()).collect(),
-        };
-        let mut known = INSTANCES.lock().unwrap_or_else(|e| e.into_inner());
-        if let Some((_, instance)) = known.iter().find(|(made_for, _)| *made_for == wanted) {
-            return Ok(Arc::clone(instance));
-        }
-        let instance = Arc::new(Self::create(validation, extensions)?);
-        known.push((wanted, Arc::clone(&instance)));
-        Ok(instance)
-    }
-
-    fn create(validation: bool, wanted: &[&CStr]) -> Result<Self> {
+    pub(super) fn with_extensions(validation: bool, wanted: &[&CStr]) -> Result<Arc<Self>> {
+        ANCHOR.get_or_init(anchor);
         // SAFETY: the loader is a well-behaved system library, which `Self` unloads last.
         let entry = unsafe { ash::Entry::load() }.map_err(|e| {
             Error::Device(format!(
@@ -173,24 +163,26 @@ impl Instance {
         // SAFETY: every pointer in `info` outlives the call.
         let raw = unsafe { entry.create_instance(&info, None) }
             .map_err(|e| Error::Device(format!("Vulkan instance: {e}")))?;
-        let instance = Self {
+        let mut instance = Self {
             raw,
             debug_utils,
             presents: !wanted.is_empty(),
+            messenger: None,
             entry,
         };
         if validation {
             instance.listen()?;
         }
-        Ok(instance)
+        Ok(Arc::new(instance))
     }
 
-    /// Receives the messages of the validation layer, for as long as the instance lives.
-    fn listen(&self) -> Result<()> {
+    /// Receives the messages of the validation layer.
+    fn listen(&mut self) -> Result<()> {
         let loader = ext::debug_utils::Instance::new(&self.entry, &self.raw);
         // SAFETY: the extension is enabled, and the callback is a plain function.
-        unsafe { loader.create_debug_utils_messenger(&messenger_info(), None) }
+        let messenger = unsafe { loader.create_debug_utils_messenger(&messenger_info(), None) }
             .map_err(|e| Error::Device(format!("Vulkan debug messenger: {e}")))?;
+        self.messenger = Some((loader, messenger));
         Ok(())
     }
 
@@ -392,8 +384,13 @@ unsafe extern "system" fn on_message(
 
 impl Drop for Instance {
     fn drop(&mut self) {
-        // SAFETY: an instance is dropped only where it could not be finished, before anything was
-        // made of it. The library is unloaded with the fields, after this.
-        unsafe { self.raw.destroy_instance(None) };
+        // SAFETY: everything made from the instance holds it by `Arc`, so nothing is left. The
+        // library is unloaded with the fields, after this.
+        unsafe {
+            if let Some((loader, messenger)) = &self.messenger {
+                loader.destroy_debug_utils_messenger(*messenger, None);
+            }
+            self.raw.destroy_instance(None);
+        }
     }
 }
