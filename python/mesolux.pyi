@@ -24,7 +24,7 @@ class Progress:
         """Of the emitted power."""
     @property
     def error_bound(self) -> float | None:
-        """Power that can still be missing, as a share of the emitted; None at a reflectance of 1."""
+        """Power that can still be missing, over the emitted; None at a reflectance of 1."""
     @property
     def seconds(self) -> float: ...
 

@@ -6,13 +6,11 @@ mod common;
 use std::f64::consts::{PI, TAU};
 use std::path::{Path, PathBuf};
 
-use common::{Build, assert_silent, device};
+use common::{Build, assert_silent, lit};
 use exr::prelude::{ReadChannels, ReadLayers, read};
 use glam::{DVec3, Vec3};
 use image::RgbaImage;
-use mesolux::bake::lit_scene::LitScene;
 use mesolux::bake::quality::Quality;
-use mesolux::bake::solution::Origin;
 use mesolux::export::directional::files::Encoding;
 use mesolux::export::directional::{Directional, Frame, irradiance_of_slots};
 use mesolux::export::light_map::LightMap;
@@ -204,11 +202,7 @@ const OWN: f64 = 1e-2;
 #[test]
 fn tilted_normals_are_lit_as_the_path_tracer_has_them() {
     let build = room();
-    let settings = Quality::default().settings();
-    let solution =
-        mesolux::bake::bake(&device(), &build.scene, &settings, |_| true).expect("a bake");
-    let bake = solution.into_bake(Origin::default());
-    let scene = LitScene::new(&build.scene, &bake).expect("a lit scene");
+    let scene = lit(&build.scene, Quality::default());
     let lit = scene.look();
     let surface = Surface::new(&build.scene, Texels::Page(192), || true).expect("it is laid out");
     let map = LightMap::new(&surface, &lit, &|_| true).expect("a light map");

@@ -5,11 +5,9 @@ mod common;
 
 use std::collections::HashMap;
 
-use common::{Build, assert_silent, device};
+use common::{Build, assert_silent, lit};
 use glam::{DVec2, DVec3, Vec3};
-use mesolux::bake::lit_scene::LitScene;
 use mesolux::bake::quality::Quality;
-use mesolux::bake::solution::Origin;
 use mesolux::export::light_map::LightMap;
 use mesolux::export::map_files::Part;
 use mesolux::export::surface::{PADDING, Surface, Texels};
@@ -28,11 +26,7 @@ fn scene(name: &str, patches: Option<usize>) -> Scene {
 
 /// Bakes a scene, and finds its light map on pages of this size.
 fn mapped(scene: &Scene, texels: Texels) -> (Surface, LightMap) {
-    let settings = Quality::default().settings();
-    let solution =
-        mesolux::bake::bake(&device(), scene, &settings, |_| true).expect("the scene is baked");
-    let bake = solution.into_bake(Origin::default());
-    let lit = LitScene::new(scene, &bake).expect("a lit scene");
+    let lit = lit(scene, Quality::default());
     let surface = Surface::new(scene, texels, || true).expect("it is laid out");
     let map = LightMap::new(&surface, &lit.look(), &|_| true).expect("a light map");
     (surface, map)
@@ -252,11 +246,7 @@ fn light_comes_in_beneath_a_sheet() {
     build.quad(DVec3::new(0.3, 0.3, 0.3), 0.4 * z, 0.4 * x, (3, 3), grey);
     build.quad(DVec3::new(0.4, 0.99, 0.4), 0.2 * x, 0.2 * z, (1, 1), lamp);
     build.weld();
-    let settings = Quality::Draft.settings();
-    let solution = mesolux::bake::bake(&device(), &build.scene, &settings, |_| true)
-        .expect("the scene is baked");
-    let bake = solution.into_bake(Origin::default());
-    let lit = LitScene::new(&build.scene, &bake).expect("a lit scene");
+    let lit = lit(&build.scene, Quality::Draft);
     let lit = lit.look();
     let surface = Surface::new(&build.scene, Texels::Page(64), || true).expect("it is laid out");
     let map = LightMap::new(&surface, &lit, &|_| true).expect("a light map");

@@ -2,11 +2,9 @@
 
 mod common;
 
-use common::{Build, assert_silent, device};
+use common::{Build, assert_silent, lit};
 use glam::DVec3;
-use mesolux::bake::lit_scene::LitScene;
 use mesolux::bake::quality::Quality;
-use mesolux::bake::solution::Origin;
 use mesolux::export::probes::{grid, places, probes};
 
 /// Left of a wall of 5 mm the lamp is red, right of it green.
@@ -33,11 +31,7 @@ fn no_light_leaks_through_a_thin_wall() {
         white,
     );
     build.weld();
-    let settings = Quality::Draft.settings();
-    let solution = mesolux::bake::bake(&device(), &build.scene, &settings, |_| true)
-        .expect("the scene is baked");
-    let bake = solution.into_bake(Origin::default());
-    let lit = LitScene::new(&build.scene, &bake).expect("a lit scene");
+    let lit = lit(&build.scene, Quality::Draft);
     let lit = lit.look();
     let positions = grid(&build.scene, [8, 4, 4]);
     let around = places(&positions);

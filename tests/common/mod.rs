@@ -11,6 +11,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
+use mesolux::bake::lit_scene::LitScene;
+use mesolux::bake::quality::Quality;
+use mesolux::bake::solution::Origin;
 use mesolux::bench::relief_room::{REPEAT, TEXELS};
 use mesolux::mesh::elements::Elements;
 use mesolux::render::{Picture, side_by_side};
@@ -184,4 +187,13 @@ pub fn thirds(n: u32) -> Vec<[f64; 2]> {
         }
     }
     places
+}
+
+/// A scene with the light of a bake.
+pub fn lit(scene: &Scene, quality: Quality) -> LitScene {
+    let settings = quality.settings();
+    let solution =
+        mesolux::bake::bake(&device(), scene, &settings, |_| true).expect("the scene is baked");
+    let bake = solution.into_bake(Origin::default());
+    LitScene::new(scene, &bake).expect("a lit scene")
 }

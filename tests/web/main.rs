@@ -9,8 +9,11 @@ mod harness;
 mod loaders;
 mod server;
 
+use std::path::Path;
+
 use image::RgbImage;
 use mesolux::render::ldr;
+use tempfile::TempDir;
 
 use browser::{Browser, SIZE, wait};
 use harness::{Display, device, difference, mesolux, picture, told};
@@ -34,15 +37,25 @@ fn apart(one: &RgbImage, other: &RgbImage) -> f32 {
     errors.iter().sum::<f32>() / errors.len() as f32
 }
 
+/// Runs the program, which must succeed.
+fn run(folder: &Path, args: &[&str]) {
+    let mut command = mesolux(folder, args);
+    let output = command.args(device()).output().expect("the program runs");
+    assert!(output.status.success(), "{}", told(&output));
+}
+
+/// A folder with a bake of the Cornell box, `box.safetensors`.
+fn baked_box() -> TempDir {
+    let folder = tempfile::tempdir().expect("a folder for the test");
+    let bake = ["bake", "cornell-box", "-o", "box.safetensors", "--no-cache"];
+    run(folder.path(), &bake);
+    folder
+}
+
 #[test]
 fn the_page_shows_the_light_and_is_moved_by_the_mouse() {
-    let folder = tempfile::tempdir().expect("a folder for the test");
-    let run = |args: &[&str]| {
-        let mut command = mesolux(folder.path(), args);
-        let output = command.args(device()).output().expect("the program runs");
-        assert!(output.status.success(), "{}", told(&output));
-    };
-    run(&["bake", "cornell-box", "-o", "box.safetensors", "--no-cache"]);
+    let folder = baked_box();
+    let run = |args: &[&str]| run(folder.path(), args);
     run(&[
         "export",
         "box.safetensors",

@@ -5,6 +5,8 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
+use crate::solver::Arriving;
+
 /// Degrees, each in so many azimuths.
 const TILTS: [f64; 4] = [15.0, 30.0, 45.0, 60.0];
 const AZIMUTHS: usize = 16;
@@ -26,4 +28,11 @@ pub(super) fn facets() -> [(DVec3, f64); FACETS] {
 /// Their normals in the axes of the scene, about the third of these.
 pub(super) fn turned(axes: [DVec3; 3]) -> [DVec3; FACETS] {
     facets().map(|(n, _)| n.x * axes[0] + n.y * axes[1] + n.z * axes[2])
+}
+
+/// Adds light to the irradiance of each facet, whose normals are [`turned`].
+pub(super) fn add(sums: &mut [DVec3; FACETS], turned: &[DVec3; FACETS], from: Arriving) {
+    for (sum, facet) in sums.iter_mut().zip(turned) {
+        *sum += from.light * from.way.dot(*facet).max(0.0);
+    }
 }

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::Frame;
-use super::facets::{FACETS, facets, turned};
+use super::facets::{self, FACETS, facets, turned};
 use crate::error::Result;
 use crate::picture::tone::luminance;
 use crate::solver::{Lit, Place};
@@ -34,9 +34,7 @@ pub(super) fn look(
     let facets = facets();
     let start = |i: usize| (turned(frames[i].axes()), [DVec3::ZERO; FACETS]);
     let found = lit.arriving(places, direct, start, |(turned, sums), from| {
-        for (sum, facet) in sums.iter_mut().zip(turned) {
-            *sum += from.light * from.way.dot(*facet).max(0.0);
-        }
+        facets::add(sums, turned, from);
     })?;
     let each = found.into_iter().zip(frames).map(|((_, sums), frame)| {
         let ([x, y, z], axes) = (fit(&facets, &sums), frame.axes());

@@ -4,16 +4,16 @@ use glam::{DVec3, Vec3};
 use nalgebra::DMatrix;
 
 use super::Frame;
-use super::facets::{FACETS, facets, turned};
+use super::facets::{self, FACETS, facets, turned};
 use crate::error::Result;
 use crate::math::directions::Directions;
-use crate::solver::{Lit, Place};
+use crate::solver::{Arriving, Lit, Place};
 
 /// Light by slots: irradiance of a facet that faces the slot's middle.
 ///
 /// Light between the middles of four slots is shared by them. That alone bends light towards the
 /// middles; what it makes of facets tilted by up to 60° is then put right by the smallest change of
-/// the slots.
+/// the slots, which may leave some a little below zero.
 pub(super) struct Fit {
     directions: Directions,
     centres: Vec<DVec3>,
@@ -23,8 +23,9 @@ pub(super) struct Fit {
     back: DMatrix<f64>,
 }
 
-/// Of the largest share of a slot in a facet: differences between facets below this share are left.
-const LEAST: f64 = 1e-3;
+/// Damping of the fit, over the largest square sum of a facet's cosines: without it, slots change
+/// much for little.
+const DAMPING: f64 = 1e-3;
 
 impl Fit {
     pub fn new(directions: Directions) -> Self {
@@ -38,7 +39,7 @@ impl Fit {
         let mut square = &cosines * cosines.transpose();
         let most = square.diagonal().max();
         for facet in 0..FACETS {
-            square[(facet, facet)] += LEAST * most;
+            square[(facet, facet)] += DAMPING * most;
         }
         // Positive definite by what was added.
         let inverse = square.try_inverse();
@@ -64,16 +65,14 @@ impl Fit {
             let slots = vec![DVec3::ZERO; self.centres.len()];
             (axes, turned(axes), slots, [DVec3::ZERO; FACETS])
         };
-        let add = |(axes, facets, slots, sums): &mut (_, [DVec3; FACETS], Vec<_>, [_; FACETS]),
-                   from: crate::solver::Arriving| {
+        let add = |(axes, turned, slots, sums): &mut (_, [DVec3; FACETS], Vec<_>, [_; FACETS]),
+                   from: Arriving| {
             let axes: &[DVec3; 3] = axes;
             let way = DVec3::from_array(axes.map(|axis| axis.dot(from.way)));
             for (slot, weight) in self.directions.bilinear(way) {
                 slots[slot] += from.light * weight;
             }
-            for (sum, facet) in sums.iter_mut().zip(facets) {
-                *sum += from.light * from.way.dot(*facet).max(0.0);
-            }
+            facets::add(sums, turned, from);
         };
         let found = lit.arriving(places, direct, start, add)?;
         let each = found

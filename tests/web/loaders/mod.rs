@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::apart;
 use crate::browser::{Browser, wait};
-use crate::harness::{Display, device, mesolux, picture, told};
+use crate::harness::{Display, picture, told};
 use crate::server::{Server, State};
+use crate::{apart, baked_box, run};
 
 /// Where this file's neighbours are.
 fn sources() -> PathBuf {
@@ -46,13 +46,8 @@ fn issues(packages: &Path, file: &Path) -> String {
 #[ignore = "long: runs by scripts/test --all"]
 fn others_load_the_gltf() {
     let packages = packages();
-    let folder = tempfile::tempdir().expect("a folder for the test");
-    let run = |args: &[&str]| {
-        let mut command = mesolux(folder.path(), args);
-        let output = command.args(device()).output().expect("the program runs");
-        assert!(output.status.success(), "{}", told(&output));
-    };
-    run(&["bake", "cornell-box", "-o", "box.safetensors", "--no-cache"]);
+    let folder = baked_box();
+    let run = |args: &[&str]| run(folder.path(), args);
     run(&[
         "export",
         "box.safetensors",
