@@ -20,7 +20,7 @@ use mesolux::export::light_map::LightMap;
 use mesolux::export::map_files::{MapFile, Part};
 use mesolux::export::probes;
 use mesolux::export::sensors::{self, SensorFile, SensorGrid};
-use mesolux::export::surface::{Surface, Texels};
+use mesolux::export::surface::{Layout, Surface, Texels};
 use mesolux::export::web;
 use mesolux::math::directions;
 use mesolux::scene::Scene;
@@ -54,9 +54,9 @@ pub struct Options {
 #[derive(Args)]
 #[command(next_help_heading = "Light maps")]
 struct MapOptions {
-    /// Write a light map, irradiance in W/m²: .exr (half floats), .hdr, .rgbm.png or .png (sRGB);
-    /// may be given several times. Several pages are OUT-1, OUT-2 and so on
-    #[arg(long, value_name = "OUT.exr|.hdr|.rgbm.png|.png")]
+    /// Write a light map, irradiance in W/m²: .exr (half floats), .hdr, .ktx2 (BC6H), .rgbm.png or
+    /// .png (sRGB); may be given several times. Several pages are OUT-1, OUT-2 and so on
+    #[arg(long, value_name = "OUT.exr|.hdr|.ktx2|.rgbm.png|.png")]
     light_map: Vec<PathBuf>,
     /// Write the scene as binary glTF with its light map (MOZ_lightmap, TEXCOORD_1)
     #[arg(long, value_name = "OUT.glb")]
@@ -183,6 +183,11 @@ impl MapOptions {
                 PAGES.end()
             )));
         }
+        if self.has_blocks() && !self.page.is_multiple_of(4) {
+            let page = self.page;
+            let what = format!("--page {page}: must be a multiple of 4 for .ktx2");
+            return Err(Error::Usage(what));
+        }
         match self.texels_per_unit {
             Some(count) if !(count.is_finite() && count > 0.0) => Err(Error::Usage(format!(
                 "--texels-per-unit {count}: must be a positive number"
@@ -191,14 +196,24 @@ impl MapOptions {
         }
     }
 
-    fn texels(&self) -> Texels {
-        match self.texels_per_unit {
+    fn layout(&self) -> Layout {
+        let texels = match self.texels_per_unit {
             None => Texels::Page(self.page),
             Some(count) => Texels::PerUnit {
                 count,
                 page: self.page,
             },
+        };
+        Layout {
+            texels,
+            whole_blocks: self.has_blocks(),
         }
+    }
+
+    /// Whether a light map is written in blocks.
+    fn has_blocks(&self) -> bool {
+        let is_ktx2 = |path: &PathBuf| MapFile::of(path).is_ok_and(|kind| kind == MapFile::Ktx2);
+        self.light_map.iter().any(is_ktx2)
     }
 
     fn part(&self) -> Part {
@@ -248,7 +263,7 @@ impl MapOptions {
             let kind = MapFile::of(path)?;
             let scale = match kind {
                 MapFile::Rgbm | MapFile::Srgb => format!(", scale {}", map.scale(self.part())),
-                MapFile::Exr | MapFile::Hdr => String::new(),
+                MapFile::Exr | MapFile::Hdr | MapFile::Ktx2 => String::new(),
             };
             for path in written {
                 tracing::info!("{}: light map{scale}", path.display());
@@ -423,7 +438,7 @@ pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
     let lit_scene = LitScene::new(&scene, &bake)?;
     let lit = lit_scene.look();
     if options.maps.is_wanted() {
-        let surface = laid_out(&scene, options.maps.texels())?;
+        let surface = laid_out(&scene, options.maps.layout())?;
         if let Some(encoding) = options.maps.encoding.of()? {
             encoding.basis().check(&surface.pages)?;
         }
@@ -449,10 +464,10 @@ pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
 }
 
 /// The scene's surface, laid out.
-fn laid_out(scene: &Scene, texels: Texels) -> Result<Surface> {
+fn laid_out(scene: &Scene, layout: Layout) -> Result<Surface> {
     catch_interrupts();
     let start = Instant::now();
-    let surface = Surface::new(scene, texels, || !interrupted())?;
+    let surface = Surface::new(scene, layout, || !interrupted())?;
     let pages = surface.pages;
     tracing::info!(
         "{} charts on {} pages of {} x {}, {:.0} % used, {:.4} texels a unit, in {:.1} s",

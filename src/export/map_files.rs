@@ -9,6 +9,7 @@ use image::ImageEncoder;
 use image::codecs::hdr::HdrEncoder;
 use image::codecs::png::PngEncoder;
 
+use super::ktx2;
 use super::light_map::LightMap;
 use super::texels::NOTHING;
 use crate::atomic_file::write_atomically;
@@ -45,10 +46,12 @@ pub enum MapFile {
     Rgbm,
     /// 8-bit sRGB: irradiance is the linear value times `scale`; more is cut off.
     Srgb,
+    /// KTX 2 in BC6H blocks: irradiance, W·m⁻².
+    Ktx2,
 }
 
 impl MapFile {
-    /// By a path's ending: `.exr`, `.hdr`, `.rgbm.png`, `.png`.
+    /// By a path's ending: `.exr`, `.hdr`, `.ktx2`, `.rgbm.png`, `.png`.
     ///
     /// # Errors
     /// Any other ending.
@@ -57,13 +60,14 @@ impl MapFile {
         let kinds = [
             (".exr", Self::Exr),
             (".hdr", Self::Hdr),
+            (".ktx2", Self::Ktx2),
             (".rgbm.png", Self::Rgbm),
             (".png", Self::Srgb),
         ];
         let found = kinds.into_iter().find(|(ending, _)| name.ends_with(ending));
         found.map(|(_, kind)| kind).ok_or_else(|| {
             Error::Usage(format!(
-                "light map {}: the name must end in .exr, .hdr, .rgbm.png or .png",
+                "light map {}: the name must end in .exr, .hdr, .ktx2, .rgbm.png or .png",
                 path.display()
             ))
         })
@@ -198,6 +202,7 @@ impl Page {
         let mut out = Cursor::new(Vec::new());
         let (width, height) = (self.width, self.height);
         match kind {
+            MapFile::Ktx2 => return ktx2::encode(width, height, &self.irradiance),
             MapFile::Exr => {
                 let at = |at: exr::math::Vec2<usize>| {
                     let value = self.irradiance[at.y() * width as usize + at.x()];

@@ -10,6 +10,7 @@ pub mod baked_colours;
 mod borders;
 pub mod directional;
 pub mod glb;
+mod ktx2;
 mod lattice;
 pub mod light_map;
 pub mod map_files;

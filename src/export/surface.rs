@@ -19,6 +19,24 @@ pub enum Texels {
     PerUnit { count: f64, page: u32 },
 }
 
+/// How a surface is laid out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Layout {
+    pub texels: Texels,
+    /// Whether charts share no block of 4 x 4 texels, as compressed files want it. The size of a
+    /// page must be a multiple of 4 then.
+    pub whole_blocks: bool,
+}
+
+impl From<Texels> for Layout {
+    fn from(texels: Texels) -> Self {
+        Self {
+            texels,
+            whole_blocks: false,
+        }
+    }
+}
+
 /// Most texels of all pages.
 const MOST_TEXELS: u64 = 1 << 28;
 
@@ -56,7 +74,15 @@ impl Surface {
     ///
     /// # Errors
     /// Texels that do not fit their pages; stopped.
-    pub fn new(scene: &Scene, texels: Texels, go_on: impl Fn() -> bool + Sync) -> Result<Self> {
+    pub fn new(
+        scene: &Scene,
+        layout: impl Into<Layout>,
+        go_on: impl Fn() -> bool + Sync,
+    ) -> Result<Self> {
+        let Layout {
+            texels,
+            whole_blocks,
+        } = layout.into();
         let scene = scene.uncut();
         let corners = Corners::new(&scene);
         let normals = smooth_normals(&scene, &corners);
@@ -72,6 +98,7 @@ impl Surface {
         };
         let options = uvunwrap::Options {
             padding: PADDING,
+            block_align: whole_blocks,
             density: match texels {
                 Texels::Page(page_size) => Density::Auto { page_size },
                 Texels::PerUnit { count, page } => Density::Fixed {
