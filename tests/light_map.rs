@@ -205,7 +205,7 @@ fn check_layout(surface: &Surface, least_used: f64) {
     assert!(used >= least_used);
 }
 
-/// rms of each colour. Measured:
+/// rms of each colour. Measured: 0.68, 1.02 and 1.04 %.
 const BC6H: f32 = 0.02;
 
 /// rms within charts and on their borders. Measured: 0.15 and 0.49 %; 0.51 and 0.84 %.

@@ -44,6 +44,7 @@ fn triangle(vertices: [u32; 3], uv: [[f32; 2]; 3], material: u32) -> Triangle {
         vertices,
         uv,
         emission_uv: None,
+        light_uv: None,
         material,
     }
 }

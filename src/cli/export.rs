@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::{ArgMatches, Args, ValueEnum};
+use glam::DVec3;
 
 use super::bake::{SolveOptions, writable};
 use super::bake_scene::BakeScene;
@@ -18,9 +19,10 @@ use mesolux::export::directional::{Basis, Directional};
 use mesolux::export::glb::{self, Shown};
 use mesolux::export::light_map::LightMap;
 use mesolux::export::map_files::{MapFile, Part};
-use mesolux::export::probes;
+use mesolux::export::probes::{self, Grid, ProbeFile, Probes};
 use mesolux::export::sensors::{self, SensorFile, SensorGrid};
 use mesolux::export::surface::{Layout, Surface, Texels};
+use mesolux::export::vertex_light::VertexLight;
 use mesolux::export::web;
 use mesolux::math::directions;
 use mesolux::scene::Scene;
@@ -65,6 +67,10 @@ struct MapOptions {
     /// which every viewer shows alike
     #[arg(long, value_name = "OUT.glb")]
     unlit_glb: Option<PathBuf>,
+    /// Write the elements of the bake as binary glTF with their light as colours of the vertices
+    /// (COLOR_0, KHR_materials_unlit) and as irradiance in W/m² (_IRRADIANCE), without any map
+    #[arg(long, value_name = "OUT.glb")]
+    vertex_glb: Option<PathBuf>,
     /// Write a folder with a page that shows the scene with its light in a browser, for any static
     /// server; it needs nothing from elsewhere
     #[arg(long, value_name = "DIR")]
@@ -161,7 +167,10 @@ impl MapOptions {
             let what = "--encoding is of a --light-map, and none is asked for";
             return Err(Error::Usage(what.into()));
         }
-        for path in [&self.glb, &self.unlit_glb].into_iter().flatten() {
+        for path in [&self.glb, &self.unlit_glb, &self.vertex_glb]
+            .into_iter()
+            .flatten()
+        {
             if !path
                 .extension()
                 .is_some_and(|e| e.eq_ignore_ascii_case("glb"))
@@ -222,6 +231,33 @@ impl MapOptions {
             Light::Direct => Part::Direct,
             Light::Indirect => Part::Indirect,
         }
+    }
+
+    /// The elements with their light at vertices.
+    fn write_vertices(&self, path: &Path, scene: &Scene, lit: &Lit<'_>) -> Result<()> {
+        catch_interrupts();
+        let bar = Bar::new();
+        let start = Instant::now();
+        let go_on = |looked_at: usize| {
+            bar.show(format!("light at vertices: {looked_at} places"));
+            !interrupted()
+        };
+        let light = VertexLight::new(scene, lit, &go_on);
+        bar.finish();
+        let light = light?;
+        tracing::info!(
+            "{} vertices, light found at {} places in {:.1} s",
+            light.light.len(),
+            light.looked_at,
+            start.elapsed().as_secs_f64()
+        );
+        let colours = baked_colours::corners(&light, self.part(), self.exposure);
+        for what in glb::write(path, &light.surface, Shown::Vertices(&colours))? {
+            tracing::warn!("{what}");
+        }
+        let (path, ev) = (path.display(), colours.exposure);
+        tracing::info!("{path}: colours of vertices, exposure {ev}");
+        Ok(())
     }
 
     /// The scene with its light as glTF.
@@ -313,12 +349,22 @@ fn grid(text: &str) -> std::result::Result<SensorGrid, String> {
 #[derive(Args)]
 #[command(next_help_heading = "Probes")]
 struct ProbeOptions {
-    /// Write light at probes: irradiance in spherical harmonics of the second degree
-    #[arg(long, value_name = "OUT.json")]
-    probes: Option<PathBuf>,
+    /// Write light at probes: irradiance in spherical harmonics of the second degree, and distances
+    /// by direction, by which light between probes does not come through walls; may be given
+    /// several times
+    #[arg(long, value_name = "OUT.json|.safetensors")]
+    probes: Vec<PathBuf>,
     /// Probes along x, y and z in the box about the scene
     #[arg(long, value_name = "NXxNYxNZ", default_value = "8x4x8", value_parser = counts)]
     probe_grid: [u32; 3],
+    /// Probes at the points of a file instead, `x y z` a line
+    #[arg(
+        long,
+        value_name = "POINTS",
+        requires = "probes",
+        conflicts_with = "probe_grid"
+    )]
+    probe_points: Option<PathBuf>,
 }
 
 /// Most probes of a grid.
@@ -341,36 +387,53 @@ fn counts(text: &str) -> std::result::Result<[u32; 3], String> {
 
 impl ProbeOptions {
     fn check(&self) -> Result<()> {
-        match &self.probes {
-            Some(path)
-                if !path
-                    .extension()
-                    .is_some_and(|e| e.eq_ignore_ascii_case("json")) =>
-            {
-                let what = format!("{}: the name must end in .json", path.display());
-                Err(Error::Usage(what))
+        for path in &self.probes {
+            ProbeFile::of(path)?;
+            writable(path)?;
+        }
+        Ok(())
+    }
+
+    /// The grid, and the places of the probes; none where none are asked for.
+    fn positions(&self, scene: &Scene) -> Result<(Option<Grid>, Vec<DVec3>)> {
+        match &self.probe_points {
+            _ if self.probes.is_empty() => Ok((None, Vec::new())),
+            Some(path) => Ok((None, probes::read_positions(path)?)),
+            None => {
+                let grid = Grid::about(scene, self.probe_grid);
+                Ok((Some(grid), grid.positions()))
             }
-            Some(path) => writable(path),
-            None => Ok(()),
         }
     }
 
-    fn write(&self, path: &Path, scene: &Scene, lit: &Lit<'_>) -> Result<()> {
-        let positions = probes::grid(scene, self.probe_grid);
-        let around = probes::places(&positions);
-        let light = at_places(lit, &around)?;
-        if light.len() < around.len() {
-            let what = format!("{}: stopped by Ctrl-C, and not written", path.display());
-            return Err(Error::Usage(what));
+    fn write(
+        &self,
+        scene: &Scene,
+        lit: &Lit<'_>,
+        grid: Option<Grid>,
+        positions: &[DVec3],
+    ) -> Result<()> {
+        catch_interrupts();
+        let bar = Bar::new();
+        let go_on = |found: usize| {
+            bar.show(format!("light at {found} of {} probes", positions.len()));
+            !interrupted()
+        };
+        let found = Probes::new(scene, lit, grid, positions, &go_on)?;
+        bar.finish();
+        let Some(found) = found else {
+            let what = "probes: stopped by Ctrl-C, and not written";
+            return Err(Error::Usage(what.into()));
+        };
+        let inside = found.list.iter().filter(|probe| !probe.valid).count();
+        for path in &self.probes {
+            found.write(path)?;
+            tracing::info!(
+                "{}: {} probes, {inside} of them within solids",
+                path.display(),
+                found.list.len()
+            );
         }
-        let found = probes::probes(&positions, &light, &lit.backs(&around)?);
-        probes::write(path, self.probe_grid, &found)?;
-        let inside = found.iter().filter(|probe| !probe.valid).count();
-        tracing::info!(
-            "{}: {} probes, {inside} of them within solids",
-            path.display(),
-            found.len()
-        );
         Ok(())
     }
 }
@@ -414,10 +477,11 @@ pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
     options.sensors.check()?;
     options.maps.check()?;
     options.probes.check()?;
-    let probes = options.probes.probes.as_deref();
-    if options.sensors.values.is_none() && !options.maps.is_wanted() && probes.is_none() {
-        let what = "nothing to write: give --light-map, --glb, --web, --probes, or --values with \
-                    --sensors";
+    let maps = &options.maps;
+    let is_wanted = maps.is_wanted() || maps.vertex_glb.is_some();
+    if options.sensors.values.is_none() && !is_wanted && options.probes.probes.is_empty() {
+        let what = "nothing to write: give --light-map, --glb, --vertex-glb, --web, --probes, or \
+                    --values with --sensors";
         return Err(Error::Usage(what.into()));
     }
     let wanted = Wanted {
@@ -429,6 +493,7 @@ pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
     wanted.check(given)?;
     let opened = wanted.open()?;
     let places = options.sensors.places(&opened.scene)?;
+    let (grid, positions) = options.probes.positions(&opened.scene)?;
     let device = options.device.open()?;
     let (scene, bake) = opened.baked(&device)?;
     if bake.by_paper {
@@ -437,6 +502,9 @@ pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
     }
     let lit_scene = LitScene::new(&scene, &bake)?;
     let lit = lit_scene.look();
+    if let Some(path) = &options.maps.vertex_glb {
+        options.maps.write_vertices(path, &scene, &lit)?;
+    }
     if options.maps.is_wanted() {
         let surface = laid_out(&scene, options.maps.layout())?;
         if let Some(encoding) = options.maps.encoding.of()? {
@@ -447,8 +515,8 @@ pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
         options.maps.write_glb(&surface, &map)?;
         options.maps.write(&surface, &map, &lit)?;
     }
-    if let Some(path) = probes {
-        options.probes.write(path, &scene, &lit)?;
+    if !positions.is_empty() {
+        options.probes.write(&scene, &lit, grid, &positions)?;
     }
     if let Some(path) = &options.sensors.values {
         let light = at_places(&lit, &places)?;
@@ -468,6 +536,9 @@ fn laid_out(scene: &Scene, layout: Layout) -> Result<Surface> {
     catch_interrupts();
     let start = Instant::now();
     let surface = Surface::new(scene, layout, || !interrupted())?;
+    for what in &surface.said {
+        tracing::warn!("{what}");
+    }
     let pages = surface.pages;
     tracing::info!(
         "{} charts on {} pages of {} x {}, {:.0} % used, {:.4} texels a unit, in {:.1} s",

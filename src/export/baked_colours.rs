@@ -11,8 +11,10 @@ use super::light_map::LightMap;
 use super::map_files::Part;
 use super::surface::Surface;
 use super::texels::quarters;
+use super::vertex_light::VertexLight;
 use crate::error::{Error, Result};
-use crate::picture::Picture;
+use crate::picture::tone::{luminance, neutral};
+use crate::picture::{Picture, exposure_by_area};
 
 /// Pages as PNG, exposed and tone-mapped as pictures are, and the exposure that was used: without
 /// one, the brightest tenth of the texels that do not emit is brought to 0.6 and more.
@@ -86,4 +88,66 @@ pub fn pages(
         Ok(png.into_inner())
     });
     Ok((pages.collect::<Result<_>>()?, exposure))
+}
+
+/// Colours of the corners of a scene's triangles, `[triangle][corner]`.
+pub struct CornerColours {
+    /// Linear RGB in 0..=1, exposed and tone-mapped: of a material without a texture of its
+    /// reflectance light and reflectance together; of others what makes the mean of the texture so.
+    pub colours: Vec<[[f32; 3]; 3]>,
+    /// Irradiance, W·m⁻², RGB.
+    pub irradiance: Vec<[[f32; 3]; 3]>,
+    /// Powers of two.
+    pub exposure: f32,
+}
+
+/// Light at vertices as colours; the exposure is found as for [`pages`].
+pub fn corners(light: &VertexLight, part: Part, exposure: Option<f32>) -> CornerColours {
+    let scene = &light.surface.scene;
+    let irradiance: Vec<[Vec3; 3]> = (light.corners.iter())
+        .map(|corners| corners.map(|at| part.of(&light.light[at as usize])))
+        .collect();
+    let reflectance: Vec<Vec3> = (scene.materials.iter())
+        .map(|material| Vec3::from(material.mean_reflectance()))
+        .collect();
+    let reflected = |t: usize, light: Vec3| {
+        reflectance[scene.triangles[t].material as usize] * light / std::f32::consts::PI
+    };
+    let exposure = exposure.unwrap_or_else(|| {
+        let dark = (irradiance.iter().enumerate()).filter_map(|(t, [a, b, c])| {
+            let triangle = &scene.triangles[t];
+            let [p, q, r] = scene.corners(triangle);
+            let mean = reflected(t, (a + b + c) / 3.0).to_array();
+            let area = 0.5 * (q - p).cross(r - p).length();
+            let emits = scene.materials[triangle.material as usize].emits();
+            (!emits).then(|| (luminance(mean), area))
+        });
+        exposure_by_area(dark)
+    });
+    let colour = |t: usize, k: usize| -> [f32; 3] {
+        let triangle = &scene.triangles[t];
+        let material = &scene.materials[triangle.material as usize];
+        let mut radiance = reflected(t, irradiance[t][k]);
+        if part != Part::Indirect && material.emits() {
+            let [u, v] = triangle.uv_of_emission()[k];
+            let map = material.map_ke.as_ref();
+            let glow = map.map_or([1.0; 3], |map| map.sample_bilinear(u, v));
+            radiance += Vec3::from(material.ke) * Vec3::from(glow);
+        }
+        let shown = Vec3::from(neutral((radiance * exposure.exp2()).to_array()));
+        let shown = match material.map_kd {
+            // The texture multiplies it.
+            Some(_) => shown / reflectance[triangle.material as usize].max(Vec3::splat(1e-6)),
+            None => shown,
+        };
+        shown.clamp(Vec3::ZERO, Vec3::ONE).to_array()
+    };
+    let each = 0..irradiance.len();
+    CornerColours {
+        colours: each.map(|t| [0, 1, 2].map(|k| colour(t, k))).collect(),
+        irradiance: (irradiance.iter())
+            .map(|of| of.map(|light| light.to_array()))
+            .collect(),
+        exposure,
+    }
 }

@@ -9,6 +9,7 @@ use std::path::Path;
 use glam::{DMat3, DQuat, DVec3};
 use serde_json::{Value, json};
 
+use super::baked_colours::CornerColours;
 use super::light_map::LightMap;
 use super::map_files::{MapFile, Part};
 use super::surface::Surface;
@@ -29,7 +30,13 @@ pub enum Shown<'a> {
     /// By colours that hold light and reflectance together, extension `KHR_materials_unlit`, one
     /// PNG a page.
     Baked(&'a [Vec<u8>]),
+    /// By colours of the vertices, `COLOR_0`, extension `KHR_materials_unlit`; the surface is that
+    /// of a [`VertexLight`](super::vertex_light::VertexLight).
+    Vertices(&'a CornerColours),
 }
+
+/// The extension of materials that show their colours as they are.
+const UNLIT: &str = "KHR_materials_unlit";
 
 /// Name of the extras of a material that hold what glTF cannot.
 pub const EXTRAS: &str = "mesolux";
@@ -37,7 +44,8 @@ pub const EXTRAS: &str = "mesolux";
 /// Writes a scene; returns what of it glTF cannot hold, one sentence each.
 ///
 /// Triangles keep their order, but for those of a mesh with many materials. Light maps hold
-/// irradiance in 8-bit sRGB times the extension's `intensity`; `TEXCOORD_1` says where. A height
+/// irradiance in 8-bit sRGB times the extension's `intensity`; `TEXCOORD_1` says where. Vertices have
+/// their irradiance, W·m⁻², as `_IRRADIANCE` beside their colours. A height
 /// map is in the extras of its material: `mesolux.heightTexture` and `mesolux.heightScale`.
 ///
 /// # Errors
@@ -71,7 +79,11 @@ pub fn encode(surface: &Surface, shown: Shown<'_>) -> Result<(Vec<u8>, Vec<Strin
         }
         written
     };
-    primitives::add(&mut document, surface, place);
+    let colours = match shown {
+        Shown::Vertices(colours) => Some(colours),
+        _ => None,
+    };
+    primitives::add(&mut document, surface, colours, place);
     lights(&mut document, &scene.lights, &mut said);
     for camera in &scene.cameras {
         add_camera(&mut document, camera);
@@ -79,7 +91,7 @@ pub fn encode(surface: &Surface, shown: Shown<'_>) -> Result<(Vec<u8>, Vec<Strin
     let extensions = match shown {
         Shown::Unlit => None,
         Shown::LightMap(..) => Some("MOZ_lightmap"),
-        Shown::Baked(_) => Some("KHR_materials_unlit"),
+        Shown::Baked(_) | Shown::Vertices(_) => Some(UNLIT),
     };
     document.extensions.extend(extensions);
     let bytes = document.into_bytes(&scene.name).map_err(|e| Error::Scene {
@@ -92,7 +104,7 @@ pub fn encode(surface: &Surface, shown: Shown<'_>) -> Result<(Vec<u8>, Vec<Strin
 /// A texture of each page of light.
 fn light_textures(document: &mut Document, shown: Shown<'_>) -> Result<Vec<Value>> {
     let pages: Vec<Vec<u8>> = match shown {
-        Shown::Unlit => Vec::new(),
+        Shown::Unlit | Shown::Vertices(_) => Vec::new(),
         Shown::Baked(pages) => pages.to_vec(),
         Shown::LightMap(map, part) => (0..map.pages.count)
             .map(|page| {
@@ -163,17 +175,13 @@ fn written(
 
 /// Adds its light to a material.
 fn show(material: &mut Value, shown: Shown<'_>, texture: Option<&Value>) {
-    let Some(texture) = texture else {
-        return;
-    };
-    match shown {
-        Shown::Unlit => {}
-        Shown::LightMap(map, part) => {
+    match (shown, texture) {
+        (Shown::LightMap(map, part), Some(texture)) => {
             let mut light = texture.clone();
             light["intensity"] = json!(map.scale(part));
             material["extensions"]["MOZ_lightmap"] = light;
         }
-        Shown::Baked(_) => {
+        (Shown::Baked(_), Some(texture)) => {
             *material = json!({
                 "name": material["name"],
                 "pbrMetallicRoughness": {
@@ -181,9 +189,23 @@ fn show(material: &mut Value, shown: Shown<'_>, texture: Option<&Value>) {
                     "metallicFactor": 0.0,
                     "roughnessFactor": 1.0,
                 },
-                "extensions": { "KHR_materials_unlit": {} },
+                "extensions": { (UNLIT): {} },
             });
         }
+        (Shown::Vertices(_), _) => {
+            let mut surface = json!({ "metallicFactor": 0.0, "roughnessFactor": 1.0 });
+            let written = &material["pbrMetallicRoughness"];
+            if let Some(texture) = written.get("baseColorTexture") {
+                surface["baseColorTexture"] = texture.clone();
+                surface["baseColorFactor"] = written["baseColorFactor"].clone();
+            }
+            *material = json!({
+                "name": material["name"],
+                "pbrMetallicRoughness": surface,
+                "extensions": { (UNLIT): {} },
+            });
+        }
+        _ => {}
     }
 }
 

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use glam::{DVec3, Vec3};
 
+use super::text_points::{Row, read_rows};
 use crate::atomic_file::write_atomically;
 use crate::error::{Error, Result};
 use crate::scene::Scene;
@@ -55,32 +56,17 @@ impl SensorFile {
 /// A file that cannot be read or has no point; a line that is not six finite numbers; a normal of
 /// no length.
 pub fn read_points(path: &Path) -> Result<Vec<Place>> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
-    let mut places = Vec::new();
-    for (number, line) in (1..).zip(text.lines()) {
-        let line = line.trim();
-        if line.is_empty() || line.starts_with('#') {
-            continue;
-        }
-        let wrong = |what: &str| Error::line(path, number, format!("\"{line}\" {what}"));
-        let words = line.split(|c: char| c.is_whitespace() || c == ',');
-        let numbers: Vec<f64> = (words.filter(|word| !word.is_empty()))
-            .map(|word| word.parse().ok().filter(|n: &f64| n.is_finite()))
-            .collect::<Option<_>>()
-            .ok_or_else(|| wrong("is not all finite numbers"))?;
-        let &[x, y, z, nx, ny, nz] = numbers.as_slice() else {
-            return Err(wrong("is not six numbers: x y z nx ny nz"));
+    let place = |row: Row<'_>| {
+        let &[x, y, z, nx, ny, nz] = row.numbers else {
+            return Err(row.wrong("is not six numbers: x y z nx ny nz"));
         };
         let normal = DVec3::new(nx, ny, nz).try_normalize();
-        places.push(Place {
+        Ok(Place {
             position: DVec3::new(x, y, z),
-            normal: normal.ok_or_else(|| wrong("has a normal of no length"))?,
-        });
-    }
-    match places.is_empty() {
-        false => Ok(places),
-        true => Err(Error::file(path, "has no point: a line is x y z nx ny nz")),
-    }
+            normal: normal.ok_or_else(|| row.wrong("has a normal of no length"))?,
+        })
+    };
+    read_rows(path, "x y z nx ny nz", place)
 }
 
 /// A grid of sensors on the surfaces of one name.

@@ -1,11 +1,10 @@
 //! The surfaces of a scene as it was read, laid out for light maps.
 
-use std::collections::HashMap;
-
 use glam::{DVec2, DVec3};
-use uvunwrap::{Density, MeshInput, generate_with_progress};
 
-use crate::error::{Error, Result};
+pub use super::charts::PADDING;
+use super::charts::{self, Charts};
+use crate::error::Result;
 use crate::mesh::corners::Corners;
 use crate::scene::Scene;
 use crate::solver::Place;
@@ -37,12 +36,6 @@ impl From<Texels> for Layout {
     }
 }
 
-/// Most texels of all pages.
-const MOST_TEXELS: u64 = 1 << 28;
-
-/// Texels between the border of a chart and that of its page; twice as many between charts.
-pub const PADDING: u32 = 2;
-
 /// The triangles of a scene, `[triangle][corner]`, each in a chart of a light map.
 pub struct Surface {
     pub scene: Scene,
@@ -55,6 +48,8 @@ pub struct Surface {
     /// `[triangle]`, of all pages.
     pub chart: Vec<u32>,
     pub pages: Pages,
+    /// Why charts that the meshes brought are not as they were, one sentence each.
+    pub said: Vec<String>,
 }
 
 /// The pages of a light map.
@@ -70,7 +65,10 @@ pub struct Pages {
 }
 
 impl Surface {
-    /// Lays out the scene that `scene` was cut from. `go_on` returning false stops.
+    /// Lays out the scene that `scene` was cut from: where [`Triangle::light_uv`] says, if that gives
+    /// each triangle a place of its own. `go_on` returning false stops.
+    ///
+    /// [`Triangle::light_uv`]: crate::scene::Triangle::light_uv
     ///
     /// # Errors
     /// Texels that do not fit their pages; stopped.
@@ -79,81 +77,45 @@ impl Surface {
         layout: impl Into<Layout>,
         go_on: impl Fn() -> bool + Sync,
     ) -> Result<Self> {
-        let Layout {
-            texels,
-            whole_blocks,
-        } = layout.into();
         let scene = scene.uncut();
-        let corners = Corners::new(&scene);
-        let normals = smooth_normals(&scene, &corners);
-        let seams = creases(&scene, &normals);
-        let (origin, unit) = scene.local_frame();
-        let positions: Vec<[f32; 3]> = (scene.vertices.iter())
-            .map(|&v| ((v - origin) / unit).as_vec3().to_array())
-            .collect();
-        let indices: Vec<u32> = scene.triangles.iter().flat_map(|t| t.vertices).collect();
-        let mesh = MeshInput {
-            seams: Some(&seams),
-            ..MeshInput::new(&positions, &indices)
-        };
-        let options = uvunwrap::Options {
-            padding: PADDING,
-            block_align: whole_blocks,
-            density: match texels {
-                Texels::Page(page_size) => Density::Auto { page_size },
-                Texels::PerUnit { count, page } => Density::Fixed {
-                    texels_per_unit: (count * unit) as f32,
-                    page_size: Some(page),
-                },
-            },
-            ..uvunwrap::Options::default()
-        };
-        let unwrapped = generate_with_progress(&[mesh], &options, |_| go_on());
-        let atlas = unwrapped.map_err(|e| Error::Scene {
-            scene: scene.name.clone(),
-            what: format!("no light map can be laid out: {e}"),
-        })?;
-        let texels_in_all = u64::from(atlas.page_count) * u64::from(atlas.width).pow(2);
-        if texels_in_all > MOST_TEXELS {
-            return Err(Error::Scene {
-                scene: scene.name.clone(),
-                what: format!(
-                    "a light map of {} pages of {}² has more than {MOST_TEXELS} texels",
-                    atlas.page_count, atlas.width
-                ),
-            });
-        }
-        // One page is cropped to its charts: engines want all of it.
-        let height = match texels {
-            Texels::Page(size) => size.max(atlas.height),
-            Texels::PerUnit { .. } => atlas.height,
-        };
-        let whole = DVec2::new(1.0, f64::from(atlas.height) / f64::from(height));
-        let pages = Pages {
-            count: atlas.page_count,
-            width: atlas.width,
-            height,
-            texels_per_unit: f64::from(atlas.texels_per_unit) / unit,
-            charts: atlas.chart_count,
-            used: f64::from(atlas.utilization) * whole.y,
-        };
-        let laid = &atlas.meshes[0];
-        let of = |t: usize| [0, 1, 2].map(|k| &laid.vertices[laid.indices[3 * t + k] as usize]);
-        let uv = (0..scene.triangles.len())
-            .map(|t| of(t).map(|v| whole * DVec2::new(f64::from(v.uv[0]), f64::from(v.uv[1]))));
-        let page = (0..scene.triangles.len()).map(|t| {
-            let [a, b, c] = of(t).map(|v| v.page.zip(v.chart));
-            a.filter(|_| a == b && b == c).map(|(page, _)| page)
-        });
-        let chart = (0..scene.triangles.len()).map(|t| of(t)[0].chart.unwrap_or(u32::MAX));
-        Ok(Self {
-            chart: chart.collect(),
-            uv: uv.collect(),
-            page: page.collect(),
-            normals,
+        let normals = smooth_normals(&scene, &Corners::new(&scene));
+        let Charts {
+            uv,
+            page,
+            chart,
             pages,
+            said,
+        } = charts::lay_out(&scene, &normals, layout.into(), go_on)?;
+        Ok(Self {
             scene,
+            normals,
+            uv,
+            page,
+            chart,
+            pages,
+            said,
         })
+    }
+
+    /// A scene as it is: no triangle of it lies on a page.
+    pub(super) fn without_charts(scene: Scene) -> Self {
+        let count = scene.triangles.len();
+        Self {
+            normals: smooth_normals(&scene, &Corners::new(&scene)),
+            uv: vec![[DVec2::ZERO; 3]; count],
+            page: vec![None; count],
+            chart: vec![u32::MAX; count],
+            pages: Pages {
+                count: 0,
+                width: 0,
+                height: 0,
+                texels_per_unit: 0.0,
+                charts: 0,
+                used: 0.0,
+            },
+            said: Vec::new(),
+            scene,
+        }
     }
 
     /// A place by its barycentric coordinates in a triangle: of a surface that its normals curve
@@ -201,24 +163,4 @@ fn smooth_normals(scene: &Scene, corners: &Corners) -> Vec<[DVec3; 3]> {
             })
         })
         .collect()
-}
-
-/// Edges across which the normals differ: `[triangle][edge]`, from each corner to the next.
-fn creases(scene: &Scene, normals: &[[DVec3; 3]]) -> Vec<[bool; 3]> {
-    const ALIKE: f64 = 1.0 - 1e-9;
-    let mut first: HashMap<[u32; 2], [DVec3; 2]> = HashMap::new();
-    let mut creases = vec![[false; 3]; scene.triangles.len()];
-    for (t, triangle) in scene.triangles.iter().enumerate() {
-        for k in 0..3 {
-            let next = (k + 1) % 3;
-            let [a, b] = [triangle.vertices[k], triangle.vertices[next]];
-            let ends = match a < b {
-                true => [normals[t][k], normals[t][next]],
-                false => [normals[t][next], normals[t][k]],
-            };
-            let known = first.entry([a.min(b), a.max(b)]).or_insert(ends);
-            creases[t][k] = (0..2).any(|i| known[i].dot(ends[i]) < ALIKE);
-        }
-    }
-    creases
 }

@@ -37,7 +37,7 @@ pub struct TexelMap {
 const INSET: f64 = 0.05;
 
 /// Interpolation at a place reads texels whose middles are less than one texel off each way.
-const REACH: f64 = std::f64::consts::SQRT_2;
+pub(super) const REACH: f64 = std::f64::consts::SQRT_2;
 
 impl TexelMap {
     pub fn new(surface: &Surface) -> Self {
@@ -60,44 +60,33 @@ impl TexelMap {
     /// Adds what a triangle covers; a texel between two belongs to the one that is nearer.
     fn cover(&mut self, surface: &Surface, t: usize, page: u32) {
         let corners = [0, 1, 2].map(|k| surface.texel(t, k));
-        let low = corners.iter().fold(DVec2::INFINITY, |low, &c| low.min(c));
-        let high = corners
-            .iter()
-            .fold(DVec2::NEG_INFINITY, |high, &c| high.max(c));
-        let range = |low: f64, high: f64, most: u32| {
-            let first = (low - REACH - 0.5).ceil().max(0.0) as u32;
-            let last = (high + REACH - 0.5).floor().min(f64::from(most) - 1.0);
-            first..=last.max(0.0) as u32
-        };
-        for y in range(low.y, high.y, self.height) {
-            for x in range(low.x, high.x, self.width) {
-                let middle = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
-                let (weights, distance) = nearest(corners, middle);
-                if distance >= REACH {
-                    continue;
+        for [x, y] in texels_about(corners, self.width, self.height) {
+            let middle = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+            let (weights, distance) = nearest(corners, middle);
+            if distance >= REACH {
+                continue;
+            }
+            let weights = match distance > 0.0 {
+                true => inset(corners, weights),
+                false => weights,
+            };
+            let texel = Texel {
+                at: [x, y],
+                page,
+                triangle: t as u32,
+                weights,
+                distance,
+            };
+            let slot = self.slot(page, x, y);
+            match self.index[slot] {
+                NOTHING => {
+                    self.index[slot] = self.texels.len() as u32;
+                    self.texels.push(texel);
                 }
-                let weights = match distance > 0.0 {
-                    true => inset(corners, weights),
-                    false => weights,
-                };
-                let texel = Texel {
-                    at: [x, y],
-                    page,
-                    triangle: t as u32,
-                    weights,
-                    distance,
-                };
-                let slot = self.slot(page, x, y);
-                match self.index[slot] {
-                    NOTHING => {
-                        self.index[slot] = self.texels.len() as u32;
-                        self.texels.push(texel);
-                    }
-                    known => {
-                        let known = &mut self.texels[known as usize];
-                        if distance < known.distance {
-                            *known = texel;
-                        }
+                known => {
+                    let known = &mut self.texels[known as usize];
+                    if distance < known.distance {
+                        *known = texel;
                     }
                 }
             }
@@ -134,8 +123,25 @@ impl TexelMap {
     }
 }
 
+/// Columns and rows of the texels that interpolation over a triangle may read, and more.
+pub(super) fn texels_about(
+    corners: [DVec2; 3],
+    width: u32,
+    height: u32,
+) -> impl Iterator<Item = [u32; 2]> {
+    let [a, b, c] = corners;
+    let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+    let range = |low: f64, high: f64, most: u32| {
+        let first = (low - REACH - 0.5).ceil().max(0.0) as u32;
+        let last = (high + REACH - 0.5).floor().min(f64::from(most) - 1.0);
+        first..=last.max(0.0) as u32
+    };
+    let columns = range(low.x, high.x, width);
+    range(low.y, high.y, height).flat_map(move |y| columns.clone().map(move |x| [x, y]))
+}
+
 /// The place of a triangle nearest to a point, as barycentric coordinates, and its distance.
-fn nearest([a, b, c]: [DVec2; 3], p: DVec2) -> ([f64; 3], f64) {
+pub(super) fn nearest([a, b, c]: [DVec2; 3], p: DVec2) -> ([f64; 3], f64) {
     let cross = |u: DVec2, v: DVec2| u.perp_dot(v);
     let area = cross(b - a, c - a);
     if area.abs() > 0.0 {

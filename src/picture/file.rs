@@ -54,6 +54,24 @@ pub(crate) fn automatic_exposure(metered: &mut [f32]) -> f32 {
     }
 }
 
+/// Share of a surface that is darker than what the exposure is for.
+const METERED_SHARE: f64 = 0.9;
+
+/// The exposure, as a power of two, for surfaces of these luminances and areas: as for the pixels of
+/// a picture that shows each by its area.
+pub(crate) fn exposure_by_area(surfaces: impl Iterator<Item = (f32, f64)>) -> f32 {
+    // What no light reaches, backs of walls most of all, is not exposed for.
+    let mut lit: Vec<_> = surfaces.filter(|(luminance, _)| *luminance > 0.0).collect();
+    lit.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let whole: f64 = lit.iter().map(|l| l.1).sum();
+    let mut below = 0.0;
+    let bright = lit.iter().find(|(_, area)| {
+        below += area;
+        below >= METERED_SHARE * whole
+    });
+    bright.map_or(0.0, |(luminance, _)| (METER_TARGET / luminance).log2())
+}
+
 /// A kind of picture file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FileKind {

@@ -7,7 +7,7 @@ pub mod tone;
 use rayon::prelude::*;
 
 pub use file::{FileKind, Picture, SAMPLES};
-pub(crate) use file::{Samples, automatic_exposure, mean, write_png};
+pub(crate) use file::{Samples, automatic_exposure, exposure_by_area, mean, write_png};
 pub(crate) use projection::{NEAR, Projection, Tile};
 
 use crate::error::{Error, Result};

@@ -57,6 +57,7 @@ impl Mesh {
                     corners,
                     uv: None,
                     emission_uv: None,
+                    light_uv: None,
                     material: 0,
                 })
                 .collect(),
@@ -72,6 +73,8 @@ pub(super) struct MeshTriangle {
     pub uv: Option<[[f32; 2]; 3]>,
     /// As [`Triangle::emission_uv`].
     pub emission_uv: Option<[[f32; 2]; 3]>,
+    /// As [`Triangle::light_uv`].
+    pub light_uv: Option<[[f32; 2]; 3]>,
     /// Index into [`Mesh::materials`].
     pub material: u32,
 }
@@ -183,6 +186,7 @@ impl Assembly {
                 vertices,
                 uv,
                 emission_uv: triangle.emission_uv,
+                light_uv: triangle.light_uv,
                 material: materials[triangle.material as usize],
             });
             let name = names.get(part).unwrap_or(&self.scene.name);
@@ -278,7 +282,11 @@ impl Assembly {
     /// Adds the back of a triangle, to its mesh.
     fn add_back(&mut self, t: usize) {
         let scene = &mut self.scene;
-        let back = sides::turned(&scene.triangles[t]);
+        // Light maps have no room for both sides in one place.
+        let back = Triangle {
+            light_uv: None,
+            ..sides::turned(&scene.triangles[t])
+        };
         if self.known.insert(least_first(back.vertices)) {
             scene.triangles.push(back);
             let name = meshes::name(&scene.meshes, t as u32).unwrap_or(&scene.name);

@@ -285,6 +285,7 @@ impl Refined {
                 vertices: piece.vertices,
                 uv: floats(piece.uv),
                 emission_uv: piece.emission_uv.map(floats),
+                light_uv: None,
                 material: piece.material,
             });
         }

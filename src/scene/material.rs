@@ -140,6 +140,14 @@ impl Material {
         }
     }
 
+    /// Reflectance in the mean over the texture, RGB.
+    pub fn mean_reflectance(&self) -> [f32; 3] {
+        match &self.map_kd {
+            None => self.kd,
+            Some(map) => product(self.kd, map.mean()),
+        }
+    }
+
     /// Whether it emits light.
     pub fn emits(&self) -> bool {
         self.ke.iter().any(|&c| c > 0.0)

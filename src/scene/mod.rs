@@ -144,7 +144,7 @@ impl Scene {
 }
 
 /// One triangle, counter-clockwise seen from its front, the side that sends and receives light.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Triangle {
     /// Indices into [`Scene::vertices`].
     pub vertices: [u32; 3],
@@ -152,6 +152,8 @@ pub struct Triangle {
     pub uv: [[f32; 2]; 3],
     /// The same of the emission texture, where that lies elsewhere than the others.
     pub emission_uv: Option<[[f32; 2]; 3]>,
+    /// Place in a light map per corner, v up, where the file gives one: `TEXCOORD_1` of glTF.
+    pub light_uv: Option<[[f32; 2]; 3]>,
     /// Index into [`Scene::materials`].
     pub material: u32,
 }

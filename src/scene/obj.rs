@@ -180,6 +180,7 @@ fn faces(path: &Path, checked: &Checked, mesh: &mut Mesh) -> Result<()> {
                 corners: corners.map(|v| first + v),
                 uv,
                 emission_uv: None,
+                light_uv: None,
                 material,
             });
         }

@@ -79,7 +79,11 @@ impl Placement {
         if (self.0.matrix3.determinant() < 0.0) != reverse {
             for triangle in &mut mesh.triangles {
                 triangle.corners.swap(1, 2);
-                let uv = [&mut triangle.uv, &mut triangle.emission_uv];
+                let uv = [
+                    &mut triangle.uv,
+                    &mut triangle.emission_uv,
+                    &mut triangle.light_uv,
+                ];
                 uv.into_iter().flatten().for_each(|uv| uv.swap(1, 2));
             }
         }

@@ -47,6 +47,7 @@ impl Shapes {
             vertices: corners,
             uv: [[0.0; 2]; 3],
             emission_uv: None,
+            light_uv: None,
             material,
         });
     }

@@ -179,6 +179,7 @@ pub(super) fn turned(triangle: &Triangle) -> Triangle {
         vertices: [a, c, b],
         uv: turned(triangle.uv),
         emission_uv: triangle.emission_uv.map(turned),
+        light_uv: triangle.light_uv.map(turned),
         ..*triangle
     }
 }

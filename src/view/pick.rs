@@ -38,6 +38,7 @@ mod tests {
             vertices: [first, first + 1, first + 2],
             uv: [[0.0; 2]; 3],
             emission_uv: None,
+            light_uv: None,
             material: 0,
         };
         let scene = Scene {

@@ -6,6 +6,7 @@ use glam::{DVec3, Vec3};
 
 use crate::bake::solution::{Bake, DirectionalLight, Solution};
 use crate::error::Result;
+use crate::picture::exposure_by_area;
 use crate::render::{Joined, Lighting, corner_irradiance, tone};
 use crate::scene::{Scene, Triangle};
 use crate::solver::{Ambient, Solver, StopReason, Update};
@@ -36,11 +37,6 @@ pub struct Snapshot {
     pub exposure: f32,
     pub progress: Progress,
 }
-
-/// Share of the area that is darker than what the exposure is for, and the luminance which that is
-/// brought to, as in pictures.
-const METERED_SHARE: f64 = 0.9;
-const METER_TARGET: f32 = 0.6;
 
 impl Snapshot {
     fn new(
@@ -138,10 +134,10 @@ pub fn is_done(stop: StopReason) -> bool {
     )
 }
 
-/// Stops that bring the luminance under which METERED_SHARE of the area that does not emit lies to
-/// METER_TARGET. It does not depend on the view: a window that orbits does not flicker.
+/// The exposure for what does not emit. It does not depend on the view: a window that orbits does not
+/// flicker.
 fn exposure(scene: &Scene, irradiance: &[Vec3], ambient: Vec3) -> f32 {
-    let mut lit: Vec<(f32, f64)> = scene
+    let lit = scene
         .triangles
         .iter()
         .zip(irradiance)
@@ -157,18 +153,8 @@ fn exposure(scene: &Scene, irradiance: &[Vec3], ambient: Vec3) -> f32 {
             let [a, b, c] = scene.corners(triangle);
             let area = DVec3::length((b - a).cross(c - a)) / 2.0;
             (tone::luminance(radiance.to_array()), area)
-        })
-        // What no light reaches, backs of walls most of all, is not exposed for.
-        .filter(|(luminance, _)| *luminance > 0.0)
-        .collect();
-    lit.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-    let whole: f64 = lit.iter().map(|l| l.1).sum();
-    let mut below = 0.0;
-    let bright = lit.iter().find(|(_, area)| {
-        below += area;
-        below >= METERED_SHARE * whole
-    });
-    bright.map_or(0.0, |(luminance, _)| (METER_TARGET / luminance).log2())
+        });
+    exposure_by_area(lit)
 }
 
 #[cfg(test)]
@@ -186,6 +172,7 @@ mod tests {
                     vertices: [0, 1, 2],
                     uv: [[0.0; 2]; 3],
                     emission_uv: None,
+                    light_uv: None,
                     material: 0,
                 };
                 10
@@ -200,6 +187,6 @@ mod tests {
             .map(|i| Vec3::splat(i as f32 * std::f32::consts::PI))
             .collect();
         let stops = exposure(&scene, &light, Vec3::ZERO);
-        assert!((stops.exp2() * 9.0 - METER_TARGET).abs() < 1e-5, "{stops}");
+        assert!((stops.exp2() * 9.0 - 0.6).abs() < 1e-5, "{stops}");
     }
 }

@@ -70,6 +70,7 @@ fn add(scene: &mut Scene, corners: [[f64; 3]; 3], uv: [[f32; 2]; 3], material: u
         vertices: [first, first + 1, first + 2],
         uv,
         emission_uv: None,
+        light_uv: None,
         material,
     });
 }
@@ -261,6 +262,7 @@ fn irradiance_is_smooth_up_to_a_crease() {
                     vertices,
                     uv: [[0.0; 2]; 3],
                     emission_uv: None,
+                    light_uv: None,
                     material: 0,
                 })
                 .to_vec(),

@@ -28,7 +28,11 @@ pub struct Tensor {
 }
 
 impl Tensor {
-    fn floats(name: &'static str, shape: &[usize], values: impl Iterator<Item = f32>) -> Self {
+    pub(crate) fn floats(
+        name: &'static str,
+        shape: &[usize],
+        values: impl Iterator<Item = f32>,
+    ) -> Self {
         Self {
             name,
             dtype: Dtype::F32,
@@ -37,7 +41,7 @@ impl Tensor {
         }
     }
 
-    fn vectors<'a>(
+    pub(crate) fn vectors<'a>(
         name: &'static str,
         shape: &[usize],
         values: impl IntoIterator<Item = &'a Vec3>,
@@ -45,7 +49,7 @@ impl Tensor {
         Self::floats(name, shape, values.into_iter().flat_map(Vec3::to_array))
     }
 
-    fn words(name: &'static str, values: &[u32]) -> Self {
+    pub(crate) fn words(name: &'static str, values: &[u32]) -> Self {
         Self {
             name,
             dtype: Dtype::U32,
@@ -53,6 +57,25 @@ impl Tensor {
             bytes: values.iter().flat_map(|v| v.to_le_bytes()).collect(),
         }
     }
+}
+
+/// Writes tensors to a temporary file beside `path`, syncs it, and renames it to `path`.
+///
+/// # Errors
+/// A file that cannot be written.
+pub(crate) fn write_tensors(
+    path: &Path,
+    tensors: &[Tensor],
+    metadata: HashMap<String, String>,
+) -> Result<()> {
+    let views = tensors
+        .iter()
+        .map(|t| TensorView::new(t.dtype, t.shape.clone(), &t.bytes).map(|v| (t.name, v)))
+        .collect::<std::result::Result<Vec<_>, _>>()
+        .map_err(|e| Error::file(path, e.to_string()))?;
+    let bytes = safetensors::serialize(views, Some(metadata.into_iter().collect()))
+        .map_err(|e| Error::file(path, e.to_string()))?;
+    write_atomically(path, |file| file.write_all(&bytes))
 }
 
 impl Solution {
@@ -65,14 +88,7 @@ impl Solution {
         let mut metadata = self.metadata(path, origin, settings)?;
         let bytes_by_name = tensors.iter().map(|t| (t.name, &t.bytes[..]));
         metadata.insert("sha256".to_owned(), checksum(bytes_by_name));
-        let views = tensors
-            .iter()
-            .map(|t| TensorView::new(t.dtype, t.shape.clone(), &t.bytes).map(|v| (t.name, v)))
-            .collect::<std::result::Result<Vec<_>, _>>()
-            .map_err(|e| Error::file(path, e.to_string()))?;
-        let bytes = safetensors::serialize(views, Some(metadata.into_iter().collect()))
-            .map_err(|e| Error::file(path, e.to_string()))?;
-        write_atomically(path, |file| file.write_all(&bytes))
+        write_tensors(path, &tensors, metadata)
     }
 
     fn metadata(

@@ -50,20 +50,19 @@ impl Document {
         push(&mut self.views, view)
     }
 
-    /// Vectors of the vertices; `bounds` are needed of positions.
-    pub fn vectors<const N: usize>(&mut self, values: &[[f32; N]], bounds: bool) -> usize {
-        let view = self.view(
-            bytemuck::cast_slice(values.as_flattened()),
-            Some(ARRAY_BUFFER),
-        );
-        let kind = ["SCALAR", "VEC2", "VEC3", "VEC4"][N - 1];
+    /// Vectors of so many components; `bounds` are needed of positions.
+    pub fn vectors(&mut self, values: &[f32], components: usize, bounds: bool) -> usize {
+        let view = self.view(bytemuck::cast_slice(values), Some(ARRAY_BUFFER));
+        let kind = ["SCALAR", "VEC2", "VEC3", "VEC4"][components - 1];
+        let count = values.len() / components;
         let mut accessor = json!({
-            "bufferView": view, "componentType": FLOAT, "count": values.len(), "type": kind,
+            "bufferView": view, "componentType": FLOAT, "count": count, "type": kind,
         });
         if bounds {
+            let vectors = || values.chunks_exact(components);
             let of = |start: f32, pick: fn(f32, f32) -> f32| -> Vec<f32> {
-                (0..N)
-                    .map(|k| values.iter().fold(start, |x, v| pick(x, v[k])))
+                (0..components)
+                    .map(|k| vectors().fold(start, |x, v| pick(x, v[k])))
                     .collect()
             };
             accessor["min"] = json!(of(f32::INFINITY, f32::min));

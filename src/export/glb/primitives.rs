@@ -6,11 +6,16 @@ use glam::DVec3;
 use serde_json::{Value, json};
 
 use super::document::Document;
+use crate::export::baked_colours::CornerColours;
 use crate::export::surface::Surface;
 use crate::scene::MeshRange;
 
 /// Set of texture coordinates of emission that lies elsewhere than the other maps.
 pub const EMISSION_SET: u32 = 2;
+
+/// Attribute of the irradiance at vertices, W·m⁻², RGB. Names of attributes that are not glTF's begin
+/// so.
+const IRRADIANCE: &str = "_IRRADIANCE";
 
 /// Runs of one material in a mesh, at most, before its triangles are sorted by material.
 const MOST_RUNS: usize = 64;
@@ -20,6 +25,7 @@ const MOST_RUNS: usize = 64;
 pub fn add(
     document: &mut Document,
     surface: &Surface,
+    colours: Option<&CornerColours>,
     material: impl Fn(u32, Option<u32>) -> Value,
 ) {
     let scene = &surface.scene;
@@ -42,7 +48,7 @@ pub fn add(
                 document.materials.push(material(key.0, key.1));
                 document.materials.len() - 1
             });
-            primitive(document, surface, &run, middle, index)
+            primitive(document, surface, colours, &run, middle, index)
         });
         let primitives = primitives.collect();
         document.mesh(&mesh.name, primitives, middle.to_array());
@@ -77,59 +83,86 @@ fn middle(surface: &Surface, triangles: std::ops::Range<usize>) -> DVec3 {
     }
 }
 
+/// Name and number of components of each attribute that a primitive has.
+fn attributes(
+    surface: &Surface,
+    colours: Option<&CornerColours>,
+    emits: bool,
+) -> Vec<(String, usize)> {
+    let mut names = vec![("POSITION", 3), ("NORMAL", 3), ("TEXCOORD_0", 2)];
+    if surface.pages.count > 0 {
+        names.push(("TEXCOORD_1", 2));
+    }
+    if colours.is_some() {
+        names.extend([("COLOR_0", 3), (IRRADIANCE, 3)]);
+    }
+    let mut names: Vec<(String, usize)> = (names.into_iter())
+        .map(|(name, components)| (name.to_owned(), components))
+        .collect();
+    if emits {
+        names.push((format!("TEXCOORD_{EMISSION_SET}"), 2));
+    }
+    names
+}
+
 fn primitive(
     document: &mut Document,
     surface: &Surface,
+    colours: Option<&CornerColours>,
     triangles: &[usize],
     middle: DVec3,
     material: usize,
 ) -> Value {
     let scene = &surface.scene;
-    let (mut positions, mut normals) = (Vec::new(), Vec::new());
-    let (mut uvs, mut light_uvs, mut emission_uvs) = (Vec::new(), Vec::new(), Vec::new());
+    let emits = scene.materials[scene.triangles[triangles[0]].material as usize]
+        .map_ke
+        .is_some();
+    let names = attributes(surface, colours, emits);
+    // The values of a corner, one attribute after another.
+    let corner = |t: usize, k: usize| -> Vec<f32> {
+        let triangle = &scene.triangles[t];
+        let position = scene.vertices[triangle.vertices[k] as usize] - middle;
+        let normal = surface.normals[t][k].as_vec3().normalize().to_array();
+        // glTF's v points down.
+        let flip = |[u, v]: [f32; 2]| [u, 1.0 - v];
+        let mut values = [position.as_vec3().to_array(), normal].concat();
+        values.extend(flip(triangle.uv[k]));
+        if surface.pages.count > 0 {
+            values.extend(surface.uv[t][k].as_vec2().to_array());
+        }
+        if let Some(of) = colours {
+            values.extend([of.colours[t][k], of.irradiance[t][k]].concat());
+        }
+        if emits {
+            values.extend(flip(triangle.uv_of_emission()[k]));
+        }
+        values
+    };
+    let mut vertices: Vec<Vec<f32>> = Vec::new();
     let mut indices = Vec::with_capacity(3 * triangles.len());
     let mut known: HashMap<Vec<u32>, u32> = HashMap::new();
     for &t in triangles {
-        let triangle = &scene.triangles[t];
         for k in 0..3 {
-            let position = scene.vertices[triangle.vertices[k] as usize] - middle;
-            let position = position.as_vec3().to_array();
-            let normal = surface.normals[t][k].as_vec3().normalize().to_array();
-            // glTF's v points down.
-            let flip = |[u, v]: [f32; 2]| [u, 1.0 - v];
-            let uv = flip(triangle.uv[k]);
-            let emission = flip(triangle.uv_of_emission()[k]);
-            let light = surface.uv[t][k].as_vec2().to_array();
-            let key: Vec<u32> = (position.iter().chain(&normal))
-                .chain(&uv)
-                .chain(&emission)
-                .chain(&light)
-                .map(|value| value.to_bits())
-                .collect();
-            let next = positions.len() as u32;
+            let values = corner(t, k);
+            let key = values.iter().map(|value| value.to_bits()).collect();
+            let next = vertices.len() as u32;
             let index = *known.entry(key).or_insert(next);
             if index == next {
-                positions.push(position);
-                normals.push(normal);
-                uvs.push(uv);
-                light_uvs.push(light);
-                emission_uvs.push(emission);
+                vertices.push(values);
             }
             indices.push(index);
         }
     }
-    let mut attributes = json!({
-        "POSITION": document.vectors(&positions, true),
-        "NORMAL": document.vectors(&normals, false),
-        "TEXCOORD_0": document.vectors(&uvs, false),
-        "TEXCOORD_1": document.vectors(&light_uvs, false),
-    });
-    let emits = scene.materials[scene.triangles[triangles[0]].material as usize]
-        .map_ke
-        .is_some();
-    if emits {
-        let set = format!("TEXCOORD_{EMISSION_SET}");
-        attributes[set] = json!(document.vectors(&emission_uvs, false));
+    let mut attributes = json!({});
+    let mut first = 0;
+    for (name, components) in names {
+        let range = first..first + components;
+        let values: Vec<f32> = (vertices.iter())
+            .flat_map(|vertex| vertex[range.clone()].iter().copied())
+            .collect();
+        let is_position = name == "POSITION";
+        attributes[name] = json!(document.vectors(&values, components, is_position));
+        first = range.end;
     }
     json!({
         "attributes": attributes,

@@ -201,6 +201,7 @@ fn mesh(quads: impl Iterator<Item = (Quad, u32)>) -> Mesh {
                 corners: [a, b, c].map(|i| first + i),
                 uv: Some(box_projection([a, b, c].map(|i| corners[i as usize]))),
                 emission_uv: None,
+                light_uv: None,
                 material,
             });
         }

@@ -69,6 +69,7 @@ impl Sheet {
                         corners: corners.map(|[a, b]| (j + b) * (n + 1) + i + a),
                         uv: Some(uv),
                         emission_uv: None,
+                        light_uv: None,
                         material: self.material,
                     });
                 }

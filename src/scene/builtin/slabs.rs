@@ -81,6 +81,7 @@ impl Slabs {
                 corners,
                 uv: None,
                 emission_uv: None,
+                light_uv: None,
                 material,
             });
         };

@@ -123,6 +123,7 @@ impl<S: Fn(DVec3) -> f64> Edges<S> {
                 corners,
                 uv: None,
                 emission_uv: None,
+                light_uv: None,
                 material,
             };
             triangles[index] = part([from, middle, across]);

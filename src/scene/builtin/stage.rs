@@ -119,6 +119,7 @@ pub(super) fn room(room: &Room, count: usize, material_of: fn(Part) -> u32) -> M
             corners: [first, first + 1, first + 2],
             uv: Some(box_projection(corners)),
             emission_uv: None,
+            light_uv: None,
             material: material_of(part),
         });
     }

@@ -47,8 +47,12 @@ impl Place {
         scale: [1.0; 2],
     };
 
+    pub fn of_set(set: u32) -> Self {
+        Self { set, ..Self::FIRST }
+    }
+
     fn new(set: u32, transform: Option<TextureTransform>) -> Self {
-        let plain = Self { set, ..Self::FIRST };
+        let plain = Self::of_set(set);
         transform.map_or(plain, |by| Self {
             set: by.tex_coord().unwrap_or(set),
             offset: by.offset(),

@@ -11,6 +11,9 @@ use crate::scene::assemble::MeshTriangle;
 use crate::scene::material::DEFAULT_KD;
 use crate::scene::material::MadeUp;
 
+/// Set of texture coordinates that says where a surface lies in its light map.
+const LIGHT_SET: u32 = 1;
+
 impl Reader<'_> {
     /// # Errors
     /// An index out of range; attributes of different lengths; a position that is not finite.
@@ -85,6 +88,13 @@ impl Reader<'_> {
             Some(place) => coordinates(place)?,
             None => None,
         };
+        // Not where its textures lie: those repeat.
+        let own = self.materials.places[material].set != LIGHT_SET
+            && self.materials.emission_places[material].is_none_or(|of| of.set != LIGHT_SET);
+        let light_uv = match own {
+            true => coordinates(Place::of_set(LIGHT_SET))?,
+            false => None,
+        };
         // A mirrored node shows the other side of what it places.
         let mirrored = placed.matrix3.determinant() < 0.0;
         let mesh = &mut self.found.mesh;
@@ -98,6 +108,7 @@ impl Reader<'_> {
                 corners: corners.map(|v| first + v),
                 uv: uv.as_ref().map(|uv| corners.map(|v| uv[v as usize])),
                 emission_uv: (emission_uv.as_ref()).map(|uv| corners.map(|v| uv[v as usize])),
+                light_uv: (light_uv.as_ref()).map(|uv| corners.map(|v| uv[v as usize])),
                 material: material as u32,
             });
         }

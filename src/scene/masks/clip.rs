@@ -32,6 +32,7 @@ pub(super) struct Shape {
     pub vertices: [u32; 3],
     pub uv: [[f32; 2]; 3],
     pub emission_uv: Option<[[f32; 2]; 3]>,
+    pub light_uv: Option<[[f32; 2]; 3]>,
     /// Whether the order turned it over.
     pub is_turned: bool,
 }
@@ -45,6 +46,7 @@ impl Shape {
             vertices: order.map(|k| triangle.vertices[k]),
             uv: order.map(|k| triangle.uv[k]),
             emission_uv: (triangle.emission_uv).map(|uv| order.map(|k| uv[k])),
+            light_uv: (triangle.light_uv).map(|uv| order.map(|k| uv[k])),
             is_turned: (b + 3 - a) % 3 != 1,
         }
     }

@@ -325,6 +325,8 @@ impl<'a> Cutting<'a> {
             uv: piece.map(|(node, at)| uv_at(&shape.uv, node, at)),
             emission_uv: (shape.emission_uv.as_ref())
                 .map(|uv| piece.map(|(node, at)| uv_at(uv, node, at))),
+            light_uv: (shape.light_uv.as_ref())
+                .map(|uv| piece.map(|(node, at)| uv_at(uv, node, at))),
             material: self.scene.triangles[t].material,
         };
         let corners = triangle.vertices.map(|v| self.cut.vertices[v as usize]);

@@ -229,8 +229,13 @@ fn lay(
     find: impl Fn([[f32; 2]; 3]) -> [f32; 2],
 ) {
     piece.uv[corner] = find(whole.uv);
-    if let (Some(own), Some(of_whole)) = (&mut piece.emission_uv, whole.emission_uv) {
-        own[corner] = find(of_whole);
+    for (own, of_whole) in [
+        (&mut piece.emission_uv, whole.emission_uv),
+        (&mut piece.light_uv, whole.light_uv),
+    ] {
+        if let (Some(own), Some(of_whole)) = (own, of_whole) {
+            own[corner] = find(of_whole);
+        }
     }
 }
 

@@ -14,7 +14,7 @@ use std::collections::HashMap;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{Scene, Triangle};
+use super::{Scene, Triangle, meshes};
 use cutting::{Cutting, length, longest};
 use glow::Glow;
 use shadows::Shadows;
@@ -65,6 +65,13 @@ pub struct OnInput {
 }
 
 impl OnInput {
+    /// Barycentric coordinates in the triangle of the input.
+    pub fn weights(&self, weights: [f64; 3]) -> [f64; 3] {
+        let along = |i: usize| (0..3).map(|k| weights[k] * self.corners[k][i]).sum::<f64>();
+        let [second, third] = [0, 1].map(along);
+        [1.0 - second - third, second, third]
+    }
+
     /// The whole of a triangle.
     pub fn whole(triangle: u32) -> Self {
         Self {
@@ -137,6 +144,22 @@ impl Scene {
         }
     }
 
+    /// The same scene with its triangles in the order of those of the input, and their meshes by
+    /// these, and where each lies in the input.
+    pub(crate) fn in_order_of_input(&self) -> (Self, Vec<OnInput>) {
+        let of_input = self.on_input();
+        let mut order: Vec<usize> = (0..self.triangles.len()).collect();
+        order.sort_by_key(|&t| of_input[t].triangle);
+        let from: Vec<u32> = order.iter().map(|&t| of_input[t].triangle).collect();
+        let scene = Self {
+            triangles: order.iter().map(|&t| self.triangles[t]).collect(),
+            meshes: meshes::of_cut(&self.meshes, &from),
+            refined_from: None,
+            ..self.clone()
+        };
+        (scene, order.into_iter().map(|t| of_input[t]).collect())
+    }
+
     /// Cuts triangles as `refinement` says. The result has [`Scene::refined_from`].
     pub fn refined(&self, refinement: &Refinement) -> Self {
         let area: f64 = self.triangles.iter().map(|t| area(self.corners(t))).sum();
@@ -206,13 +229,7 @@ impl Scene {
             return whole;
         };
         let count = from.on_input.iter().map(|on| on.triangle + 1).max();
-        let none = Triangle {
-            vertices: [0; 3],
-            uv: [[0.0; 2]; 3],
-            emission_uv: None,
-            material: 0,
-        };
-        whole.triangles = vec![none; count.unwrap_or(0) as usize];
+        whole.triangles = vec![Triangle::default(); count.unwrap_or(0) as usize];
         whole.vertices.truncate(from.vertices);
         // Each corner of the input is one of some triangle that was cut from it.
         let corners = OnInput::whole(0).corners;
@@ -225,6 +242,9 @@ impl Scene {
                     input.uv[corner] = part.uv[k];
                     if let Some(uv) = part.emission_uv {
                         input.emission_uv.get_or_insert(uv)[corner] = uv[k];
+                    }
+                    if let Some(uv) = part.light_uv {
+                        input.light_uv.get_or_insert(uv)[corner] = uv[k];
                     }
                 }
             }
@@ -255,6 +275,7 @@ impl Scene {
                     vertices,
                     uv: on.corners.map(|at| at_uv(whole.uv, at)),
                     emission_uv: (whole.emission_uv).map(|uv| on.corners.map(|at| at_uv(uv, at))),
+                    light_uv: (whole.light_uv).map(|uv| on.corners.map(|at| at_uv(uv, at))),
                     material: whole.material,
                 }
             })

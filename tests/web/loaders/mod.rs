@@ -59,6 +59,8 @@ fn others_load_the_gltf() {
         "mapped.glb",
         "--unlit-glb",
         "unlit.glb",
+        "--vertex-glb",
+        "vertices.glb",
     ]);
     let page = folder.path().join("page");
     std::fs::create_dir(&page).expect("a folder for the page");
@@ -67,7 +69,11 @@ fn others_load_the_gltf() {
     std::fs::copy(sources().join("index.html"), page.join("index.html")).expect("it is there");
 
     let display = Display::new();
-    for (name, exposure, limit) in [("mapped", "2", MAPPED), ("unlit", "null", UNLIT)] {
+    for (name, exposure, limit) in [
+        ("mapped", "2", MAPPED),
+        ("unlit", "null", UNLIT),
+        ("vertices", "null", VERTICES),
+    ] {
         let glb = folder.path().join(format!("{name}.glb"));
         let issues = issues(&packages, &glb);
         println!("{name}: {issues}");
@@ -110,3 +116,6 @@ const MAPPED: f32 = 0.085;
 
 /// With baked colours. Measured: 0.0154.
 const UNLIT: f32 = 0.031;
+
+/// With colours of vertices. Measured: 0.0143.
+const VERTICES: f32 = 0.029;

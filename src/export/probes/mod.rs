@@ -1,15 +1,23 @@
 //! Light at probes: places in space from which light is taken for what moves.
 
+mod files;
+mod grid;
+mod walls;
+
 use std::path::Path;
 
 use glam::{DVec3, Vec3};
 use nalgebra::{DMatrix, SMatrix};
-use serde_json::json;
+use rayon::prelude::*;
 
-use crate::atomic_file::write_atomically;
-use crate::error::{Error, Result};
+use super::text_points::{Row, read_rows};
+use crate::error::Result;
 use crate::scene::Scene;
-use crate::solver::{LightAt, Place};
+use crate::scene::geometry::Geometry;
+use crate::solver::{LightAt, Lit, Place};
+pub use files::ProbeFile;
+pub use grid::Grid;
+pub use walls::{SIDE, Walls, off_square, on_square};
 
 /// Coefficients of the real spherical harmonics up to the second degree.
 pub const COEFFICIENTS: usize = 9;
@@ -23,6 +31,59 @@ pub struct Probe {
     pub irradiance: [Vec3; COEFFICIENTS],
     /// Whether it lies outside of all solids: within one, it sees backs, and has no light to give.
     pub valid: bool,
+}
+
+/// Probes with what they see.
+pub struct Probes {
+    /// None of given points.
+    pub grid: Option<Grid>,
+    pub list: Vec<Probe>,
+    /// `[probe]`
+    pub walls: Vec<Walls>,
+}
+
+/// Probes that are found between two calls of `go_on`.
+const AT_ONCE: usize = 32;
+
+impl Probes {
+    /// At the places of a grid, or at given positions. `go_on` is called with how many are found;
+    /// false stops, and gives None.
+    ///
+    /// # Errors
+    /// A position that is not finite; a scene that cannot be traced.
+    pub fn new(
+        scene: &Scene,
+        lit: &Lit<'_>,
+        grid: Option<Grid>,
+        positions: &[DVec3],
+        go_on: &dyn Fn(usize) -> bool,
+    ) -> Result<Option<Self>> {
+        let geometry = Geometry::new(&scene.uncut())?;
+        let (mut list, mut walls) = (Vec::new(), Vec::new());
+        for some in positions.chunks(AT_ONCE) {
+            if !go_on(list.len()) {
+                return Ok(None);
+            }
+            let around = places(some);
+            list.extend(probes(some, &lit.at(&around)?, &lit.backs(&around)?));
+            let about = some.par_iter().map(|&at| Walls::new(&geometry, at));
+            walls.extend(about.collect::<Vec<_>>());
+        }
+        Ok(Some(Self { grid, list, walls }))
+    }
+}
+
+/// Reads positions of probes: `x y z` a line, scene units; what follows on the line, as the normals
+/// of Radiance's points, is not used. Empty lines and those that begin with `#` are skipped.
+///
+/// # Errors
+/// A file that cannot be read or has no point; a line that does not begin with three finite numbers.
+pub fn read_positions(path: &Path) -> Result<Vec<DVec3>> {
+    let position = |row: Row<'_>| match row.numbers {
+        [x, y, z, ..] => Ok(DVec3::new(*x, *y, *z)),
+        _ => Err(row.wrong("is not three numbers: x y z")),
+    };
+    read_rows(path, "x y z", position)
 }
 
 /// Y_00, Y_1−1, Y_10, Y_11, Y_2−2, Y_2−1, Y_20, Y_21, Y_22 of a unit vector, orthonormal over the
@@ -51,16 +112,6 @@ pub fn directions() -> Vec<DVec3> {
             .flat_map(move |y| steps.into_iter().map(move |z| DVec3::new(x, y, z)))
     });
     all.filter_map(DVec3::try_normalize).collect()
-}
-
-/// Places of a grid in the box about a scene: in the middle of each of its cells.
-pub fn grid(scene: &Scene, counts: [u32; 3]) -> Vec<DVec3> {
-    let (low, high) = scene.bounds();
-    let [nx, ny, nz] = counts;
-    let at = |i: u32, of: u32| (f64::from(i) + 0.5) / f64::from(of);
-    let all = (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| (i, j, k))));
-    all.map(|(i, j, k)| low + (high - low) * DVec3::new(at(i, nx), at(j, ny), at(k, nz)))
-        .collect()
 }
 
 /// What is looked at for probes at these places: 26 places each.
@@ -121,36 +172,6 @@ impl Probe {
         let sum: Vec3 = all.map(|(y, c)| c * y as f32).sum();
         sum.max(Vec3::ZERO)
     }
-}
-
-/// What the file says of its coefficients.
-const HARMONICS: &str = "real, orthonormal: 00, 1-1, 10, 11, 2-2, 2-1, 20, 21, 22; \
-                         E(n) = sum c Y(n), W/m2";
-
-/// Writes probes as JSON: `counts` of the grid (x fastest), and of each `position`, `valid` and
-/// `irradiance`, nine times RGB.
-///
-/// # Errors
-/// A file that cannot be written.
-pub fn write(path: &Path, counts: [u32; 3], probes: &[Probe]) -> Result<()> {
-    let each: Vec<_> = (probes.iter())
-        .map(|probe| {
-            let coefficients = probe.irradiance.map(|c| c.to_array());
-            json!({
-                "position": probe.position.to_array(),
-                "valid": probe.valid,
-                "irradiance": coefficients,
-            })
-        })
-        .collect();
-    let all = json!({
-        "format": "mesolux probes 1",
-        "harmonics": HARMONICS,
-        "counts": counts,
-        "probes": each,
-    });
-    let text = serde_json::to_string(&all).map_err(|e| Error::file(path, e.to_string()))?;
-    write_atomically(path, |out| out.write_all(text.as_bytes()))
 }
 
 #[cfg(test)]
