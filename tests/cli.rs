@@ -263,6 +263,18 @@ fn bad_names_and_outputs() {
             &["render", "b.safetensors", "--reference", "-o", "p.png"],
             "b.safetensors",
         ),
+        (
+            &[
+                "render",
+                "cornell",
+                "--reference",
+                "--white",
+                "lamps",
+                "-o",
+                "p.png",
+            ],
+            "--white R,G,B",
+        ),
     ] {
         let run = mesolux(args, folder.path());
         let text = String::from_utf8_lossy(&run.stderr);
@@ -292,6 +304,47 @@ fn bad_names_and_outputs() {
     assert_eq!(run.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&run.stderr).contains("Vulkan"));
 }
+
+/// The lamp of the Cornell box is yellow: by its white the back wall is nearly grey, and with 16 bits
+/// as with 8.
+#[test]
+fn a_white_wall_is_shown_white() {
+    let folder = tempfile::tempdir().expect("a folder for the test");
+    let wall = |options: &[&str]| -> [f64; 3] {
+        let mut args = vec!["render", "cornell-box", "-o", "p.png", "--size", "64x64"];
+        args.extend(["--quality", "preview"]);
+        args.extend(options);
+        let run = mesolux(&args, folder.path());
+        assert!(
+            run.status.success(),
+            "{}",
+            String::from_utf8_lossy(&run.stderr)
+        );
+        let picture = image::open(folder.path().join("p.png"))
+            .expect("a PNG")
+            .into_rgb16();
+        // The upper part of the back wall.
+        let pixels = (20..44).flat_map(|x| (16..22).map(move |y| (x, y)));
+        let sum = pixels.fold([0.0; 3], |sum: [f64; 3], (x, y)| {
+            let pixel = picture.get_pixel(x, y).0;
+            [0, 1, 2].map(|c| sum[c] + f64::from(pixel[c]) / 65535.0)
+        });
+        sum.map(|c| c / 144.0)
+    };
+    let [plain, white, deep] = [
+        &[][..],
+        &["--white", "lamps"],
+        &["--white", "lamps", "--png", "srgb16"],
+    ]
+    .map(wall);
+    println!("{plain:.3?}, by its white {white:.3?}");
+    assert!(plain[0] / plain[2] > 1.5);
+    assert!((white[0] / white[2] - 1.0).abs() < WHITE);
+    assert!((0..3).all(|c| (white[c] - deep[c]).abs() < 0.5 / 255.0));
+}
+
+/// Red over blue of the wall's codes, less 1: what red and green walls add. Measured: 0.12.
+const WHITE: f64 = 0.2;
 
 /// What goes to a file has no colours, unless they are asked for; --quiet leaves warnings.
 #[test]

@@ -58,7 +58,17 @@ impl CameraOptions {
                 names.join(", ")
             ))
         })?;
+        let moved = [
+            ("--look-from", self.look_from.is_some()),
+            ("--look-at", self.look_at.is_some()),
+            ("--fov", self.fov.is_some()),
+        ];
+        let by: Vec<_> = moved.iter().filter(|m| m.1).map(|m| m.0).collect();
         Ok(Camera {
+            name: match by.is_empty() {
+                true => found.name.clone(),
+                false => format!("{} with {}", found.name, by.join(", ")),
+            },
             position: self.look_from.unwrap_or(found.position),
             look_at: self.look_at.unwrap_or(found.look_at),
             fov_y: self.fov.unwrap_or(found.fov_y),

@@ -16,9 +16,9 @@ use mesolux::render::{Comparison, FileKind, Flip, Picture, side_by_side};
 /// two look in turns: 0 for alike, 1 at most, the mean over the pixels.
 #[derive(Args)]
 pub struct Options {
-    #[arg(value_name = "PICTURE.exr")]
+    #[arg(value_name = "PICTURE.exr|.hdr")]
     ours: PathBuf,
-    #[arg(value_name = "REFERENCE.exr")]
+    #[arg(value_name = "REFERENCE.exr|.hdr")]
     reference: PathBuf,
     /// Both and their difference side by side: red where the picture is brighter, blue where it is
     /// darker

@@ -8,6 +8,7 @@ mod bench_pictures;
 mod bench_report;
 mod camera;
 mod compare;
+mod develop;
 mod devices;
 mod export;
 mod info;

@@ -9,19 +9,20 @@ use super::bake::{SolveOptions, writable};
 use super::bake_scene::BakeScene;
 use super::baked::{Wanted, is_bake};
 use super::camera::CameraOptions;
+use super::develop::DevelopOptions;
 use super::progress::interrupted;
 use super::reference::{self, ReferenceOptions};
 use super::series::{self, SeriesOptions};
 use super::show::ShowOptions;
 use super::{Builtin, DeviceOptions};
 use mesolux::error::{Error, Result};
-use mesolux::render::{FileKind, Lighting, Picture, Renderer, SAMPLES, View};
+use mesolux::render::{Development, FileKind, Lighting, Picture, Renderer, SAMPLES, View};
 use mesolux::scene::{Camera, Scene};
 use mesolux::vk::Device;
 
 /// Draw a scene or a bake to a picture
 ///
-/// A PNG is exposed and tone-mapped; an EXR holds linear radiance. A SCENE is baked first, with the
+/// A PNG is exposed and tone-mapped; an EXR or HDR holds linear radiance. A SCENE is baked first, with the
 /// options of `bake`, and the bake is kept for the next time; or it is path traced with
 /// --reference.
 #[derive(Args)]
@@ -29,8 +30,8 @@ pub struct Options {
     /// A scene (see `bake`) or a bake (.safetensors)
     #[arg(value_name = "SCENE|BAKE")]
     input: String,
-    /// The picture to write: .png or .exr
-    #[arg(short, long, value_name = "IMAGE.png|.exr")]
+    /// The picture to write: .png, .exr or .hdr
+    #[arg(short, long, value_name = "IMAGE.png|.exr|.hdr")]
     output: PathBuf,
     /// Pixels across and down
     #[arg(long, value_name = "WxH", default_value = "800x800", value_parser = size)]
@@ -39,9 +40,8 @@ pub struct Options {
     bake_scene: BakeScene,
     #[command(flatten)]
     camera: CameraOptions,
-    /// Multiplies the light by 2^EV; found from the picture if not given
-    #[arg(long, value_name = "EV", allow_hyphen_values = true)]
-    exposure: Option<f32>,
+    #[command(flatten)]
+    develop: DevelopOptions,
     #[command(flatten)]
     series: SeriesOptions,
     #[command(flatten)]
@@ -67,13 +67,7 @@ pub fn size(text: &str) -> std::result::Result<(u32, u32), String> {
 
 pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
     FileKind::of(&options.output)?;
-    if let Some(ev) = options.exposure
-        && !(-64.0..=64.0).contains(&ev)
-    {
-        return Err(Error::Usage(format!(
-            "--exposure {ev}: must be in -64 to 64"
-        )));
-    }
+    options.develop.check(!options.reference.reference)?;
     writable(&options.output)?;
     let wanted = Wanted {
         input: &options.input,
@@ -102,7 +96,9 @@ pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
         cache: cache.as_deref(),
         ..Lighting::from(&bake)
     };
-    options.draw(&device, &scene, lighting, &camera, cameras.as_deref())?;
+    let development = options.develop.of(Some((&scene, &bake)));
+    let cameras = cameras.as_deref();
+    options.draw(&device, &scene, lighting, (&camera, cameras), development)?;
     options.device.check()
 }
 
@@ -125,9 +121,10 @@ fn run_reference(options: &Options) -> Result<()> {
             .collect::<Result<Vec<_>>>()?;
         Picture::side_by_side(&pictures)
     };
+    let development = options.develop.of(None);
     match cameras {
-        None => options.write(&trace(&camera)?, &camera),
-        Some(cameras) => series::draw(&options.output, &cameras, options.exposure, |camera| {
+        None => options.write(&trace(&camera)?, &camera, development),
+        Some(cameras) => series::draw(&options.output, &cameras, development, |camera| {
             let picture = trace(camera)?;
             // Fewer paths than in the other pictures would be visible.
             Ok((!interrupted()).then_some(picture))
@@ -150,8 +147,8 @@ impl Options {
         device: &Arc<Device>,
         scene: &Scene,
         lighting: Lighting<'_>,
-        camera: &Camera,
-        cameras: Option<&[Camera]>,
+        (camera, cameras): (&Camera, Option<&[Camera]>),
+        development: Development,
     ) -> Result<()> {
         let first = cameras.and_then(|c| c.first()).unwrap_or(camera);
         let parts = self.show.parts().iter();
@@ -166,9 +163,9 @@ impl Options {
             Picture::side_by_side(&pictures.collect::<Result<Vec<_>>>()?)
         };
         let Some(cameras) = cameras else {
-            return self.write(&drawn(&renderers)?, camera);
+            return self.write(&drawn(&renderers)?, camera, development);
         };
-        series::draw(&self.output, cameras, self.exposure, |camera| {
+        series::draw(&self.output, cameras, development, |camera| {
             for renderer in &mut renderers {
                 renderer.look(&self.view(camera))?;
             }
@@ -176,8 +173,8 @@ impl Options {
         })
     }
 
-    fn write(&self, picture: &Picture, camera: &Camera) -> Result<()> {
-        picture.write(&self.output, self.exposure)?;
+    fn write(&self, picture: &Picture, camera: &Camera, development: Development) -> Result<()> {
+        picture.write(&self.output, development)?;
         tracing::info!(
             "{}: {}x{}, camera {}",
             self.output.display(),

@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use super::bake::writable;
 use super::progress::{Bar, catch_interrupts, interrupted};
 use mesolux::error::Result;
-use mesolux::render::Picture;
+use mesolux::render::{Development, Picture};
 use mesolux::scene::{Camera, Scene, camera_path};
 
 #[derive(Args)]
@@ -68,13 +68,13 @@ fn numbered(output: &Path, number: usize, of: usize) -> PathBuf {
 pub fn draw<'a>(
     output: &Path,
     cameras: &'a [Camera],
-    exposure: Option<f32>,
+    development: Development,
     mut draw: impl FnMut(&'a Camera) -> Result<Option<Picture>>,
 ) -> Result<()> {
     catch_interrupts();
     let (start, bar, of) = (Instant::now(), Bar::new(), cameras.len());
     writable(&numbered(output, 1, of))?;
-    let (mut exposure, mut written) = (exposure, 0);
+    let (mut development, mut written) = (development, 0);
     for camera in cameras {
         if interrupted() {
             break;
@@ -82,8 +82,8 @@ pub fn draw<'a>(
         let Some(picture) = draw(camera)? else {
             break;
         };
-        let exposure = *exposure.get_or_insert(picture.automatic_exposure);
-        picture.write(&numbered(output, written + 1, of), Some(exposure))?;
+        (development.exposure).get_or_insert(picture.automatic_exposure);
+        picture.write(&numbered(output, written + 1, of), development)?;
         written += 1;
         let taken = start.elapsed().as_secs_f64();
         bar.show(format!(
@@ -97,7 +97,7 @@ pub fn draw<'a>(
         start.elapsed().as_secs_f64(),
         numbered(output, 1, of).display(),
         numbered(output, written.max(1), of).display(),
-        exposure.unwrap_or_default()
+        development.exposure.unwrap_or_default()
     );
     Ok(())
 }

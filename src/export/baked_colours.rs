@@ -13,8 +13,8 @@ use super::surface::Surface;
 use super::texels::quarters;
 use super::vertex_light::VertexLight;
 use crate::error::{Error, Result};
-use crate::picture::tone::{luminance, neutral};
-use crate::picture::{Picture, exposure_by_area};
+use crate::picture::tone::luminance;
+use crate::picture::{Development, Picture, exposure_by_area};
 
 /// Pages as PNG, exposed and tone-mapped as pictures are, and the exposure that was used: without
 /// one, the brightest tenth of the texels that do not emit is brought to 0.6 and more.
@@ -124,6 +124,7 @@ pub fn corners(light: &VertexLight, part: Part, exposure: Option<f32>) -> Corner
         });
         exposure_by_area(dark)
     });
+    let develop = Development::from(Some(exposure)).shown(exposure);
     let colour = |t: usize, k: usize| -> [f32; 3] {
         let triangle = &scene.triangles[t];
         let material = &scene.materials[triangle.material as usize];
@@ -134,7 +135,7 @@ pub fn corners(light: &VertexLight, part: Part, exposure: Option<f32>) -> Corner
             let glow = map.map_or([1.0; 3], |map| map.sample_bilinear(u, v));
             radiance += Vec3::from(material.ke) * Vec3::from(glow);
         }
-        let shown = Vec3::from(neutral((radiance * exposure.exp2()).to_array()));
+        let shown = Vec3::from(develop(radiance.to_array()));
         let shown = match material.map_kd {
             // The texture multiplies it.
             Some(_) => shown / reflectance[triangle.material as usize].max(Vec3::splat(1e-6)),

@@ -7,10 +7,13 @@ use std::path::Path;
 
 use image::ImageEncoder;
 #[cfg(feature = "formats")]
+use image::codecs::hdr::HdrEncoder;
+#[cfg(feature = "formats")]
 use image::codecs::openexr::OpenExrEncoder;
 use image::codecs::png::PngEncoder;
 use rayon::prelude::*;
 
+use super::develop::{Codes, Development};
 use super::tone;
 use crate::atomic_file::write_atomically;
 use crate::error::{Error, Result};
@@ -77,6 +80,7 @@ pub(crate) fn exposure_by_area(surfaces: impl Iterator<Item = (f32, f64)>) -> f3
 pub enum FileKind {
     Png,
     Exr,
+    Hdr,
 }
 
 impl FileKind {
@@ -89,8 +93,9 @@ impl FileKind {
         match ending.as_deref() {
             Some("png") => Ok(Self::Png),
             Some("exr") => Ok(Self::Exr),
+            Some("hdr") => Ok(Self::Hdr),
             _ => Err(Error::Usage(format!(
-                "picture {}: the name must end in .png (8-bit sRGB, tone-mapped) or .exr (linear radiance)",
+                "picture {}: the name must end in .png (tone-mapped), .exr or .hdr (linear radiance)",
                 path.display()
             ))),
         }
@@ -183,16 +188,21 @@ impl Picture {
         })
     }
 
-    /// Reads linear radiance from an OpenEXR file; all pixels are metered.
+    /// Reads linear radiance from an OpenEXR or Radiance HDR file; all pixels are metered.
     ///
     /// # Errors
     /// A file that cannot be read, or that holds no finite RGB.
     pub fn read(path: &Path) -> Result<Self> {
-        if FileKind::of(path)? != FileKind::Exr {
-            return Err(Error::file(path, "a PNG holds no radiance: give an .exr"));
-        }
+        let format = match FileKind::of(path)? {
+            FileKind::Exr => image::ImageFormat::OpenExr,
+            FileKind::Hdr => image::ImageFormat::Hdr,
+            FileKind::Png => {
+                let what = "a PNG holds no radiance: give an .exr or .hdr";
+                return Err(Error::file(path, what));
+            }
+        };
         let bytes = std::fs::read(path).map_err(|e| Error::read(path, e))?;
-        let decoded = image::load_from_memory_with_format(&bytes, image::ImageFormat::OpenExr)
+        let decoded = image::load_from_memory_with_format(&bytes, format)
             .map_err(|e| Error::file(path, e.to_string()))?
             .into_rgb32f();
         let size = decoded.dimensions();
@@ -204,25 +214,25 @@ impl Picture {
         Ok(Self::new(size, radiance, &metered))
     }
 
-    /// Writes the picture, by the ending of `path`: `.png` as 8-bit sRGB, exposed by 2^`exposure`
-    /// and tone-mapped, or `.exr` as linear 32-bit float radiance, W·m⁻²·sr⁻¹, neither exposed nor
-    /// tone-mapped.
-    ///
-    /// Without `exposure`, the 90th percentile of the luminance of non-emitting surfaces is brought
-    /// to 0.6, so that lamps in view do not darken the room.
+    /// Writes the picture, by the ending of `path`: `.png` as `development` says, which may be an
+    /// exposure alone; `.exr` and `.hdr` as linear radiance, W·m⁻²·sr⁻¹, as it is: 32-bit floats,
+    /// Radiance's RGBE.
     ///
     /// # Errors
     /// Another ending; a file that cannot be written.
-    pub fn write(&self, path: &Path, exposure: Option<f32>) -> Result<()> {
-        match FileKind::of(path)? {
-            FileKind::Png => write_png(path, (self.width, self.height), &self.srgb_codes(exposure)),
+    pub fn write(&self, path: &Path, development: impl Into<Development>) -> Result<()> {
+        let development = development.into();
+        let size = (self.width, self.height);
+        match (FileKind::of(path)?, development.codes) {
+            (FileKind::Png, Codes::Srgb8) => write_png(path, size, &self.srgb_codes(development)),
+            (FileKind::Png, codes) => self.write_deep_png(path, development, codes),
             #[cfg(not(feature = "formats"))]
-            FileKind::Exr => Err(Error::file(
+            (FileKind::Exr | FileKind::Hdr, _) => Err(Error::file(
                 path,
-                "OpenEXR needs the Cargo feature `formats`",
+                "OpenEXR and Radiance HDR need the Cargo feature `formats`",
             )),
             #[cfg(feature = "formats")]
-            FileKind::Exr => write_atomically(path, |out| {
+            (FileKind::Exr, _) => write_atomically(path, |out| {
                 // The encoder seeks back to fill in its table, which a stream cannot.
                 let mut whole = Cursor::new(Vec::new());
                 OpenExrEncoder::new(&mut whole)
@@ -235,19 +245,57 @@ impl Picture {
                     .map_err(io::Error::other)?;
                 out.write_all(whole.get_ref())
             }),
+            #[cfg(feature = "formats")]
+            (FileKind::Hdr, _) => write_atomically(path, |out| {
+                let pixels: Vec<_> = self.radiance.iter().map(|&c| image::Rgb(c)).collect();
+                let [width, height] = [self.width, self.height].map(|side| side as usize);
+                HdrEncoder::new(out)
+                    .encode(&pixels, width, height)
+                    .map_err(io::Error::other)
+            }),
         }
     }
 
-    /// 8-bit sRGB codes, `[row][column][channel]`.
-    pub(crate) fn srgb_codes(&self, exposure: Option<f32>) -> Vec<u8> {
-        let scale = exposure.unwrap_or(self.automatic_exposure).exp2();
-        let shown = |radiance: [f32; 3]| tone::neutral(radiance.map(|c| c * scale));
+    /// 16 bits a channel.
+    fn write_deep_png(&self, path: &Path, development: Development, codes: Codes) -> Result<()> {
+        let linear = self.developed(&development);
+        let code = |&value: &f32| {
+            let value = match codes {
+                Codes::Linear16 => value.clamp(0.0, 1.0),
+                _ => tone::coded(value),
+            };
+            ((65535.0 * value).round() as u16).to_be_bytes()
+        };
+        let bytes: Vec<u8> = linear.as_flattened().iter().flat_map(code).collect();
+        write_atomically(path, |out| {
+            let mut encoder = png::Encoder::new(out, self.width, self.height);
+            encoder.set_color(png::ColorType::Rgb);
+            encoder.set_depth(png::BitDepth::Sixteen);
+            match codes {
+                Codes::Linear16 => encoder.set_source_gamma(png::ScaledFloat::new(1.0)),
+                _ => encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric),
+            }
+            let mut writer = encoder.write_header().map_err(io::Error::other)?;
+            writer.write_image_data(&bytes).map_err(io::Error::other)?;
+            writer.finish().map_err(io::Error::other)
+        })
+    }
+
+    /// Linear RGB of each pixel as it is shown.
+    fn developed(&self, development: &Development) -> Vec<[f32; 3]> {
+        let shown = development.shown(self.automatic_exposure);
         let mut linear: Vec<[f32; 3]> = self.radiance.par_iter().map(|&r| shown(r)).collect();
         // Tone-mapped before they are averaged: otherwise one sample of a lamp dominates its pixel,
         // and the lamp's edge is jagged.
         for (place, samples) in &self.contrasts {
-            linear[*place as usize] = mean(&samples.map(shown));
+            linear[*place as usize] = mean(&samples.map(&shown));
         }
+        linear
+    }
+
+    /// 8-bit sRGB codes, `[row][column][channel]`.
+    pub(crate) fn srgb_codes(&self, development: impl Into<Development>) -> Vec<u8> {
+        let linear = self.developed(&development.into());
         let width = self.width as usize;
         let mut codes = vec![0; 3 * linear.len()];
         codes

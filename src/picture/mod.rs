@@ -1,11 +1,13 @@
 //! Pictures in linear light, of every renderer: their views, their files and their tones.
 
+mod develop;
 mod file;
 mod projection;
 pub mod tone;
 
 use rayon::prelude::*;
 
+pub use develop::{Codes, Development, Tone};
 pub use file::{FileKind, Picture, SAMPLES};
 pub(crate) use file::{Samples, automatic_exposure, exposure_by_area, mean, write_png};
 pub(crate) use projection::{NEAR, Projection, Tile};

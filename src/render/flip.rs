@@ -103,7 +103,7 @@ impl Flip {
                 let codes: Vec<u8> = self.error.iter().flat_map(|&e| magma(e)).collect();
                 write_png(path, size, &codes)
             }
-            FileKind::Exr => {
+            FileKind::Exr | FileKind::Hdr => {
                 let grey: Vec<_> = self.error.iter().map(|&e| [e; 3]).collect();
                 let metered = vec![true; grey.len()];
                 Picture::new(size, grey, &metered).write(path, None)

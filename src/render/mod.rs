@@ -40,7 +40,9 @@ pub(crate) use textures::upload as upload_texture;
 
 use crate::error::Result;
 pub use crate::mesh::corners::{Joined, corner_irradiance};
-pub use crate::picture::{FileKind, Light, MOST_PIXELS, Picture, SAMPLES, View, tone};
+pub use crate::picture::{
+    Codes, Development, FileKind, Light, MOST_PIXELS, Picture, SAMPLES, Tone, View, tone,
+};
 use crate::scene::Scene;
 use crate::vk::Device;
 

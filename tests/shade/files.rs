@@ -1,7 +1,7 @@
 //! The files that a picture is written to, and the ones that it is not.
 
 use glam::{DVec3, Vec3};
-use mesolux::render::{MOST_PIXELS, render};
+use mesolux::render::{Codes, Development, MOST_PIXELS, Picture, render, tone};
 use mesolux::scene::Scene;
 
 use super::{
@@ -70,6 +70,62 @@ fn a_grey_card_has_the_code_of_the_formulas() {
         (mean - exact).abs() < 1.0 / 64.0 + 1e-3,
         "{mean} instead of {exact}"
     );
+    no_messages();
+}
+
+/// 16 bits hold what 8 bits round, linear codes are those before sRGB and say so, and Radiance's RGBE
+/// holds the radiance to a part in 256.
+#[test]
+fn deep_and_linear_files_hold_the_same_picture() {
+    let (scene, camera) = (asymmetric(), camera(DVec3::ZERO));
+    let picture = draw(&scene, &view(&camera, 61, 47));
+    let dir = tempfile::tempdir().expect("a folder");
+    let written = |name: &str, codes: Codes| {
+        let path = dir.path().join(name);
+        let development = Development {
+            codes,
+            ..Development::default()
+        };
+        picture.write(&path, development).expect("written");
+        path
+    };
+    let shallow = written("8.png", Codes::Srgb8);
+    let shallow = image::open(&shallow).expect("a PNG").into_rgb8();
+    let open = |name: &str, codes: Codes| match image::open(written(name, codes)) {
+        Ok(image::DynamicImage::ImageRgb16(deep)) => deep,
+        other => panic!("{other:?}"),
+    };
+    let deep = open("16.png", Codes::Srgb16);
+    let linear = open("linear.png", Codes::Linear16);
+    for ((one, two), three) in shallow.pixels().zip(deep.pixels()).zip(linear.pixels()) {
+        for c in 0..3 {
+            let wide = f32::from(two.0[c]);
+            // With half a code of dither.
+            assert!((f32::from(one.0[c]) - wide / 257.0).abs() <= 1.0);
+            let coded = tone::coded(f32::from(three.0[c]) / 65535.0);
+            assert!((65535.0 * coded - wide).abs() <= 8.0, "{coded} {wide}");
+        }
+    }
+    let info = |name: &str| {
+        let file = std::fs::File::open(dir.path().join(name)).expect("a PNG");
+        let reader = png::Decoder::new(std::io::BufReader::new(file)).read_info();
+        let reader = reader.expect("a PNG");
+        (
+            reader.info().gamma().map(|g| g.into_value()),
+            reader.info().srgb,
+        )
+    };
+    assert_eq!(info("linear.png"), (Some(1.0), None));
+    assert!(info("16.png").1.is_some());
+
+    let hdr = written("picture.hdr", Codes::Srgb8);
+    let read = Picture::read(&hdr).expect("an HDR");
+    for (one, other) in picture.radiance.iter().zip(&read.radiance) {
+        let most = one.iter().fold(0.0_f32, |most, &c| most.max(c));
+        for c in 0..3 {
+            assert!((one[c] - other[c]).abs() <= most / 128.0);
+        }
+    }
     no_messages();
 }
 
