@@ -58,10 +58,12 @@ pub(crate) fn automatic_exposure(metered: &mut [f32]) -> f32 {
 }
 
 /// Share of a surface that is darker than what the exposure is for.
+#[cfg(any(feature = "export", feature = "window"))]
 const METERED_SHARE: f64 = 0.9;
 
 /// The exposure, as a power of two, for surfaces of these luminances and areas: as for the pixels of
 /// a picture that shows each by its area.
+#[cfg(any(feature = "export", feature = "window"))]
 pub(crate) fn exposure_by_area(surfaces: impl Iterator<Item = (f32, f64)>) -> f32 {
     // What no light reaches, backs of walls most of all, is not exposed for.
     let mut lit: Vec<_> = surfaces.filter(|(luminance, _)| *luminance > 0.0).collect();

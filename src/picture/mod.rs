@@ -8,8 +8,10 @@ pub mod tone;
 use rayon::prelude::*;
 
 pub use develop::{Codes, Development, Tone};
+#[cfg(any(feature = "export", feature = "window"))]
+pub(crate) use file::exposure_by_area;
 pub use file::{FileKind, Picture, SAMPLES};
-pub(crate) use file::{Samples, automatic_exposure, exposure_by_area, mean, write_png};
+pub(crate) use file::{Samples, automatic_exposure, mean, write_png};
 pub(crate) use projection::{NEAR, Projection, Tile};
 
 use crate::error::{Error, Result};

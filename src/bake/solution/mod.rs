@@ -16,6 +16,7 @@ use crate::scene::{OnInput, Scene};
 use crate::solver::{BY_PAPER, Light, ReliefLight, Report};
 pub use origin::Origin;
 pub use read::{About, Bake};
+#[cfg(feature = "export")]
 pub(crate) use write::write_tensors;
 pub use write::{Dtype, Tensor, VERSION};
 

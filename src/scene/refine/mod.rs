@@ -14,7 +14,9 @@ use std::collections::HashMap;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{Scene, Triangle, meshes};
+#[cfg(feature = "export")]
+use super::meshes;
+use super::{Scene, Triangle};
 use cutting::{Cutting, length, longest};
 use glow::Glow;
 use shadows::Shadows;
@@ -146,6 +148,7 @@ impl Scene {
 
     /// The same scene with its triangles in the order of those of the input, and their meshes by
     /// these, and where each lies in the input.
+    #[cfg(feature = "export")]
     pub(crate) fn in_order_of_input(&self) -> (Self, Vec<OnInput>) {
         let of_input = self.on_input();
         let mut order: Vec<usize> = (0..self.triangles.len()).collect();
