@@ -2,7 +2,7 @@
 """Bakes the light map of a scene with Blender's Cycles, and compares ours to it.
 
     mesolux export SCENE --glb room.glb --light-map light.exr
-    python3 scripts/beside-cycles room.glb light.exr [SAMPLES]
+    python3 tests/peers/cycles_light_map.py room.glb light.exr [SAMPLES]
 
 Needs a Python that Blender's package `bpy` is for, and one page. Cycles bakes direct and indirect
 light twice, with different seeds, up to 64 reflections, without a denoiser: what the two differ by
