@@ -141,6 +141,7 @@ impl Relief {
                 shadow_triangles: &lights.triangles,
                 parallel_lights: &buffers.parallel_lights,
                 webs: &lights.webs,
+                light_polygons: &lights.polygons,
             },
         )
     }
