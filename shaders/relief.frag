@@ -39,7 +39,6 @@ layout(scalar, binding = 10) readonly buffer Triangles { ShadowTriangle shadow_t
 // By prism, where it is lit so.
 layout(scalar, binding = 11) readonly buffer ParallelLights { ParallelLight parallel_lights[]; };
 layout(scalar, binding = 12) readonly buffer Webs { float webs[]; };
-layout(scalar, binding = 13) readonly buffer Polygons { LightPolygon light_polygons[]; };
 
 layout(push_constant, scalar) uniform Parameters {
     vec3 x;
@@ -51,7 +50,6 @@ layout(push_constant, scalar) uniform Parameters {
     float metered;
     uint light_count;    // of light_points; those of emitters come first
     uint emitter_points;
-    uint polygon_count;  // 0: emitters shine by their points alone
     uint shading;
     uint view;
     float pixel;         // angle of a sample
@@ -62,7 +60,6 @@ uint march_steps = 0;
 #define ALL_STEPS march_steps
 #include "shared/height_march.glsl"
 #include "shared/light_points.glsl"
-#include "shared/light_polygons.glsl"
 #include "shared/shadow_rays.glsl"
 
 const float PI = 3.14159265358979;
@@ -174,9 +171,7 @@ vec3 sharp(Prism p, ReliefSurface surface, Place place, vec3 at) {
     }
     vec3 facet = facet_normal(place);
     Base base = base_of(p, surface, place);
-    vec3 seen = vec3(0.0);      // of the points of emitters
-    vec3 of_all = vec3(0.0);
-    vec3 points = vec3(0.0);    // of point lights
+    vec3 sum = vec3(0.0);
     for (uint i = 0; i < samples; i++) {
         LightPoint light = light_of_sample(i);
         vec3 way = light.position - at;
@@ -186,22 +181,13 @@ vec3 sharp(Prism p, ReliefSurface surface, Place place, vec3 at) {
         if (arrives <= 0.0) {
             continue;
         }
-        vec3 whole = light.strength * arrives;
         float leaves;
-        bool open = !shadowed_by_relief(p, surface, place, base, towards, leaves)
-                    && !blocked(at, end_of_way(light), leaves * inversesqrt(square));
-        vec3 arrived = open ? whole : vec3(0.0);
-        if (i < emitter_samples()) {
-            of_all += whole;
-            seen += arrived;
-        } else {
-            points += arrived;
+        if (!shadowed_by_relief(p, surface, place, base, towards, leaves)
+            && !blocked(at, end_of_way(light), leaves * inversesqrt(square))) {
+            sum += light.strength * arrives;
         }
     }
-    if (polygon_count > 0 && seen != vec3(0.0)) {
-        seen = shadowed(unshadowed(at, facet), seen, of_all);
-    }
-    return seen + points;
+    return sum;
 }
 
 #include "shared/clusters.glsl"

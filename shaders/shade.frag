@@ -20,7 +20,6 @@ layout(scalar, binding = 3) readonly buffer Triangles { ShadowTriangle shadow_tr
 // [drawn triangle]
 layout(scalar, binding = 4) readonly buffer LitTriangles { LitTriangle lit_triangles[]; };
 layout(scalar, binding = 5) readonly buffer Webs { float webs[]; };
-layout(scalar, binding = 6) readonly buffer Polygons { LightPolygon light_polygons[]; };
 
 layout(push_constant, scalar) uniform Parameters {
     vec3 x;
@@ -32,11 +31,9 @@ layout(push_constant, scalar) uniform Parameters {
     float metered;
     uint light_count;      // of light_points; those of emitters come first
     uint emitter_points;
-    uint polygon_count;    // 0: emitters shine by their points alone
 };
 
 #include "shared/light_points.glsl"
-#include "shared/light_polygons.glsl"
 #include "shared/shadow_rays.glsl"
 
 const float PI = 3.14159265358979;
@@ -56,35 +53,19 @@ vec3 straight() {
     // where light grazes.
     vec3 from = at + t.above * t.plane + lift(at, t.a, t.normal_a, share.x) + lift(at, t.b, t.normal_b, share.y)
               + lift(at, t.c, t.normal_c, share.z);
-    vec3 exact = unshadowed(at, normal);
-    vec3 seen = vec3(0.0);      // of the points of emitters
-    vec3 of_all = vec3(0.0);
-    vec3 points = vec3(0.0);    // of point lights
-    uint emitters = emitter_samples();
+    vec3 sum = vec3(0.0);
     uint samples = light_samples();
-    // Where nothing stands between, points of emitters are not asked.
-    for (uint i = t.open == 1 && polygon_count > 0 ? emitters : 0; i < samples; i++) {
+    for (uint i = 0; i < samples; i++) {
         LightPoint light = light_of_sample(i);
         vec3 way = light.position - at;
         float square = dot(way, way);
         vec3 towards = way * inversesqrt(square);
         float arrives = arriving(light, towards, dot(normal, towards), square);
-        if (arrives <= 0.0) {
-            continue;
-        }
-        vec3 whole = light.strength * arrives;
-        vec3 open = t.open == 1 || !blocked(from, end_of_way(light), 0.0) ? whole : vec3(0.0);
-        if (i < emitters) {
-            of_all += whole;
-            seen += open;
-        } else {
-            points += open;
+        if (arrives > 0.0 && (t.open == 1 || !blocked(from, end_of_way(light), 0.0))) {
+            sum += light.strength * arrives;
         }
     }
-    if (polygon_count > 0) {
-        seen = t.open == 1 ? exact : shadowed(exact, seen, of_all);
-    }
-    return seen + points;
+    return sum;
 }
 
 void main() {

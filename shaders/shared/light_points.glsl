@@ -6,33 +6,20 @@
 // coordinates and their interpolation round by a few 2^-24 of it.
 const float ABOVE = 3.8e-6;
 
-// Of one sample: points of emitters, and all.
-uint emitter_samples() {
-    return emitter_points / (LIGHT_SETS * LIGHT_TURNS);
-}
-
+// Of one sample.
 uint light_samples() {
-    return emitter_samples() + (light_count - emitter_points);
-}
-
-// Well mixed (Wellons 2018, "lowbias32").
-uint mixed(uint x) {
-    x = (x ^ (x >> 16)) * 0x21f0aaadu;
-    x = (x ^ (x >> 15)) * 0xd35a2d97u;
-    return x ^ (x >> 15);
+    return emitter_points / (LIGHT_SETS * LIGHT_TURNS) + (light_count - emitter_points);
 }
 
 LightPoint light_of_sample(uint i) {
-    if (i >= emitter_samples()) {
-        return light_points[emitter_points + i - emitter_samples()];
+    uint emitters = emitter_points / (LIGHT_SETS * LIGHT_TURNS);
+    if (i >= emitters) {
+        return light_points[emitter_points + i - emitters];
     }
     uvec2 at = uvec2(gl_FragCoord.xy);
-    // Points LIGHT_TURNS apart are close together on an emitter: those of a sample are taken from
-    // other quarters of it, so that each sample sees of all of it.
-    uint turn = (at.y % 4 * 4 + at.x % 4) ^ i;
-    // Any set for a pixel: in turns, they would show as a lattice.
-    uint set = mixed(mixed(at.x / 4) + at.y / 4) % LIGHT_SETS;
-    return light_points[set * LIGHT_POINTS + i * LIGHT_TURNS + turn];
+    uvec2 turn = at % 4;
+    uvec2 pixel_at = at / 4 % 4;
+    return light_points[(pixel_at.y * 4 + pixel_at.x) * LIGHT_POINTS + i * LIGHT_TURNS + turn.y * 4 + turn.x];
 }
 
 // Share of a beam's intensity in a direction from it, linear in both angles.

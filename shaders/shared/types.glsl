@@ -228,17 +228,6 @@ struct LightPoint {
     uint columns;
 };
 
-// An emitter whose light is found in closed form: a convex polygon, of a triangle with its last
-// corner twice; or a sun.
-struct LightPolygon {
-    vec3 a;             // corners from the eye, internal units; of a sun the direction to it
-    vec3 b;
-    vec3 c;
-    vec3 d;
-    vec3 strength;      // πLe, or irradiance of what faces the sun
-    uint far;           // 1 for a sun
-};
-
 // A relief as it is drawn.
 struct ReliefSurface {
     float lowest;       // of the prisms, in the map's heights

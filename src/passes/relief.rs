@@ -141,7 +141,6 @@ impl Relief {
                 shadow_triangles: &lights.triangles,
                 parallel_lights: &buffers.parallel_lights,
                 webs: &lights.webs,
-                light_polygons: &lights.polygons,
             },
         )
     }

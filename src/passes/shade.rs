@@ -8,7 +8,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 
 use super::shaders::shade::{Bindings, SHADER};
-use super::shadow_rays::{LightBuffers, LightCounts};
+use super::shadow_rays::LightBuffers;
 use crate::error::Result;
 use crate::vk::{
     Attachment, Buffer, BufferUse, Commands, DescriptorSet, Device, Format, Framebuffer,
@@ -36,12 +36,11 @@ pub struct Vertex {
 pub use super::shaders::shade::Parameters;
 
 impl Parameters {
-    /// The same, lit straight by so many lights.
-    pub fn lit_by(self, counts: LightCounts) -> Self {
+    /// The same, lit straight by so many light points, of which so many are of emitters.
+    pub fn lit_by(self, [light_count, emitter_points]: [u32; 2]) -> Self {
         Self {
-            light_count: counts.points,
-            emitter_points: counts.of_emitters,
-            polygon_count: counts.polygons,
+            light_count,
+            emitter_points,
             ..self
         }
     }
@@ -151,7 +150,6 @@ impl Shade {
                 shadow_triangles: &lights.triangles,
                 lit_triangles: lit,
                 webs: &lights.webs,
-                light_polygons: &lights.polygons,
             },
         )
     }

@@ -15,7 +15,6 @@ use crate::error::Result;
 use crate::mesh::corners::Corners;
 use crate::passes::buffers::upload;
 use crate::passes::shade::{Draw, Parameters, Vertex};
-use crate::passes::shadow_rays::LightCounts;
 use crate::passes::types::LitTriangle;
 use crate::picture::{NEAR, Projection, Tile};
 use crate::scene::{Material, Scene};
@@ -161,13 +160,13 @@ impl Mesh {
         })
     }
 
-    /// Draws of one tile, lit straight by so many lights.
+    /// Draws of one tile. `lights` counts light points as [`Parameters::lit_by`] does.
     pub fn draws<'a>(
         &'a self,
         seen: &SeenScene<'a>,
         tile: Tile,
         textures: &'a Bound,
-        lights: LightCounts,
+        lights: [u32; 2],
     ) -> impl Iterator<Item = Draw<'a>> {
         let rows = seen.projection.rows(tile);
         let (scene, part) = (seen.scene, seen.lighting.part);
@@ -263,7 +262,6 @@ pub fn parameters([x, y, w]: [Vec3; 3], material: Option<&Material>, part: Light
         metered,
         light_count: 0,
         emitter_points: 0,
-        polygon_count: 0,
     }
 }
 

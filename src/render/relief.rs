@@ -10,7 +10,7 @@ use super::seen_scene::SeenScene;
 use super::textures::Textures;
 use crate::error::Result;
 use crate::passes;
-use crate::passes::shadow_rays::{LightBuffers, LightCounts};
+use crate::passes::shadow_rays::LightBuffers;
 use crate::picture::Tile;
 use crate::vk::{Commands, DescriptorSet, Device, Sampler};
 
@@ -64,7 +64,7 @@ impl Relief {
         let counts = if seen.lighting.shading == ReliefShading::Factored {
             lights.counts
         } else {
-            LightCounts::default()
+            [0; 2]
         };
         let draws = self.mesh.ranges.iter().zip(&self.sets);
         let draws = draws.map(|(range, set)| {
@@ -84,7 +84,6 @@ impl Relief {
                     metered: shade.metered,
                     light_count: shade.light_count,
                     emitter_points: shade.emitter_points,
-                    polygon_count: shade.polygon_count,
                     shading: self.shading,
                     view: seen.lighting.show.code(),
                     pixel: seen.projection.sample_angle(seen.samples),
