@@ -305,8 +305,8 @@ fn bad_names_and_outputs() {
     assert!(String::from_utf8_lossy(&run.stderr).contains("Vulkan"));
 }
 
-/// The lamp of the Cornell box is yellow: by its white the back wall is nearly grey, and with 16 bits
-/// as with 8.
+/// The lamp of the Cornell box is yellow: by its white the back wall is nearly grey, and with 16
+/// bits as with 8.
 #[test]
 fn a_white_wall_is_shown_white() {
     let folder = tempfile::tempdir().expect("a folder for the test");

@@ -9,22 +9,24 @@ use mesolux::render::{Codes, Development, Tone};
 use mesolux::scene::Scene;
 
 #[derive(Args)]
-#[command(next_help_heading = "PNG")]
 pub struct DevelopOptions {
     /// Multiplies the light by 2^EV; found from the picture if not given
-    #[arg(long, value_name = "EV", allow_hyphen_values = true)]
+    #[arg(long, value_name = "EV", allow_hyphen_values = true, help_heading = PNG)]
     exposure: Option<f32>,
     /// Light in which a white surface is shown white: linear RGB, or `lamps`, the mean direct light
     /// on the surfaces [default: that of sRGB, so that yellow lamps make white walls yellow]
-    #[arg(long, value_name = "lamps|R,G,B", value_parser = white)]
+    #[arg(long, value_name = "lamps|R,G,B", value_parser = white, help_heading = PNG)]
     white: Option<White>,
     /// What becomes of light that is too bright
-    #[arg(long, value_enum, default_value_t = ToneName::Neutral)]
+    #[arg(long, value_enum, default_value_t = ToneName::Neutral, help_heading = PNG)]
     tone: ToneName,
     /// Bits and coding
-    #[arg(long, value_enum, default_value_t = CodesName::Srgb8)]
+    #[arg(long, value_enum, default_value_t = CodesName::Srgb8, help_heading = PNG)]
     png: CodesName,
 }
+
+/// A heading for each option: one for all would stand above those of later structs, too.
+const PNG: &str = "PNG";
 
 #[derive(Debug, Clone, Copy)]
 enum White {
@@ -73,13 +75,7 @@ impl DevelopOptions {
     /// # Errors
     /// An exposure out of range; `--white lamps` without a bake.
     pub fn check(&self, has_bake: bool) -> Result<()> {
-        if let Some(ev) = self.exposure
-            && !(-64.0..=64.0).contains(&ev)
-        {
-            return Err(Error::Usage(format!(
-                "--exposure {ev}: must be in -64 to 64"
-            )));
-        }
+        check_exposure(self.exposure)?;
         if !has_bake && matches!(self.white, Some(White::Lamps)) {
             let what = "--white lamps needs the light of a bake: give --white R,G,B";
             return Err(Error::Usage(what.into()));
@@ -109,6 +105,17 @@ impl DevelopOptions {
     }
 }
 
+/// # Errors
+/// An exposure out of range.
+pub fn check_exposure(exposure: Option<f32>) -> Result<()> {
+    match exposure.filter(|ev| !(-64.0..=64.0).contains(ev)) {
+        None => Ok(()),
+        Some(ev) => Err(Error::Usage(format!(
+            "--exposure {ev}: must be in -64 to 64"
+        ))),
+    }
+}
+
 /// Mean direct light over the surfaces; of a scene that only a sky lights, all light.
 fn lamps(scene: &Scene, bake: &Bake) -> Option<[f32; 3]> {
     let mean = |irradiance: &[Vec3]| {
@@ -121,5 +128,9 @@ fn lamps(scene: &Scene, bake: &Bake) -> Option<[f32; 3]> {
         (sum / sum.max_element()).as_vec3().to_array()
     };
     let found = [&bake.irradiance_direct, &bake.irradiance].map(|light| mean(light));
-    found.into_iter().find(|&rgb| is_colour(rgb))
+    let lamps = found.into_iter().find(|&rgb| is_colour(rgb));
+    if lamps.is_none() {
+        tracing::warn!("--white lamps: the scene is dark, and its white stays as it is");
+    }
+    lamps
 }

@@ -9,6 +9,7 @@ use glam::DVec3;
 use super::bake::{SolveOptions, writable};
 use super::bake_scene::BakeScene;
 use super::baked::Wanted;
+use super::develop::check_exposure;
 use super::progress::{Bar, catch_interrupts, interrupted};
 use super::{Builtin, DeviceOptions};
 use mesolux::bake::lit_scene::LitScene;
@@ -43,7 +44,7 @@ pub struct Options {
     sensors: SensorOptions,
     #[command(flatten)]
     probes: ProbeOptions,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Baking")]
     bake_scene: BakeScene,
     #[command(flatten)]
     solve: SolveOptions,
@@ -180,10 +181,7 @@ impl MapOptions {
             }
             writable(path)?;
         }
-        if let Some(ev) = self.exposure.filter(|ev| !(-64.0..=64.0).contains(ev)) {
-            let what = format!("--exposure {ev}: must be in -64 to 64");
-            return Err(Error::Usage(what));
-        }
+        check_exposure(self.exposure)?;
         if !PAGES.contains(&self.page) {
             return Err(Error::Usage(format!(
                 "--page {}: must be in {} to {}",
@@ -349,9 +347,8 @@ fn grid(text: &str) -> std::result::Result<SensorGrid, String> {
 #[derive(Args)]
 #[command(next_help_heading = "Probes")]
 struct ProbeOptions {
-    /// Write light at probes: irradiance in spherical harmonics of the second degree, and distances
-    /// by direction, by which light between probes does not come through walls; may be given
-    /// several times
+    /// Write light at probes: irradiance in spherical harmonics of the second degree, and the walls
+    /// about each, through which light between probes does not come; may be given several times
     #[arg(long, value_name = "OUT.json|.safetensors")]
     probes: Vec<PathBuf>,
     /// Probes along x, y and z in the box about the scene

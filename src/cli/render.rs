@@ -22,8 +22,8 @@ use mesolux::vk::Device;
 
 /// Draw a scene or a bake to a picture
 ///
-/// A PNG is exposed and tone-mapped; an EXR or HDR holds linear radiance. A SCENE is baked first, with the
-/// options of `bake`, and the bake is kept for the next time; or it is path traced with
+/// A PNG is exposed and tone-mapped; an EXR or HDR holds linear radiance. A SCENE is baked first,
+/// with the options of `bake`, and the bake is kept for the next time; or it is path traced with
 /// --reference.
 #[derive(Args)]
 pub struct Options {

@@ -13,6 +13,7 @@ use super::surface::Surface;
 use super::texels::quarters;
 use super::vertex_light::VertexLight;
 use crate::error::{Error, Result};
+use crate::mesh::sources::triangle_area;
 use crate::picture::tone::luminance;
 use crate::picture::{Development, Picture, exposure_by_area};
 
@@ -116,9 +117,8 @@ pub fn corners(light: &VertexLight, part: Part, exposure: Option<f32>) -> Corner
     let exposure = exposure.unwrap_or_else(|| {
         let dark = (irradiance.iter().enumerate()).filter_map(|(t, [a, b, c])| {
             let triangle = &scene.triangles[t];
-            let [p, q, r] = scene.corners(triangle);
             let mean = reflected(t, (a + b + c) / 3.0).to_array();
-            let area = 0.5 * (q - p).cross(r - p).length();
+            let area = triangle_area(scene.corners(triangle));
             let emits = scene.materials[triangle.material as usize].emits();
             (!emits).then(|| (luminance(mean), area))
         });

@@ -44,8 +44,8 @@ pub const EXTRAS: &str = "mesolux";
 /// Writes a scene; returns what of it glTF cannot hold, one sentence each.
 ///
 /// Triangles keep their order, but for those of a mesh with many materials. Light maps hold
-/// irradiance in 8-bit sRGB times the extension's `intensity`; `TEXCOORD_1` says where. Vertices have
-/// their irradiance, W·m⁻², as `_IRRADIANCE` beside their colours. A height
+/// irradiance in 8-bit sRGB times the extension's `intensity`; `TEXCOORD_1` says where. Vertices
+/// have their irradiance, W·m⁻², as `_IRRADIANCE` beside their colours. A height
 /// map is in the extras of its material: `mesolux.heightTexture` and `mesolux.heightScale`.
 ///
 /// # Errors

@@ -7,6 +7,7 @@ use super::charts::Charts;
 use super::surface::{Pages, Texels};
 use super::texels::{NOTHING, REACH, nearest, texels_about};
 use crate::math::groups::{Groups, edges, shared};
+use crate::mesh::sources::triangle_area;
 use crate::scene::Scene;
 
 /// What there is of a scene's own charts.
@@ -17,9 +18,6 @@ pub(super) enum Own {
     /// They cannot, and why.
     Unfit(String),
 }
-
-/// Largest page.
-const MOST: f64 = 8192.0;
 
 /// Barycentric coordinates of a place within a triangle, not on its edge, are larger.
 const WITHIN: f64 = 1e-4;
@@ -45,17 +43,13 @@ pub(super) fn own_charts(scene: &Scene, texels: Texels) -> Own {
     }
     let covered = |[a, b, c]: &[DVec2; 3]| 0.5 * (b - a).perp_dot(c - a).abs();
     let used: f64 = uv.iter().map(covered).sum();
-    let area = |t| {
-        let [a, b, c] = scene.corners(t);
-        0.5 * (b - a).cross(c - a).length()
-    };
-    let area: f64 = all.iter().map(area).sum();
+    let area: f64 = (all.iter()).map(|t| triangle_area(scene.corners(t))).sum();
     let per_unit = (used / area).sqrt();
     let size = match texels {
         Texels::Page(size) => size,
         Texels::PerUnit { count, page } => {
             let size = (count / per_unit / 4.0).ceil() * 4.0;
-            if size.is_nan() || size > MOST.min(f64::from(page)) {
+            if size.is_nan() || size > f64::from(page) {
                 return Own::Unfit(format!("they would need a page of {size}²"));
             }
             size as u32

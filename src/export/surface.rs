@@ -65,8 +65,8 @@ pub struct Pages {
 }
 
 impl Surface {
-    /// Lays out the scene that `scene` was cut from: where [`Triangle::light_uv`] says, if that gives
-    /// each triangle a place of its own. `go_on` returning false stops.
+    /// Lays out the scene that `scene` was cut from: where [`Triangle::light_uv`] says, if that
+    /// gives each triangle a place of its own. `go_on` returning false stops.
     ///
     /// [`Triangle::light_uv`]: crate::scene::Triangle::light_uv
     ///
@@ -78,7 +78,7 @@ impl Surface {
         go_on: impl Fn() -> bool + Sync,
     ) -> Result<Self> {
         let scene = scene.uncut();
-        let normals = smooth_normals(&scene, &Corners::new(&scene));
+        let normals = smooth_normals(&scene);
         let Charts {
             uv,
             page,
@@ -98,10 +98,10 @@ impl Surface {
     }
 
     /// A scene as it is: no triangle of it lies on a page.
-    pub(super) fn without_charts(scene: Scene) -> Self {
+    pub(super) fn without_charts(scene: Scene, normals: Vec<[DVec3; 3]>) -> Self {
         let count = scene.triangles.len();
         Self {
-            normals: smooth_normals(&scene, &Corners::new(&scene)),
+            normals,
             uv: vec![[DVec2::ZERO; 3]; count],
             page: vec![None; count],
             chart: vec![u32::MAX; count],
@@ -152,7 +152,8 @@ impl Surface {
 }
 
 /// Normals at the corners, `[triangle][corner]`.
-fn smooth_normals(scene: &Scene, corners: &Corners) -> Vec<[DVec3; 3]> {
+pub(super) fn smooth_normals(scene: &Scene) -> Vec<[DVec3; 3]> {
+    let corners = Corners::new(scene);
     let triangles = scene.triangles.iter().enumerate();
     triangles
         .map(|(e, triangle)| {

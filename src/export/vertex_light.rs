@@ -1,5 +1,5 @@
-//! Light at the vertices of a scene as it was cut: linear between them, in the least squares nearest
-//! to the light of the surface (Kavan, Bargteil and Sloan, "Least squares vertex baking", EGSR
+//! Light at the vertices of a scene as it was cut: linear between them, in the least squares
+//! nearest to the light of the surface (Kavan, Bargteil and Sloan, "Least squares vertex baking", EGSR
 //! 2011).
 
 use glam::{DVec3, Vec3};
@@ -7,9 +7,10 @@ use rayon::prelude::*;
 
 use super::lattice::too_early;
 use super::light_map::Looking;
-use super::surface::Surface;
+use super::surface::{Surface, smooth_normals};
 use crate::error::Result;
 use crate::math::groups::{Groups, edges, shared};
+use crate::mesh::sources::triangle_area;
 use crate::scene::{OnInput, Scene};
 use crate::solver::{LightAt, Lit, Place};
 
@@ -57,7 +58,9 @@ impl VertexLight {
     /// # Errors
     /// Stopped.
     pub fn new(scene: &Scene, lit: &Lit<'_>, go_on: &dyn Fn(usize) -> bool) -> Result<Self> {
-        let whole = Surface::without_charts(scene.uncut());
+        let whole = scene.uncut();
+        let normals = smooth_normals(&whole);
+        let whole = Surface::without_charts(whole, normals);
         let (cut, on_input) = scene.in_order_of_input();
         let surface = as_cut(cut, &whole, &on_input);
         let places: Vec<Place> = on_input
@@ -86,10 +89,8 @@ impl VertexLight {
             .map(|covered| if *covered { None } else { found.next() })
             .collect();
         let corners = joined(&surface);
-        let areas = surface.scene.triangles.iter().map(|t| {
-            let [a, b, c] = surface.scene.corners(t);
-            0.5 * (b - a).cross(c - a).length()
-        });
+        let scene = &surface.scene;
+        let areas = (scene.triangles.iter()).map(|t| triangle_area(scene.corners(t)));
         let masses = Masses::new(&corners, &areas.collect::<Vec<_>>(), &light);
         Ok(Self {
             light: masses.solve().iter().map(light_of).collect(),
@@ -117,22 +118,19 @@ fn light_of(value: &Value) -> LightAt {
 
 /// A scene as it was cut, with the normals of what it was cut from.
 fn as_cut(cut: Scene, whole: &Surface, on_input: &[OnInput]) -> Surface {
-    let mut surface = Surface::without_charts(cut);
-    for (normals, on) in surface.normals.iter_mut().zip(on_input) {
+    let normals = on_input.iter().map(|on| {
         let of_whole = whole.normals[on.triangle as usize];
-        for (k, normal) in normals.iter_mut().enumerate() {
-            let mut corner = [0.0; 3];
-            corner[k] = 1.0;
-            let weights = on.weights(corner);
+        on.corners.map(|[second, third]| {
+            let weights = [1.0 - second - third, second, third];
             let sum: DVec3 = (0..3).map(|i| weights[i] * of_whole[i]).sum();
-            *normal = sum.try_normalize().unwrap_or(*normal);
-        }
-    }
-    surface
+            sum.normalize_or(of_whole[0])
+        })
+    });
+    Surface::without_charts(cut, normals.collect())
 }
 
-/// A number for each corner, the same for those of a vertex that edges of a smooth surface join: not
-/// across edges at which more than two triangles meet, on which something stands.
+/// A number for each corner, the same for those of a vertex that edges of a smooth surface join:
+/// not across edges at which more than two triangles meet, on which something stands.
 fn joined(surface: &Surface) -> Vec<[u32; 3]> {
     let triangles = &surface.scene.triangles;
     let corner = |t: u32, vertex: u32| {
@@ -277,8 +275,8 @@ impl<'a> Masses<'a> {
 mod tests {
     use super::*;
 
-    /// A fan of triangles: light that is linear comes back as it was, also where it is known at some
-    /// places only; even light to rounding, also at vertices beside covered places alone.
+    /// A fan of triangles: light that is linear comes back as it was, also where it is known at
+    /// some places only; even light to rounding, also at vertices beside covered places alone.
     #[test]
     fn linear_light_comes_back() {
         let at = |k: u32| [0.3, 1.2, 2.0, 0.7, 5.0, 1.1].map(|v| v * f64::from(k));

@@ -61,8 +61,8 @@ pub(crate) fn automatic_exposure(metered: &mut [f32]) -> f32 {
 #[cfg(any(feature = "export", feature = "window"))]
 const METERED_SHARE: f64 = 0.9;
 
-/// The exposure, as a power of two, for surfaces of these luminances and areas: as for the pixels of
-/// a picture that shows each by its area.
+/// The exposure, as a power of two, for surfaces of these luminances and areas: as for the pixels
+/// of a picture that shows each by its area.
 #[cfg(any(feature = "export", feature = "window"))]
 pub(crate) fn exposure_by_area(surfaces: impl Iterator<Item = (f32, f64)>) -> f32 {
     // What no light reaches, backs of walls most of all, is not exposed for.
@@ -97,7 +97,8 @@ impl FileKind {
             Some("exr") => Ok(Self::Exr),
             Some("hdr") => Ok(Self::Hdr),
             _ => Err(Error::Usage(format!(
-                "picture {}: the name must end in .png (tone-mapped), .exr or .hdr (linear radiance)",
+                "picture {}: the name must end in .png (tone-mapped), .exr or .hdr (linear \
+                 radiance)",
                 path.display()
             ))),
         }

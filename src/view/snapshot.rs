@@ -134,8 +134,8 @@ pub fn is_done(stop: StopReason) -> bool {
     )
 }
 
-/// The exposure for what does not emit. It does not depend on the view: a window that orbits does not
-/// flicker.
+/// The exposure for what does not emit. It does not depend on the view: a window that orbits does
+/// not flicker.
 fn exposure(scene: &Scene, irradiance: &[Vec3], ambient: Vec3) -> f32 {
     let lit = scene
         .triangles

@@ -73,8 +73,8 @@ fn a_grey_card_has_the_code_of_the_formulas() {
     no_messages();
 }
 
-/// 16 bits hold what 8 bits round, linear codes are those before sRGB and say so, and Radiance's RGBE
-/// holds the radiance to a part in 256.
+/// 16 bits hold what 8 bits round, linear codes are those before sRGB and say so, and Radiance's
+/// RGBE holds the radiance to a part in 256.
 #[test]
 fn deep_and_linear_files_hold_the_same_picture() {
     let (scene, camera) = (asymmetric(), camera(DVec3::ZERO));

@@ -13,8 +13,8 @@ use crate::scene::MeshRange;
 /// Set of texture coordinates of emission that lies elsewhere than the other maps.
 pub const EMISSION_SET: u32 = 2;
 
-/// Attribute of the irradiance at vertices, W·m⁻², RGB. Names of attributes that are not glTF's begin
-/// so.
+/// Attribute of the irradiance at vertices, W·m⁻², RGB. Names of attributes that are not glTF's
+/// begin so.
 const IRRADIANCE: &str = "_IRRADIANCE";
 
 /// Runs of one material in a mesh, at most, before its triangles are sorted by material.

@@ -17,8 +17,9 @@ const HARMONICS: &str = "real, orthonormal: 00, 1-1, 10, 11, 2-2, 2-1, 20, 21, 2
                          E(n) = sum c Y(n), W/m2";
 
 /// What it says of its walls.
-const PLANES: &str = "[row][column][x, y, z, distance] over an octahedral map, x and y along its columns \
-                     and rows: a place p is seen if (p - position) . xyz <= distance, scene units";
+const PLANES: &str = "[row][column][x, y, z, distance] over an octahedral map, x and y along its \
+                      columns and rows: a place p is seen if (p - position) . xyz <= distance, \
+                      scene units";
 
 /// A kind of file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -77,7 +77,8 @@ impl Probes {
 /// of Radiance's points, is not used. Empty lines and those that begin with `#` are skipped.
 ///
 /// # Errors
-/// A file that cannot be read or has no point; a line that does not begin with three finite numbers.
+/// A file that cannot be read or has no point; a line that does not begin with three finite
+/// numbers.
 pub fn read_positions(path: &Path) -> Result<Vec<DVec3>> {
     let position = |row: Row<'_>| match row.numbers {
         [x, y, z, ..] => Ok(DVec3::new(*x, *y, *z)),

@@ -1,5 +1,5 @@
-//! What stands about a probe, by direction: light between probes is weighed by what they see, so that
-//! none comes through walls. Planes are kept, where distances would do in open space: of a wall seen
+//! What stands about a probe, by direction: light between probes is weighed by what they see, so
+//! that none comes through walls. Planes are kept, where distances would do in open space: of a wall seen
 //! aslant a texel holds many distances, and what is just behind it seems to be in front.
 
 use glam::{DVec2, DVec3};
@@ -67,8 +67,8 @@ impl Walls {
         }
     }
 
-    /// Whether what lies at `offset` from the place is seen, 0..=1: whether it is behind the plane of
-    /// none of the four texels about its direction, by more than `beyond`.
+    /// Whether what lies at `offset` from the place is seen, 0..=1: whether it is behind the plane
+    /// of none of the four texels about its direction, by more than `beyond`.
     pub fn sees(&self, offset: DVec3, beyond: f64) -> f64 {
         let Some(direction) = offset.try_normalize() else {
             return 1.0;
