@@ -21,15 +21,21 @@ pub struct Server {
     state: Arc<Mutex<Option<State>>>,
 }
 
-/// Reports the title, the button and the picture twice a second.
+/// Reports the title, the button and the picture, all of one moment, twice a second. A report
+/// starts when the one before has arrived, so that none overtakes another.
 const REPORT: &str = r#"<script>
-setInterval(() => {
+(async () => {
   const canvas = document.getElementById('view');
-  const box = document.querySelector('[data-part="indirect"]').getBoundingClientRect();
-  const at = [box.x + box.width / 2, box.y + box.height / 2].map(Math.round);
-  canvas.toBlob((png) => fetch('/state?' + at.join(',') + ',' + encodeURIComponent(document.title),
-    { method: 'POST', body: png }));
-}, 500);
+  const button = document.querySelector('[data-part="indirect"]');
+  for (;;) {
+    const box = button.getBoundingClientRect();
+    const at = [box.x + box.width / 2, box.y + box.height / 2].map(Math.round);
+    const about = at.join(',') + ',' + encodeURIComponent(document.title);
+    const png = await new Promise((done) => canvas.toBlob(done));
+    if (png) await fetch('/state?' + about, { method: 'POST', body: png }).catch(() => {});
+    await new Promise((done) => setTimeout(done, 500));
+  }
+})();
 </script>"#;
 
 impl Server {
