@@ -33,6 +33,8 @@ pub mod atomic_file;
 pub mod bake;
 #[cfg(feature = "cli")]
 pub mod bench;
+#[cfg(feature = "cli")]
+pub mod console;
 pub mod constants;
 pub mod error;
 #[cfg(feature = "export")]

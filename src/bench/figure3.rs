@@ -69,7 +69,7 @@ pub fn run(
         let parts: Vec<Picture> = parts.into_iter().collect::<Result<_>>()?;
         rows.push(Picture::side_by_side(&parts)?);
         let report = &solution.report;
-        println!(
+        crate::say!(
             "{}: {name}, {} elements, {} hemicubes, error bound {:.2} %, baked in {baked:.1} s, \
              drawn in {:.1} s",
             path.display(),

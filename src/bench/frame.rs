@@ -101,7 +101,7 @@ pub fn run(
             let first = rows.len();
             measure(device, scene, &solutions, &view, options, rows)?;
             for row in &rows[first..] {
-                println!("{}", line(row, &rows[first..]));
+                crate::say!("{}", line(row, &rows[first..]));
             }
         }
     }

@@ -61,18 +61,20 @@ pub fn run(device: &Arc<Device>, scene: &Scene, hemicube: u32, rounds: usize) ->
             }
         }
     }
-    println!(
+    crate::say!(
         "{}: {} elements, {} sources, hemicube {hemicube}, {}",
         scene.name,
         scene.triangles.len(),
         solvers[0].problem.sources.list.len(),
         device.name()
     );
-    println!("hemicubes a second      drawn (10 % to 90 %)         with form factors and keeping");
+    crate::say!(
+        "hemicubes a second      drawn (10 % to 90 %)         with form factors and keeping"
+    );
     for (i, (name, ..)) in BATCHES.iter().enumerate() {
         let (d, d10, d90) = spread(&mut draw[i]);
         let (w, w10, w90) = spread(&mut whole[i]);
-        println!("{name:<22}{d:>8.1} ({d10:.1} to {d90:.1}){w:>18.1} ({w10:.1} to {w90:.1})");
+        crate::say!("{name:<22}{d:>8.1} ({d10:.1} to {d90:.1}){w:>18.1} ({w10:.1} to {w90:.1})");
     }
     Ok(())
 }

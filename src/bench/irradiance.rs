@@ -73,7 +73,7 @@ impl Row {
     pub fn print(&self) {
         let Self { bake, places, .. } = self;
         let noise = 100.0 * self.noise;
-        println!(
+        crate::say!(
             "{}: {places} places without relief and emission, noise of a reference {noise:.2} %, taken off",
             bake.display()
         );
@@ -83,7 +83,7 @@ impl Row {
         ];
         for (at, m) in measured {
             let [low, high] = m.rms_interval.map(|rms| 100.0 * rms);
-            println!(
+            crate::say!(
                 "  {at}: rms {:.2} % ({low:.2} to {high:.2}), bias {:+.2} % ± {:.2} (95 %), {} % of the squared error in the worst 0.1 % of the area",
                 100.0 * m.rms,
                 100.0 * m.bias,

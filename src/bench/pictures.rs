@@ -133,7 +133,7 @@ pub fn run(
         },
         ..Settings::default()
     };
-    println!("{HEADER}");
+    crate::say!("{HEADER}");
     let mut rows = Vec::new();
     for case in CASES.iter().filter(|case| wanted(case.name)) {
         let scene = room(case);
@@ -177,7 +177,7 @@ pub fn run(
                     rms: found.rms,
                     flip: Flip::new(&picture, &reference.picture)?.mean(),
                 };
-                println!("{}", line(&row));
+                crate::say!("{}", line(&row));
                 rows.push(row);
                 let beside = side_by_side(&picture, &reference.picture)?;
                 beside.write(

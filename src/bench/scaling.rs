@@ -133,27 +133,27 @@ pub fn run(
     go_on: impl Fn() -> bool,
 ) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, e))?;
-    println!(
+    crate::say!(
         "{}; {} to an error bound of {} %, hemicube {}",
         device.name(),
         options.scene,
         100.0 * options.residual,
         options.hemicube
     );
-    println!("{HEADER}");
+    crate::say!("{HEADER}");
     let mut rows = Vec::new();
     for size in sizes(options.first, options.largest) {
         for &limit in &options.limits {
             let Some(row) = bake(device, options, size, limit, &go_on)? else {
                 return Ok(());
             };
-            println!("{}", line(&row));
+            crate::say!("{}", line(&row));
             rows.push(row);
             write(&rows, options, folder)?;
         }
     }
     for growth in growths(&rows, options) {
-        println!(
+        crate::say!(
             "{} over elements, {}: exponent {}",
             growth.quantity,
             limit_name(growth.max_elements),

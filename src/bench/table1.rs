@@ -85,12 +85,12 @@ pub fn run(
     }
     std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, e))?;
     let mut rows: Vec<Row> = Vec::new();
-    println!(
+    crate::say!(
         "{}; to an error bound of {} %",
         device.name(),
         100.0 * options.residual
     );
-    println!("{HEADER}");
+    crate::say!("{HEADER}");
     for (name, minutes, fps) in scenes {
         let builtin = LoadOptions {
             patches: options.patches,
@@ -120,7 +120,7 @@ pub fn run(
         let mut keep = |found: &[Done]| -> Result<()> {
             for done in found {
                 rows.push(done.row.clone());
-                println!("{}", line(&done.row, &rows[first..]));
+                crate::say!("{}", line(&done.row, &rows[first..]));
             }
             write(&rows, folder)
         };
@@ -145,7 +145,7 @@ pub fn run(
         keep(&low)?;
         let low_rows: Vec<Row> = low.iter().map(|done| done.row.clone()).collect();
         for ratio in ratios(&low_rows) {
-            println!("{ratio}");
+            crate::say!("{ratio}");
         }
         if options.high_poly && go_on() {
             let fine = displace(&scene)?;
@@ -162,7 +162,7 @@ pub fn run(
                 for (row, done) in rows[first..].iter_mut().zip(&low) {
                     let light = (&done.solution.irradiance[..], &high.solution.irradiance[..]);
                     let difference = Difference::new(&scene, &pairs, light);
-                    println!("{}", against_high_poly(row, &high.row, &difference));
+                    crate::say!("{}", against_high_poly(row, &high.row, &difference));
                     row.plain = Some(difference);
                 }
                 write(&rows, folder)?;

@@ -348,19 +348,24 @@ pub fn run(options: &Options) -> Result<()> {
     let solution = mesolux::bake::solution(&scene, &solver)?;
     refuse_darkness(&scene, &solution)?;
     options.device.check()?;
+    let origin = origin(&options.scene, &options.builtin, scene.input_hash());
+    let report = &solution.report;
+    let output = match report.stop {
+        StopReason::Interrupted => unfinished(&options.output),
+        _ => options.output.clone(),
+    };
+    let filled = options.solve.filled()?;
+    save_somewhere(&output, |path| solution.save(path, &origin, &filled))?;
     if options.keep_visibility {
-        let path = beside(&options.output);
+        let path = beside(&output);
         match solver.visibility(&scene)? {
             Some(visibility) => visibility.save(&path)?,
             None => tracing::warn!("no form factors are kept: --keep-visibility writes nothing"),
         }
     }
-    let origin = origin(&options.scene, &options.builtin, scene.input_hash());
-    solution.save(&options.output, &origin, &options.solve.filled()?)?;
-    let report = &solution.report;
     tracing::info!(
         "{}: {} elements, {} sources, {} hemicubes in {:.1} s; unshot {:.3} %, stopped by {:?}",
-        options.output.display(),
+        output.display(),
         report.elements,
         report.sources,
         report.hemicubes,
@@ -383,16 +388,57 @@ pub fn run(options: &Options) -> Result<()> {
         let printed = Printed {
             scene: &options.scene,
             scene_hash: &origin.hash,
-            output: &options.output,
+            output: &output,
             read_seconds,
             wall_seconds: start.elapsed().as_secs_f64(),
             peak_resident_bytes: peak_resident_bytes(),
             report,
         };
         let text = serde_json::to_string(&printed).map_err(|e| Error::Usage(e.to_string()))?;
-        println!("{text}");
+        mesolux::say!("{text}");
     }
     Ok(())
+}
+
+/// Where a bake goes that was stopped: not over a file that may be a whole one.
+fn unfinished(output: &Path) -> PathBuf {
+    if !output.is_file() {
+        return output.to_owned();
+    }
+    let stem = output.file_stem().unwrap_or_default();
+    let mut name = stem.to_owned();
+    name.push(".unfinished.safetensors");
+    let path = output.with_file_name(name);
+    tracing::warn!(
+        "{} is left as it is; what is solved goes to {}",
+        output.display(),
+        path.display()
+    );
+    path
+}
+
+/// Saves to `output`, or where that fails, after all the work, to the folder of temporary files.
+///
+/// # Errors
+/// That of the output, even where the other was written.
+fn save_somewhere(output: &Path, save: impl Fn(&Path) -> Result<()>) -> Result<()> {
+    let failed = match save(output) {
+        Ok(()) => return Ok(()),
+        Err(error) => error,
+    };
+    let folder = tempfile::Builder::new()
+        .prefix("mesolux-")
+        .disable_cleanup(true)
+        .tempdir();
+    let kept = folder.ok().and_then(|folder| {
+        let path = folder.path().join("bake.safetensors");
+        save(&path).ok().map(|()| path)
+    });
+    match kept {
+        Some(path) => tracing::warn!("the bake is kept as {}", path.display()),
+        None => tracing::warn!("nor is there room for the bake among temporary files"),
+    }
+    Err(failed)
 }
 
 /// Bakes with progress on stderr; Ctrl-C stops the bake and keeps what it has.

@@ -238,8 +238,8 @@ fn run_frame(options: &FrameOptions) -> Result<()> {
         shots: 1024,
         cache: cache.as_deref(),
     };
-    println!("{}", device.name());
-    println!("{}", frame::HEADER);
+    mesolux::say!("{}", device.name());
+    mesolux::say!("{}", frame::HEADER);
     let mut rows = Vec::new();
     for name in &scenes {
         let scene = options.builtin.load(name)?;

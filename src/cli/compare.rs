@@ -39,7 +39,7 @@ pub fn run(options: &Options) -> Result<()> {
     let reference = Picture::read(&options.reference)?;
     let found = Comparison::new(&ours, &reference)?;
     let flip = Flip::new(&ours, &reference)?;
-    println!(
+    mesolux::say!(
         "relMSE {:.3e}, bias {:+.2} %, rms {:.2} %, HDR-FLIP {:.4} (exposures {:+.2} to {:+.2})",
         found.rel_mse,
         100.0 * found.bias,

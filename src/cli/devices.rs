@@ -52,7 +52,7 @@ pub fn run(json: bool) -> Result<()> {
     let rows: Vec<_> = candidates.iter().map(Row::new).collect();
     if json {
         let text = serde_json::to_string(&rows).map_err(|e| Error::Usage(e.to_string()))?;
-        println!("{text}");
+        mesolux::say!("{text}");
         return Ok(());
     }
     if rows.is_empty() {
@@ -61,7 +61,7 @@ pub fn run(json: bool) -> Result<()> {
         ));
     }
     for row in rows {
-        println!(
+        mesolux::say!(
             "{}: {} ({}, {}, Vulkan {})",
             row.index,
             row.name,
@@ -69,7 +69,7 @@ pub fn run(json: bool) -> Result<()> {
             row.driver.trim(),
             row.vulkan
         );
-        println!(
+        mesolux::say!(
             "   memory {} MiB, storage buffers to {} MiB, images to {}², subgroups of {}",
             row.heap_bytes >> 20,
             row.max_storage_buffer_bytes >> 20,
@@ -77,9 +77,9 @@ pub fn run(json: bool) -> Result<()> {
             row.subgroup_size
         );
         if row.missing.is_empty() {
-            println!("   runs bake ({}) and render", row.estimators.join(", "));
+            mesolux::say!("   runs bake ({}) and render", row.estimators.join(", "));
         } else {
-            println!("   cannot run Mesolux: lacks {}", row.missing.join(", "));
+            mesolux::say!("   cannot run Mesolux: lacks {}", row.missing.join(", "));
         }
     }
     Ok(())

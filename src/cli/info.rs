@@ -68,7 +68,7 @@ pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
     match options.json {
         true => {
             let text = serde_json::to_string(&inside).map_err(|e| Error::Usage(e.to_string()))?;
-            println!("{text}");
+            mesolux::say!("{text}");
         }
         false => inside::print(&inside),
     }

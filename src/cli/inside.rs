@@ -11,18 +11,18 @@ const MOST_ROWS: usize = 40;
 pub fn print(inside: &Inside) {
     if let Some(baked) = &inside.bake {
         let origin = &baked.origin;
-        println!("{}: a bake by {}", inside.input, shown(&baked.program));
-        println!(
+        mesolux::say!("{}: a bake by {}", inside.input, shown(&baked.program));
+        mesolux::say!(
             "  of {}, SHA-256 {}",
             shown(&origin.scene),
             shown(&origin.hash)
         );
     } else {
-        println!("{}: a scene", inside.input);
+        mesolux::say!("{}: a scene", inside.input);
     }
     match (&inside.contents, &inside.elements, &inside.bake) {
         (Some(contents), Some(elements), _) => print_contents(contents, elements),
-        (.., Some(baked)) => println!(
+        (.., Some(baked)) => mesolux::say!(
             "  {} elements; a bake of an earlier program, which kept no names",
             baked.elements
         ),
@@ -43,12 +43,12 @@ fn print_contents(contents: &Contents, elements: &ElementCounts) {
         0 => String::new(),
         n => format!("; {n} triangles were left out"),
     };
-    println!(
+    mesolux::say!(
         "  {} vertices, {triangles} triangles{cut}{left_out}",
         contents.vertices
     );
     let [low, high] = contents.bounds.map(triple);
-    println!(
+    mesolux::say!(
         "  bounds ({low}) to ({high}), area {}",
         short(contents.area)
     );
@@ -71,10 +71,10 @@ fn print_contents(contents: &Contents, elements: &ElementCounts) {
     });
     print_rows("materials", rows.collect());
     for light in &contents.lights {
-        println!("  light \"{}\": {}", shown(&light.name), light_text(light));
+        mesolux::say!("  light \"{}\": {}", shown(&light.name), light_text(light));
     }
     for camera in &contents.cameras {
-        println!(
+        mesolux::say!(
             "  camera \"{}\": from ({}) to ({}), {}°",
             shown(&camera.name),
             triple(camera.position),
@@ -83,10 +83,10 @@ fn print_contents(contents: &Contents, elements: &ElementCounts) {
         );
     }
     for note in &contents.notes {
-        println!("  note: {}", shown(note));
+        mesolux::say!("  note: {}", shown(note));
     }
     for warning in &contents.warnings {
-        println!("  warning: {}", shown(warning));
+        mesolux::say!("  warning: {}", shown(warning));
     }
 }
 
@@ -109,17 +109,17 @@ fn print_rows(what: &str, mut rows: Vec<Row>) {
     let widest = names.iter().map(|name| name.chars().count()).max();
     let width = widest.unwrap_or(0).clamp(16, 40);
     let head = format!("{what} ({count})");
-    println!("  {head:<width$}  triangles  elements        area");
+    mesolux::say!("  {head:<width$}  triangles  elements        area");
     for (row, name) in rows.iter().zip(names) {
         let area = short(row.area);
         let text = format!(
             "    {name:<width$}{:>9} {:>9}  {area:>10}  {}",
             row.triangles, row.elements, row.more
         );
-        println!("{}", text.trim_end());
+        mesolux::say!("{}", text.trim_end());
     }
     if count > MOST_ROWS {
-        println!("    and {} smaller ones", count - MOST_ROWS);
+        mesolux::say!("    and {} smaller ones", count - MOST_ROWS);
     }
 }
 
@@ -154,10 +154,10 @@ fn print_baked(baked: &Baked) {
         .filter(|(_, value)| !value.is_null())
         .map(|(key, value)| format!("{} {}", shown(key), plain(value)))
         .collect();
-    println!("  settings: {}", settings.join(", "));
+    mesolux::say!("  settings: {}", settings.join(", "));
     let number = |key: &str| report[key].as_f64();
     let count = |key: &str| report[key].as_u64().unwrap_or(0);
-    println!(
+    mesolux::say!(
         "  solved on {}: {} sources, {} hemicubes of {}, {} s; stopped by {}",
         plain(&report["device"]),
         count("sources"),
@@ -170,24 +170,24 @@ fn print_baked(baked: &Baked) {
         Some(share) => format!("{} %", decimal(100.0 * share)),
         None => "unknown".into(),
     };
-    println!(
+    mesolux::say!(
         "  error bound {} of the emitted power, unshot {}",
         percent(number("error_bound")),
         percent(number("unshot_share"))
     );
     let cutting = &report["discretisation"];
     if let Some(rms) = cutting["rms"].as_f64() {
-        println!(
+        mesolux::say!(
             "  error of cutting into elements: {} rms of the mean light",
             percent(Some(rms))
         );
         for surface in cutting["surfaces"].as_array().into_iter().flatten() {
             let rms = surface["rms"].as_f64();
-            println!("    {}: {}", plain(&surface["name"]), percent(rms));
+            mesolux::say!("    {}: {}", plain(&surface["name"]), percent(rms));
         }
     }
     if let Some(relief) = report["relief"].as_object() {
-        println!(
+        mesolux::say!(
             "  {} elements with relief, {} directions",
             plain(&relief.get("elements").cloned().unwrap_or_default()),
             plain(&relief.get("directions").cloned().unwrap_or_default())

@@ -24,12 +24,13 @@ mod show;
 #[cfg(feature = "window")]
 mod view;
 
-use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::io::{IsTerminal, Write};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use mesolux::bake::quality::Quality;
+use mesolux::console;
 use mesolux::error::{Error, Result};
 use mesolux::scene::{ImportOptions, LoadOptions, Refinement, Scene};
 use tracing_subscriber::filter::{LevelFilter, Targets};
@@ -41,7 +42,8 @@ use tracing_subscriber::prelude::*;
 /// SCENE is a built-in name (cornell, cornell-box, cornell-relief, bowl-and-bunny, fruit-platter,
 /// brick-court, brick-wall, woven-cloth, embossed-plate), an .obj, .gltf or .glb file, or a
 /// scene.toml. Results go to files and stdout, everything else to stderr. Exit code 2 means that an
-/// input was wrong; nothing is written then.
+/// input was wrong or an output could not be written; 130, 143 and 129 that Ctrl-C, `kill` or a
+/// closed terminal stopped the work, and that what was done by then is kept.
 #[derive(Parser)]
 #[command(version, about)]
 struct Cli {
@@ -307,7 +309,7 @@ fn log_to_stderr(cli: &Cli) {
             .with_target("winit", LevelFilter::ERROR)
     };
     let lines = tracing_subscriber::fmt::layer()
-        .with_writer(std::io::stderr)
+        .with_writer(|| console::Stderr)
         .with_ansi(cli.color.are_shown())
         .without_time()
         .with_target(false);
@@ -342,10 +344,14 @@ pub fn main() -> ExitCode {
         Command::Completions(options) => shell::completions(options),
         Command::Man(options) => shell::man(options),
     };
-    match done {
-        Ok(()) => ExitCode::SUCCESS,
+    let lost = || match console::lost() {
+        Some(source) => Err(Error::write(Path::new("stdout"), source)),
+        None => Ok(()),
+    };
+    match done.and_then(|()| lost()) {
+        Ok(()) => progress::stopped_by().map_or(ExitCode::SUCCESS, ExitCode::from),
         Err(error) => {
-            eprintln!("mesolux: {error}");
+            let _ = writeln!(console::Stderr, "mesolux: {error}");
             ExitCode::from(2)
         }
     }

@@ -1,34 +1,64 @@
 //! Progress of long commands, and how they are stopped.
 
 use std::io::IsTerminal;
-use std::sync::Once;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
 
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+/// What asks the program to stop: Ctrl-C, `kill`, a terminal that is closed.
+#[cfg(unix)]
+const SIGNALS: [i32; 3] = [SIGINT, SIGTERM, signal_hook::consts::SIGHUP];
+#[cfg(not(unix))]
+const SIGNALS: [i32; 2] = [SIGINT, SIGTERM];
 
-/// The first Ctrl-C asks the work in progress to stop and keep its result; the second ends the
-/// program. Another call resets a Ctrl-C that has been handled.
-pub fn catch_interrupts() {
-    static ONCE: Once = Once::new();
-    INTERRUPTED.store(false, Ordering::SeqCst);
-    ONCE.call_once(|| {
-        let caught = ctrlc::set_handler(|| {
-            if INTERRUPTED.swap(true, Ordering::SeqCst) {
-                std::process::exit(130);
-            }
-            eprintln!("stopping after this step; the result so far is kept (again: stop at once)");
-        });
-        if let Err(error) = caught {
-            tracing::warn!("Ctrl-C will not keep the result: {error}");
+/// The signal that has arrived, if any.
+#[derive(Default)]
+struct Caught {
+    signal: Arc<AtomicUsize>,
+    any: Arc<AtomicBool>,
+    told: AtomicBool,
+}
+
+static CAUGHT: LazyLock<Caught> = LazyLock::new(|| {
+    let caught = Caught::default();
+    for signal in SIGNALS {
+        let (number, any) = (Arc::clone(&caught.signal), Arc::clone(&caught.any));
+        // In this order: a signal ends the program only if another one came before it.
+        let registered =
+            flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&any))
+                .and_then(|_| flag::register_usize(signal, number, signal as usize))
+                .and_then(|_| flag::register(signal, any));
+        if let Err(error) = registered {
+            tracing::warn!("signal {signal} will not keep the result: {error}");
         }
-    });
+    }
+    caught
+});
+
+/// The first Ctrl-C, or another signal to stop, asks the work in progress to stop and keep its
+/// result; the second ends the program. Another call resets one that has been handled.
+pub fn catch_interrupts() {
+    CAUGHT.any.store(false, Ordering::SeqCst);
+    CAUGHT.signal.store(0, Ordering::SeqCst);
+    CAUGHT.told.store(false, Ordering::SeqCst);
 }
 
 pub fn interrupted() -> bool {
-    INTERRUPTED.load(Ordering::SeqCst)
+    let is = CAUGHT.any.load(Ordering::SeqCst);
+    if is && !CAUGHT.told.swap(true, Ordering::SeqCst) {
+        tracing::warn!("stopping after this step; the result so far is kept (again: stop at once)");
+    }
+    is
+}
+
+/// Exit code of a program that a signal has stopped, 128 + its number; None if there was none.
+pub fn stopped_by() -> Option<u8> {
+    let signal = CAUGHT.signal.load(Ordering::SeqCst);
+    (signal != 0).then(|| 128 + signal as u8)
 }
 
 /// Progress on stderr: a live line on a terminal, a line now and then elsewhere.

@@ -147,11 +147,11 @@ impl Breakdown {
     }
 
     pub(super) fn print(&self) {
-        println!(
+        crate::say!(
             "part            places  light  share of error   bias %    rms %  of direct  of indirect"
         );
         for p in &self.parts {
-            println!(
+            crate::say!(
                 "{:<15} {:>6} {:>6.2} {:>13.1} % {:>+8.2} {:>8.2} {:>10.2} {:>12.2}",
                 p.name,
                 p.places,
@@ -163,13 +163,13 @@ impl Breakdown {
                 100.0 * p.rms_indirect
             );
         }
-        println!(
+        crate::say!(
             "worst elements: triangle, material, place, normal, irradiance over the mean, ours less truth %, of it direct %"
         );
         for w in &self.worst {
             let [x, y, z] = w.place;
             let [nx, ny, nz] = w.normal;
-            println!(
+            crate::say!(
                 "{:>8} {:<10} ({x:.3}, {y:.3}, {z:.3})  ({nx:+.2}, {ny:+.2}, {nz:+.2}) {:>6.3} {:>+7.1} {:>+7.1}",
                 w.triangle,
                 w.material,

@@ -178,7 +178,7 @@ struct Conditions<'a> {
 
 impl Conditions<'_> {
     fn print(&self) {
-        println!(
+        crate::say!(
             "{}: {} elements, {}; {} places without relief and emission, reference of {} paths each in {:.0} s, noise {:.2} %",
             self.scene,
             self.elements,
@@ -221,9 +221,9 @@ pub fn run(
     };
     conditions.print();
     if let Some(kind) = scene.lights.beyond_points() {
-        println!("the pixel estimator is left out: it knows no {kind}");
+        crate::say!("the pixel estimator is left out: it knows no {kind}");
     }
-    println!("{HEADER}");
+    crate::say!("{HEADER}");
     let save = |rows: &[Row], breakdown: Option<&Breakdown>| {
         let found = Found {
             conditions: &conditions,
@@ -243,7 +243,7 @@ pub fn run(
         rows.extend(done.rows.iter().cloned());
         mark(&mut rows);
         if let Some(last) = done.rows.last() {
-            println!("{}", line(last));
+            crate::say!("{}", line(last));
             if closest
                 .as_ref()
                 .is_none_or(|(rms, _)| last.measure.centroids.rms < *rms)
@@ -262,17 +262,17 @@ pub fn run(
             limit,
         };
         let mut add = |row: Row| {
-            println!("{}", line(&row));
+            crate::say!("{}", line(&row));
             rows.push(row);
         };
         if let Some(why) = job.instant_radiosity(&go_on, &mut add)? {
-            println!("instant radiosity is left out: {why}");
+            crate::say!("instant radiosity is left out: {why}");
         }
         job.path_tracer(&go_on, &mut add)?;
         for script in SCRIPTS.iter().filter(|_| go_on()) {
             let into = folder.join("peers");
             if let Some(why) = job.script(script, &options.python, &into, &mut add)? {
-                println!("{} is left out: {why}", script.name);
+                crate::say!("{} is left out: {why}", script.name);
             }
         }
         save(&rows, breakdown.as_ref())?;
@@ -280,18 +280,18 @@ pub fn run(
     print_best(&rows);
     if let (Some(breakdown), Some((_, done))) = (&breakdown, &closest) {
         let of = done.rows.last().map_or(String::new(), Row::settings);
-        println!("\nerror of the closest bake ({of}) over the mean irradiance:");
+        crate::say!("\nerror of the closest bake ({of}) over the mean irradiance:");
         breakdown.print();
     }
     Ok(())
 }
 
 fn print_best(rows: &[Row]) {
-    println!("\nbest settings, none of which is slower and further off than another:\n{HEADER}");
+    crate::say!("\nbest settings, none of which is slower and further off than another:\n{HEADER}");
     let mut best: Vec<&Row> = rows.iter().filter(|r| r.best).collect();
     best.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
     for row in best {
-        println!("{}", line(row));
+        crate::say!("{}", line(row));
     }
 }
 

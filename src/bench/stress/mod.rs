@@ -170,7 +170,7 @@ pub fn run(context: &Context, only: &str, folder: Option<&Path>) -> Result<usize
     let mut verdicts = Vec::new();
     for case in CASES.iter().filter(|c| c.name.contains(only)) {
         let verdict = case.verdict(context);
-        println!(
+        crate::say!(
             "{:<16} {:<6} {:>6.1} s  {}\n{:34}{}",
             verdict.name,
             if verdict.passes() { "passed" } else { "FAILED" },
@@ -185,7 +185,7 @@ pub fn run(context: &Context, only: &str, folder: Option<&Path>) -> Result<usize
         }
     }
     let failed = verdicts.iter().filter(|v| !v.passes()).count();
-    println!("{} cases, {failed} failed", verdicts.len());
+    crate::say!("{} cases, {failed} failed", verdicts.len());
     Ok(failed)
 }
 
