@@ -6,12 +6,8 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 #include "shared/types.glsl"
+#include "shared/texels.glsl"
 #include "shared/directions.glsl"
-
-struct Coefficient {
-    vec3 inside;
-    vec3 arriving;
-};
 
 layout(location = 0) in vec3 corner_position;
 layout(location = 1) flat in uint corner_prism;
@@ -19,26 +15,28 @@ layout(location = 1) flat in uint corner_prism;
 layout(location = 0) out vec4 radiance;
 
 layout(binding = 0) uniform sampler2D albedo;
-layout(scalar, binding = 1) readonly buffer Prisms { Prism prisms[]; };
-layout(scalar, binding = 2) readonly buffer Surfaces { ReliefSurface surfaces[]; };
+// Structs of shared/types.glsl by words, PRISM_TEXELS and so on each.
+layout(binding = 1) uniform usamplerBuffer prisms;
+layout(binding = 2) uniform usamplerBuffer surfaces;
 // [surface]
-layout(scalar, binding = 3) readonly buffer Tiles { HeightTile tiles[]; };
-layout(scalar, binding = 4) readonly buffer Pyramids { float pyramid[]; };
+layout(binding = 3) uniform usamplerBuffer tiles;
+layout(binding = 4) uniform usamplerBuffer pyramid;
 // Irradiance for a unit of β, [surface][cell][corner][rank]: rgb by light from elsewhere in the
 // relief, w from outside.
-layout(scalar, binding = 5) readonly buffer Factors { vec4 factors[]; };
-// β of the light, [light vertex][MOST_RANK]: of that which goes on inside the relief, and of that
-// which arrives.
-layout(scalar, binding = 6) readonly buffer Coefficients { Coefficient coefficients[]; };
+layout(binding = 5) uniform usamplerBuffer factors;
+// β of the light, [light vertex][MOST_RANK][2]: of that which goes on inside the relief, and of
+// that which arrives.
+layout(binding = 6) uniform usamplerBuffer coefficients;
 // Sent light by direction of the vertex's frame, as radiosity πL, [light vertex][direction].
-layout(scalar, binding = 7) readonly buffer Exits { vec3 exits[]; };
+layout(binding = 7) uniform usamplerBuffer exits;
 
-layout(scalar, binding = 8) readonly buffer LightPoints { LightPoint light_points[]; };
-layout(scalar, binding = 9) readonly buffer Nodes { ShadowNode shadow_nodes[]; };
-layout(scalar, binding = 10) readonly buffer Triangles { ShadowTriangle shadow_triangles[]; };
+layout(binding = 8) uniform usamplerBuffer light_points;
+layout(binding = 9) uniform usamplerBuffer shadow_nodes;
+layout(binding = 10) uniform usamplerBuffer shadow_triangles;
 // By prism, where it is lit so.
-layout(scalar, binding = 11) readonly buffer ParallelLights { ParallelLight parallel_lights[]; };
+layout(binding = 11) uniform usamplerBuffer parallel_lights;
 layout(scalar, binding = 12) readonly buffer Webs { float webs[]; };
+layout(binding = 13) uniform usamplerBuffer light_polygons;
 
 layout(push_constant, scalar) uniform Parameters {
     vec3 x;
@@ -50,19 +48,26 @@ layout(push_constant, scalar) uniform Parameters {
     float metered;
     uint light_count;    // of light_points; those of emitters come first
     uint emitter_points;
+    uint polygon_count;  // 0: emitters shine by their points alone
     uint shading;
     uint view;
     float pixel;         // angle of a sample
     uvec2 cells;         // of the directions
+    uvec2 corner;        // the tile's top left sample
 };
 
 uint march_steps = 0;
 #define ALL_STEPS march_steps
 #include "shared/height_march.glsl"
 #include "shared/light_points.glsl"
+#include "shared/light_polygons.glsl"
 #include "shared/shadow_rays.glsl"
 
 const float PI = 3.14159265358979;
+// Texels of a struct.
+const uint PRISM_TEXELS = 12;
+const uint SURFACE_TEXELS = 3;
+const uint TILE_TEXELS = 2;
 // Rays to lights begin so much of the relief's range above it.
 const float LIFT = 1e-4;
 // Shares of the relief's range by which a way to a light may leave the parabola that it is above a
@@ -71,6 +76,62 @@ const float STRAIGHT = 0.01;
 const float CHORD_OFF = 0.02;
 const float MOST_CHORDS = 4.0;
 #include "shared/prisms.glsl"
+
+Prism load_prism(uint prism) {
+    uint first = PRISM_TEXELS * prism;
+    uvec4 words[11];
+    for (uint i = 0; i < 11; i++) {
+        words[i] = fetch_words(prisms, first + i);
+    }
+    Prism p;
+    p.low_a = uintBitsToFloat(words[0].xyz);
+    p.light_a = words[0].w;
+    p.low_b = uintBitsToFloat(words[1].xyz);
+    p.light_b = words[1].w;
+    p.low_c = uintBitsToFloat(words[2].xyz);
+    p.light_c = words[2].w;
+    p.high_a = uintBitsToFloat(words[3].xyz);
+    p.surface = words[3].w;
+    p.high_b = uintBitsToFloat(words[4].xyz);
+    p.first_cluster = words[4].w;
+    p.high_c = uintBitsToFloat(words[5].xyz);
+    p.cluster_count = words[5].w;
+    p.uv_a = uintBitsToFloat(words[6].xy);
+    p.uv_b = uintBitsToFloat(words[6].zw);
+    p.uv_c = uintBitsToFloat(words[7].xy);
+    p.texel = uintBitsToFloat(words[7].z);
+    p.tangent = uintBitsToFloat(words[8].xyz);
+    p.bitangent = uintBitsToFloat(words[9].xyz);
+    p.normal = uintBitsToFloat(words[10].xyz);
+    return p;
+}
+
+ReliefSurface load_surface(uint surface) {
+    uint first = SURFACE_TEXELS * surface;
+    uvec4 heights = fetch_words(surfaces, first);
+    uvec4 sizes = fetch_words(surfaces, first + 1);
+    ReliefSurface s;
+    s.lowest = uintBitsToFloat(heights.x);
+    s.top = uintBitsToFloat(heights.y);
+    s.mean = uintBitsToFloat(heights.z);
+    s.rank = heights.w;
+    s.columns = sizes.x;
+    s.rows = sizes.y;
+    s.first_factor = sizes.z;
+    s.slope = fetch(surfaces, first + 2).xy;
+    return s;
+}
+
+HeightTile load_tile(uint surface) {
+    uvec4 words = fetch_words(tiles, TILE_TEXELS * surface);
+    HeightTile t;
+    t.first = words.x;
+    t.width = words.y;
+    t.height = words.z;
+    t.top = words.w;
+    t.highest = fetch(tiles, TILE_TEXELS * surface + 1).x;
+    return t;
+}
 
 // The surface that a prism stands on, as ways to lights pass over it.
 struct Base {
@@ -106,7 +167,7 @@ Base base_of(Prism p, ReliefSurface surface, Place place) {
 // from the way as the smooth normals of the triangle say, by triangles like this one, so that the
 // way's height above it is a parabola: bumps beyond a triangle's horizon still rise into the light,
 // and the next triangle's do not shadow what they cannot.
-bool shadowed_by_relief(Prism p, ReliefSurface surface, Place place, Base base, vec3 towards, out float leaves) {
+bool shadowed_by_relief(Prism p, ReliefSurface surface, HeightTile tile, Place place, Base base, vec3 towards, out float leaves) {
     // Slopes over the triangle, not over the tetrahedron of the place, at whose borders they jump.
     float out_of = dot(base.normal, towards) / dot(base.normal, base.axis);
     vec3 tangential = towards - base.axis * out_of;
@@ -130,7 +191,7 @@ bool shadowed_by_relief(Prism p, ReliefSurface surface, Place place, Base base, 
     float past = leaves - edge;
     bool straight = past <= 0.0 || local.z > 0.0 && abs(bend) * past * (past + chord) < 2.0 * STRAIGHT * rise;
     if (straight) {
-        return march(tiles[p.surface], from, vec3(from.xy + local.xy * leaves, surface.top), hit);
+        return march(tile, from, vec3(from.xy + local.xy * leaves, surface.top), hit);
     }
 
     // Past the edge the height is at_edge + slope x + bend x² / 2.
@@ -146,7 +207,7 @@ bool shadowed_by_relief(Prism p, ReliefSurface surface, Place place, Base base, 
     float run = slope > 0.0 && square > 0.0 ? 2.0 * (surface.top - at_edge) / (slope + root) : (root - slope) / bend;
     leaves = edge + run;
     vec3 last = vec3(from.xy + local.xy * edge, at_edge);
-    if (march(tiles[p.surface], from, last, hit)) {
+    if (march(tile, from, last, hit)) {
         return true;
     }
     // A chord of the parabola lies off it by bend / 8 times its length's square.
@@ -154,7 +215,7 @@ bool shadowed_by_relief(Prism p, ReliefSurface surface, Place place, Base base, 
     for (float i = 1.0; i <= chords; i++) {
         float x = run * i / chords;
         vec3 next = vec3(from.xy + local.xy * (edge + x), at_edge + x * (slope + 0.5 * bend * x));
-        if (march(tiles[p.surface], last, next, hit)) {
+        if (march(tile, last, next, hit)) {
             return true;
         }
         last = next;
@@ -164,14 +225,16 @@ bool shadowed_by_relief(Prism p, ReliefSurface surface, Place place, Base base, 
 
 // Light straight from emitters and point lights on the surface at a place, by its own normal,
 // shadowed by the relief and by the rest of the scene.
-vec3 sharp(Prism p, ReliefSurface surface, Place place, vec3 at) {
+vec3 sharp(Prism p, ReliefSurface surface, HeightTile tile, Place place, vec3 at) {
     uint samples = light_samples();
     if (samples == 0) {
         return vec3(0.0);
     }
     vec3 facet = facet_normal(place);
     Base base = base_of(p, surface, place);
-    vec3 sum = vec3(0.0);
+    vec3 seen = vec3(0.0);      // of the points of emitters
+    vec3 of_all = vec3(0.0);
+    vec3 points = vec3(0.0);    // of point lights
     for (uint i = 0; i < samples; i++) {
         LightPoint light = light_of_sample(i);
         vec3 way = light.position - at;
@@ -181,13 +244,22 @@ vec3 sharp(Prism p, ReliefSurface surface, Place place, vec3 at) {
         if (arrives <= 0.0) {
             continue;
         }
+        vec3 whole = light.strength * arrives;
         float leaves;
-        if (!shadowed_by_relief(p, surface, place, base, towards, leaves)
-            && !blocked(at, end_of_way(light), leaves * inversesqrt(square))) {
-            sum += light.strength * arrives;
+        bool open = !shadowed_by_relief(p, surface, tile, place, base, towards, leaves)
+                    && !blocked(at, end_of_way(light), leaves * inversesqrt(square));
+        vec3 arrived = open ? whole : vec3(0.0);
+        if (i < emitter_samples()) {
+            of_all += whole;
+            seen += arrived;
+        } else {
+            points += arrived;
         }
     }
-    return sum;
+    if (polygon_count > 0 && seen != vec3(0.0)) {
+        seen = shadowed(unshadowed(at, facet), seen, of_all);
+    }
+    return seen + points;
 }
 
 #include "shared/clusters.glsl"
@@ -202,15 +274,20 @@ vec3 factored(Prism p, ReliefSurface surface, Place place) {
     uint row = surface.first_factor + (cell.y * surface.columns + cell.x) * 4 * surface.rank;
     vec4 weight = vec4((1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y);
     vec3 sum = vec3(0.0);
+    uint of_a = p.light_a * MOST_RANK * 2;
+    uint of_b = p.light_b * MOST_RANK * 2;
+    uint of_c = p.light_c * MOST_RANK * 2;
     for (uint r = 0; r < surface.rank; r++) {
-        Coefficient a = coefficients[p.light_a * MOST_RANK + r];
-        Coefficient b = coefficients[p.light_b * MOST_RANK + r];
-        Coefficient c = coefficients[p.light_c * MOST_RANK + r];
-        mat3 inside = mat3(a.inside, b.inside, c.inside);
-        mat3 arriving = mat3(a.arriving, b.arriving, c.arriving);
-        vec4 factor = weight.x * factors[row + r] + weight.y * factors[row + surface.rank + r]
-                    + weight.z * factors[row + 2 * surface.rank + r] + weight.w * factors[row + 3 * surface.rank + r];
-        sum += factor.rgb * (inside * place.share) + factor.w * (arriving * place.share);
+        vec3 inside = place.share.x * fetch(coefficients, of_a + 2 * r).rgb
+                    + place.share.y * fetch(coefficients, of_b + 2 * r).rgb
+                    + place.share.z * fetch(coefficients, of_c + 2 * r).rgb;
+        vec3 arriving = place.share.x * fetch(coefficients, of_a + 2 * r + 1).rgb
+                      + place.share.y * fetch(coefficients, of_b + 2 * r + 1).rgb
+                      + place.share.z * fetch(coefficients, of_c + 2 * r + 1).rgb;
+        vec4 factor = weight.x * fetch(factors, row + r) + weight.y * fetch(factors, row + surface.rank + r)
+                    + weight.z * fetch(factors, row + 2 * surface.rank + r)
+                    + weight.w * fetch(factors, row + 3 * surface.rank + r);
+        sum += factor.rgb * inside + factor.w * arriving;
     }
     return max(sum, vec3(0.0));
 }
@@ -222,8 +299,9 @@ vec3 mean_sent(Prism p, vec3 share, vec3 to_eye) {
     uint count = cells.x * cells.y;
     vec3 sum = vec3(0.0);
     for (uint i = 0; i < 4; i++) {
-        sum += at.weight[i] * (share.x * exits[p.light_a * count + at.k[i]] + share.y * exits[p.light_b * count + at.k[i]]
-                             + share.z * exits[p.light_c * count + at.k[i]]);
+        sum += at.weight[i] * (share.x * fetch(exits, p.light_a * count + at.k[i]).rgb
+                             + share.y * fetch(exits, p.light_b * count + at.k[i]).rgb
+                             + share.z * fetch(exits, p.light_c * count + at.k[i]).rgb);
     }
     return sum;
 }
@@ -236,30 +314,42 @@ void draw() {
     if (gl_FrontFacing) {
         return;
     }
-    Prism p = prisms[corner_prism];
-    ReliefSurface surface = surfaces[p.surface];
+    Prism p = load_prism(corner_prism);
+    ReliefSurface surface = load_surface(p.surface);
+    HeightTile tile = load_tile(p.surface);
     vec3 along = corner_position;
     float footprint = length(corner_position) * pixel / p.texel;
     bool wide = shading == SHADING_RELIEF && footprint > float(WIDEST_SAMPLE);
     Place place;
-    if (!meet(p, surface, along, shading != SHADING_RELIEF || wide, place)) {
+    if (!meet(p, surface, tile, along, shading != SHADING_RELIEF || wide, place)) {
         return;
     }
     if (shading == SHADING_PARALLAX) {
         vec3 to_eye = -normalize(along);
         vec3 local = vec3(dot(p.tangent, to_eye), dot(p.bitangent, to_eye), max(dot(p.normal, to_eye), 0.2));
         HeightHit under;
-        bool found = march(tiles[p.surface], vec3(place.uv, surface.top), vec3(place.uv, surface.lowest), under);
+        bool found = march(tile, vec3(place.uv, surface.top), vec3(place.uv, surface.lowest), under);
         float height = found ? under.height : surface.mean;
         place.uv += (height - surface.mean) * surface.slope * local.xy / local.z;
     }
     vec3 at = (1.0 + place.along) * corner_position;
     gl_FragDepth = near / dot(at, w);
 
-    float level = log2(max(footprint / float(tiles[p.surface].width) * float(textureSize(albedo, 0).x), 1e-6));
+    float level = log2(max(footprint / float(tile.width) * float(textureSize(albedo, 0).x), 1e-6));
     vec3 rho = reflectance * textureLod(albedo, vec2(place.uv.x, 1.0 - place.uv.y), level).rgb;
     if (place.under) {
         return;
+    }
+    // Loops that take one turn at most: a software device works through what a branch leaves out.
+    bool as_seen = view == VIEW_SHADED || view == VIEW_OVERDRAW;
+    bool lit = view == VIEW_IRRADIANCE || as_seen && !wide;
+    vec3 light = vec3(0.0);
+    for (uint turns = lit ? 1 : 0; turns > 0; turns--) {
+        light = factored(p, surface, place) + sharp(p, surface, tile, place, at) + clustered(p, surface, tile, place);
+    }
+    vec3 sent = vec3(0.0);
+    for (uint turns = as_seen && wide ? 1 : 0; turns > 0; turns--) {
+        sent = mean_sent(p, place.share, -normalize(along));
     }
     vec3 shown;
     switch (view) {
@@ -273,18 +363,13 @@ void draw() {
         shown = vec3((place.height - surface.lowest) / (surface.top - surface.lowest));
         break;
     case VIEW_IRRADIANCE:
-        shown = (factored(p, surface, place) + sharp(p, surface, place, at) + clustered(p, surface, place)) / PI;
+        shown = light / PI;
         break;
     case VIEW_SLOTS:
-        shown = p.slots;
+        shown = fetch(prisms, PRISM_TEXELS * corner_prism + 11).rgb;
         break;
     default:
-        shown = emitted;
-        if (wide) {
-            shown += mean_sent(p, place.share, -normalize(along)) / PI;
-        } else {
-            shown += rho * (factored(p, surface, place) + sharp(p, surface, place, at) + clustered(p, surface, place)) / PI;
-        }
+        shown = emitted + (rho * light + sent) / PI;
     }
     radiance = vec4(shown, metered);
 }

@@ -4,11 +4,12 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 #include "shared/types.glsl"
+#include "shared/texels.glsl"
 
 layout(local_size_x = GROUP) in;
 
 layout(scalar, binding = 0) readonly buffer Tiles { HeightTile tiles[]; };
-layout(scalar, binding = 1) readonly buffer Pyramids { float pyramid[]; };
+layout(binding = 1) uniform usamplerBuffer pyramid;
 layout(scalar, binding = 2) readonly buffer Rays { HeightRay rays[]; };
 layout(scalar, binding = 3) writeonly buffer Hits { HeightHit hits[]; };
 

@@ -4,6 +4,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 #include "shared/types.glsl"
+#include "shared/texels.glsl"
 
 layout(location = 0) in vec3 corner_irradiance;
 layout(location = 1) in vec2 corner_uv;
@@ -14,12 +15,15 @@ layout(location = 4) flat in uint corner_triangle;
 layout(location = 0) out vec4 radiance;
 
 layout(binding = 0) uniform sampler2D albedo;
-layout(scalar, binding = 1) readonly buffer LightPoints { LightPoint light_points[]; };
-layout(scalar, binding = 2) readonly buffer Nodes { ShadowNode shadow_nodes[]; };
-layout(scalar, binding = 3) readonly buffer Triangles { ShadowTriangle shadow_triangles[]; };
+layout(binding = 1) uniform usamplerBuffer light_points;
+layout(binding = 2) uniform usamplerBuffer shadow_nodes;
+layout(binding = 3) uniform usamplerBuffer shadow_triangles;
 // [drawn triangle]
-layout(scalar, binding = 4) readonly buffer LitTriangles { LitTriangle lit_triangles[]; };
+layout(binding = 4) uniform usamplerBuffer lit_triangles;
 layout(scalar, binding = 5) readonly buffer Webs { float webs[]; };
+layout(binding = 6) uniform usamplerBuffer light_polygons;
+// States of parts of triangles, STATES_IN_TEXEL a texel: [row along c][column along b][2]
+layout(binding = 7) uniform usamplerBuffer part_states;
 
 layout(push_constant, scalar) uniform Parameters {
     vec3 x;
@@ -31,9 +35,12 @@ layout(push_constant, scalar) uniform Parameters {
     float metered;
     uint light_count;      // of light_points; those of emitters come first
     uint emitter_points;
+    uint polygon_count;    // 0: emitters shine by their points alone
+    uvec2 corner;          // the tile's top left sample
 };
 
 #include "shared/light_points.glsl"
+#include "shared/light_polygons.glsl"
 #include "shared/shadow_rays.glsl"
 
 const float PI = 3.14159265358979;
@@ -43,9 +50,45 @@ vec3 lift(vec3 at, vec3 corner, vec3 normal, float share) {
     return normal * (share * max(dot(corner - at, normal), 0.0));
 }
 
+// Texels of struct LitTriangle.
+const uint LIT_TEXELS = 7;
+const uint STATES_IN_TEXEL = 64;
+
+LitTriangle load_lit(uint triangle) {
+    uint first = LIT_TEXELS * triangle;
+    vec4 a = fetch(lit_triangles, first);
+    uvec4 b = fetch_words(lit_triangles, first + 1);
+    LitTriangle t;
+    t.a = a.xyz;
+    t.above = a.w;
+    t.b = uintBitsToFloat(b.xyz);
+    t.level = b.w;
+    uvec4 c = fetch_words(lit_triangles, first + 2);
+    t.c = uintBitsToFloat(c.xyz);
+    t.first_part = c.w;
+    t.normal_a = fetch(lit_triangles, first + 3).xyz;
+    t.normal_b = fetch(lit_triangles, first + 4).xyz;
+    t.normal_c = fetch(lit_triangles, first + 5).xyz;
+    t.plane = fetch(lit_triangles, first + 6).xyz;
+    return t;
+}
+
+// PART_... of the part of a triangle that a place is in.
+uint state_at(LitTriangle t, vec3 share) {
+    uint side = 1u << t.level;
+    vec2 place = share.yz * float(side);
+    uvec2 at = min(uvec2(max(place, vec2(0.0))), uvec2(side - 1));
+    vec2 within = place - vec2(at);
+    uint upper = within.x + within.y > 1.0 ? 1 : 0;
+    uint part = t.first_part + 2 * (at.y * side + at.x) + upper;
+    uvec4 words = fetch_words(part_states, part / STATES_IN_TEXEL);
+    uint state = words[part / 16 % 4] >> 2 * (part % 16) & 3u;
+    return t.level == 0 ? t.first_part : state;
+}
+
 // E of what comes straight from emitters and point lights.
 vec3 straight() {
-    LitTriangle t = lit_triangles[corner_triangle];
+    LitTriangle t = load_lit(corner_triangle);
     vec3 share = corner_share;
     vec3 at = corner_position;
     vec3 normal = normalize(share.x * t.normal_a + share.y * t.normal_b + share.z * t.normal_c);
@@ -53,19 +96,40 @@ vec3 straight() {
     // where light grazes.
     vec3 from = at + t.above * t.plane + lift(at, t.a, t.normal_a, share.x) + lift(at, t.b, t.normal_b, share.y)
               + lift(at, t.c, t.normal_c, share.z);
-    vec3 sum = vec3(0.0);
+    uint state = state_at(t, share);
+    // By points, if not in closed form: polygon_count is 0 then.
+    vec3 exact = unshadowed(at, normal);
+    bool dark = polygon_count > 0 && exact == vec3(0.0);
+    vec3 seen = vec3(0.0);      // of the points of emitters
+    vec3 of_all = vec3(0.0);
+    vec3 points = vec3(0.0);    // of point lights
+    uint emitters = emitter_samples();
     uint samples = light_samples();
-    for (uint i = 0; i < samples; i++) {
+    // Points of emitters are asked only where they may be hidden in part, and none where all are.
+    bool by_points = polygon_count == 0 || state == PART_UNSURE && !dark;
+    uint end = state == PART_HIDDEN ? 0 : samples;
+    for (uint i = by_points ? 0 : emitters; i < end; i++) {
         LightPoint light = light_of_sample(i);
         vec3 way = light.position - at;
         float square = dot(way, way);
         vec3 towards = way * inversesqrt(square);
         float arrives = arriving(light, towards, dot(normal, towards), square);
-        if (arrives > 0.0 && (t.open == 1 || !blocked(from, end_of_way(light), 0.0))) {
-            sum += light.strength * arrives;
+        if (arrives <= 0.0) {
+            continue;
+        }
+        vec3 whole = light.strength * arrives;
+        vec3 open = state == PART_OPEN || !blocked(from, end_of_way(light), 0.0) ? whole : vec3(0.0);
+        if (i < emitters) {
+            of_all += whole;
+            seen += open;
+        } else {
+            points += open;
         }
     }
-    return sum;
+    if (polygon_count > 0) {
+        seen = state == PART_OPEN || dark ? exact : shadowed(exact, seen, of_all) * (state == PART_HIDDEN ? 0.0 : 1.0);
+    }
+    return seen + points;
 }
 
 void main() {

@@ -4,11 +4,12 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 #include "shared/types.glsl"
+#include "shared/texels.glsl"
 
 layout(local_size_x = GROUP) in;
 
-layout(scalar, binding = 0) readonly buffer Nodes { ShadowNode shadow_nodes[]; };
-layout(scalar, binding = 1) readonly buffer Triangles { ShadowTriangle shadow_triangles[]; };
+layout(binding = 0) uniform usamplerBuffer shadow_nodes;
+layout(binding = 1) uniform usamplerBuffer shadow_triangles;
 layout(scalar, binding = 2) readonly buffer Rays { ShadowRay rays[]; };
 layout(scalar, binding = 3) writeonly buffer Hits { uint hits[]; };
 

@@ -109,4 +109,9 @@ shared! {
     VIEW_IRRADIANCE = 4;
     VIEW_SLOTS = 5;
     VIEW_OVERDRAW = 6;
+    /// Part of a triangle that lights are seen from: they may be hidden in part; nothing stands
+    /// between; something stands before all of each.
+    PART_UNSURE = 0;
+    PART_OPEN = 1;
+    PART_HIDDEN = 2;
 }

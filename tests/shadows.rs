@@ -6,6 +6,7 @@ mod common;
 use std::path::Path;
 use std::sync::OnceLock;
 
+use bytemuck::Zeroable;
 use common::{Build, assert_silent, device, show};
 use glam::{DVec3, Vec3};
 use mesolux::bake::bake;
@@ -382,6 +383,7 @@ fn the_tree_finds_what_trying_every_triangle_does() {
                 b,
                 c,
                 relief: (i % 5 == 0).into(),
+                ..ShadowTriangle::zeroed()
             }
         })
         .collect();

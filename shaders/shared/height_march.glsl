@@ -1,6 +1,6 @@
 // Where a straight segment first passes below a bilinear, periodic height map: exact, by the
-// pyramid of maxima of src/meso/height_pyramid.rs. Including files have shared/types.glsl and a
-// buffer `float pyramid[]`; the steps of all marches are added to the variable ALL_STEPS if there
+// pyramid of maxima of src/meso/height_pyramid.rs. Including files have shared/types.glsl,
+// shared/texels.glsl and a `usamplerBuffer pyramid`, four values a texel; the steps of all marches are added to the variable ALL_STEPS if there
 // is one.
 //
 // Lengths are in texels here, x along columns and y along rows (down the image, against v), heights
@@ -39,6 +39,10 @@ vec3 product_rest(vec3 a, vec3 b, out vec3 rest) {
     precise vec3 left_out = ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low;
     rest = left_out;
     return product;
+}
+
+float value_of_pyramid(uint at) {
+    return fetch(pyramid, at / 4)[at % 4];
 }
 
 struct Segment {
@@ -84,10 +88,10 @@ Patch patch_of(HeightTile tile, ivec2 cell) {
     next -= size * ivec2(equal(next, size));
     uint row = tile.first + cell.y * tile.width;
     uint next_row = tile.first + next.y * tile.width;
-    float corner = pyramid[row + cell.x];
-    float right = pyramid[row + next.x];
-    float down = pyramid[next_row + cell.x];
-    float opposite = pyramid[next_row + next.x];
+    float corner = value_of_pyramid(row + cell.x);
+    float right = value_of_pyramid(row + next.x);
+    float down = value_of_pyramid(next_row + cell.x);
+    float opposite = value_of_pyramid(next_row + next.x);
     return Patch(corner, vec2(right - corner, down - corner), (opposite - down) - (right - corner));
 }
 
@@ -167,7 +171,7 @@ bool march(HeightTile tile, vec3 from, vec3 to, out HeightHit hit) {
         vec3 along = gone * step;
 
         // Look closer where it comes below the highest of the block.
-        bool near = min(at.z, at.z + along.z) < pyramid[first + block.y * blocks.x + block.x];
+        bool near = min(at.z, at.z + along.z) < value_of_pyramid(first + block.y * blocks.x + block.x);
         if (near) {
             if (level > 0) {
                 level--;

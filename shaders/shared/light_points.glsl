@@ -1,25 +1,62 @@
 // Points that light comes straight from: those of emitters, which samples take turns at, then point
-// lights. Including files have shared/types.glsl, the buffers `LightPoint light_points[]` and
-// `float webs[]`, shares of the intensity of beams, and `light_count` and `emitter_points`.
+// lights. Including files have shared/types.glsl, shared/texels.glsl, a `usamplerBuffer light_points`, a
+// buffer `float webs[]`, shares of the intensity of beams, `light_count`, `emitter_points`, and
+// `corner`, the sample in the top left corner of the tile that is drawn.
 
 // Ends of ways lie so much of their distance from the eye above what they start and end on:
 // coordinates and their interpolation round by a few 2^-24 of it.
 const float ABOVE = 3.8e-6;
 
-// Of one sample.
+// Of one sample: points of emitters, and all.
+uint emitter_samples() {
+    return emitter_points / (LIGHT_SETS * LIGHT_TURNS);
+}
+
 uint light_samples() {
-    return emitter_points / (LIGHT_SETS * LIGHT_TURNS) + (light_count - emitter_points);
+    return emitter_samples() + (light_count - emitter_points);
+}
+
+// Well mixed (Wellons 2018, "lowbias32").
+uint mixed(uint x) {
+    x = (x ^ (x >> 16)) * 0x21f0aaadu;
+    x = (x ^ (x >> 15)) * 0xd35a2d97u;
+    return x ^ (x >> 15);
+}
+
+// Texels of struct LightPoint, of which the last two are a beam's alone.
+const uint LIGHT_TEXELS = 5;
+
+LightPoint load_light(uint i) {
+    uint first = LIGHT_TEXELS * i;
+    uvec4 position = fetch_words(light_points, first);
+    vec4 normal = fetch(light_points, first + 1);
+    uvec4 strength = fetch_words(light_points, first + 2);
+    LightPoint light;
+    light.position = uintBitsToFloat(position.xyz);
+    light.kind = position.w;
+    light.normal = normal.xyz;
+    light.area = normal.w;
+    light.strength = uintBitsToFloat(strength.xyz);
+    light.first_share = strength.w;
+    // A loop that mostly takes no turn: a software device works through both sides of a branch.
+    for (uint turns = light.kind == KIND_BEAM ? 1 : 0; turns > 0; turns--) {
+        uvec4 zero = fetch_words(light_points, first + 3);
+        light.zero = uintBitsToFloat(zero.xyz);
+        light.rows = zero.w;
+        light.columns = fetch_words(light_points, first + 4).x;
+    }
+    return light;
 }
 
 LightPoint light_of_sample(uint i) {
-    uint emitters = emitter_points / (LIGHT_SETS * LIGHT_TURNS);
-    if (i >= emitters) {
-        return light_points[emitter_points + i - emitters];
-    }
-    uvec2 at = uvec2(gl_FragCoord.xy);
-    uvec2 turn = at % 4;
-    uvec2 pixel_at = at / 4 % 4;
-    return light_points[(pixel_at.y * 4 + pixel_at.x) * LIGHT_POINTS + i * LIGHT_TURNS + turn.y * 4 + turn.x];
+    uvec2 at = uvec2(gl_FragCoord.xy) + corner;
+    // Points LIGHT_TURNS apart are close together on an emitter: those of a sample are taken from
+    // other quarters of it, so that each sample sees of all of it.
+    uint turn = (at.y % 4 * 4 + at.x % 4) ^ i;
+    // Any set for a pixel: in turns, they would show as a lattice.
+    uint set = mixed(mixed(at.x / 4) + at.y / 4) % LIGHT_SETS;
+    uint of_emitter = set * LIGHT_POINTS + i * LIGHT_TURNS + turn;
+    return load_light(i < emitter_samples() ? of_emitter : emitter_points + i - emitter_samples());
 }
 
 // Share of a beam's intensity in a direction from it, linear in both angles.

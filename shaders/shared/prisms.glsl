@@ -82,7 +82,7 @@ Part cut(Tetrahedron t, vec3 from, vec3 along) {
 }
 
 // Where the ray first meets the relief (or, for `plane`, the mean height) within a part of it.
-bool meet_part(Part part, Prism p, ReliefSurface surface, bool plane, out Place place) {
+bool meet_part(Part part, ReliefSurface surface, HeightTile tile, bool plane, out Place place) {
     if (part.leave <= part.enter) {
         return false;
     }
@@ -101,7 +101,7 @@ bool meet_part(Part part, Prism p, ReliefSurface surface, bool plane, out Place 
         place.under = false;
     } else {
         HeightHit hit;
-        if (!march(tiles[p.surface], from, to, hit)) {
+        if (!march(tile, from, to, hit)) {
             return false;
         }
         // A ray that comes in through the bottom shows the underside; one that comes in below the
@@ -119,7 +119,7 @@ bool meet_part(Part part, Prism p, ReliefSurface surface, bool plane, out Place 
 }
 
 // The same within the prism.
-bool meet(Prism p, ReliefSurface surface, vec3 along, bool plane, out Place place) {
+bool meet(Prism p, ReliefSurface surface, HeightTile tile, vec3 along, bool plane, out Place place) {
     const vec3 A = vec3(1.0, 0.0, 0.0);
     const vec3 B = vec3(0.0, 1.0, 0.0);
     const vec3 C = vec3(0.0, 0.0, 1.0);
@@ -152,7 +152,7 @@ bool meet(Prism p, ReliefSurface surface, vec3 along, bool plane, out Place plac
             which = round == 1 ? 1 : (round == 0) == from_high ? 2 : 0;
         }
         Part part = which == 0 ? parts_low : which == 1 ? parts_middle : parts_high;
-        if (meet_part(part, p, surface, plane, place)) {
+        if (meet_part(part, surface, tile, plane, place)) {
             found = which;
         }
     }

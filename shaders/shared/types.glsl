@@ -163,6 +163,9 @@ struct HeightTile {
     uint height;
     uint top;           // the coarsest level that a march uses
     float highest;
+    uint unused_a;
+    uint unused_b;
+    uint unused_c;
 };
 
 // A straight segment over a height map.
@@ -186,25 +189,30 @@ struct HeightHit {
 // ascend by the mesh's vertex, so that neighbours cut the side that they share along one diagonal.
 struct Prism {
     vec3 low_a;         // from the eye, internal units
+    uint light_a;       // light vertices
     vec3 low_b;
+    uint light_b;
     vec3 low_c;
+    uint light_c;
     vec3 high_a;
+    uint surface;
     vec3 high_b;
+    uint first_cluster; // parallel lights on it
     vec3 high_c;
+    uint cluster_count; // 0: lit by the light vertices alone
     vec2 uv_a;
     vec2 uv_b;
     vec2 uv_c;
-    uint light_a;       // light vertices
-    uint light_b;
-    uint light_c;
-    uint surface;
-    vec3 tangent;       // frame of the triangle
     float texel;        // internal units
+    uint unused_a;
+    vec3 tangent;       // frame of the triangle
+    uint unused_b;
     vec3 bitangent;
+    uint unused_c;
     vec3 normal;
-    uint first_cluster; // parallel lights on it
-    uint cluster_count; // 0: lit by the light vertices alone
+    uint unused_d;
     vec3 slots;         // false colour of its light by direction
+    uint unused_e;
 };
 
 // A parallel light on a face, in place of the light from near-parallel directions.
@@ -222,10 +230,24 @@ struct LightPoint {
     vec3 normal;        // of a beam its axis
     float area;         // of the part of an emitter
     vec3 strength;      // Le times its area, or radiant intensity
-    vec3 zero;          // of a beam: where its azimuth is 0
     uint first_share;   // of a beam
+    vec3 zero;          // of a beam: where its azimuth is 0
     uint rows;
     uint columns;
+    uint unused_a;
+    uint unused_b;
+    uint unused_c;
+};
+
+// An emitter whose light is found in closed form: a convex polygon, of a triangle with its last
+// corner twice; or a sun.
+struct LightPolygon {
+    vec3 a;             // corners from the eye, internal units; of a sun the direction to it
+    vec3 b;
+    vec3 c;
+    vec3 d;
+    vec3 strength;      // πLe, or irradiance of what faces the sun
+    uint far;           // 1 for a sun
 };
 
 // A relief as it is drawn.
@@ -233,11 +255,14 @@ struct ReliefSurface {
     float lowest;       // of the prisms, in the map's heights
     float top;
     float mean;
+    uint rank;
     uint columns;       // of the height field that the factors belong to
     uint rows;
-    uint rank;
     uint first_factor;
+    uint unused_a;
     vec2 slope;         // scene heights a texture repeat in u and in v for a unit of height
+    uint unused_b;
+    uint unused_c;
 };
 
 // A box of the tree of what casts shadows, in depth-first order: the first within it follows it.
@@ -251,9 +276,11 @@ struct ShadowNode {
 // What casts a shadow.
 struct ShadowTriangle {
     vec3 a;
-    vec3 b;
-    vec3 c;
     uint relief;        // 1: it stands for a relief about it
+    vec3 b;
+    uint unused_a;
+    vec3 c;
+    uint unused_b;
 };
 
 // What hides places from a source, and where it does.
@@ -278,14 +305,19 @@ struct ShadowRay {
 // A plain triangle that is lit straight.
 struct LitTriangle {
     vec3 a;             // from the eye, internal units
-    vec3 b;
-    vec3 c;
-    vec3 normal_a;      // of the smooth surface at the corners
-    vec3 normal_b;
-    vec3 normal_c;
-    vec3 plane;         // its own normal
     float above;        // what rays start above it
-    uint open;          // 1: nothing stands between it and the lights
+    vec3 b;
+    uint level;         // its sides are cut in 2^level
+    vec3 c;
+    uint first_part;    // of its parts; of a triangle that is not cut its state: PART_...
+    vec3 normal_a;      // of the smooth surface at the corners
+    uint unused_a;
+    vec3 normal_b;
+    uint unused_b;
+    vec3 normal_c;
+    uint unused_c;
+    vec3 plane;         // its own normal
+    uint unused_d;
 };
 
 // A patch that shoots, as the pixels of its hemicube read it.

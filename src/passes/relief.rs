@@ -40,11 +40,11 @@ pub struct Parts<'a> {
     pub pyramids: &'a [f32],
     /// `[surface][cell][corner][rank]`
     pub factors: &'a [Vec4],
-    /// β of the light that goes on inside the relief and of that which arrives by slots,
+    /// rgb of the β of the light that goes on inside the relief and of that which arrives by slots,
     /// `[light vertex][MOST_RANK]`.
-    pub coefficients: &'a [[Vec3; 2]],
-    /// `[light vertex][direction]`
-    pub exits: &'a [Vec3],
+    pub coefficients: &'a [[Vec4; 2]],
+    /// rgb, `[light vertex][direction]`
+    pub exits: &'a [Vec4],
     /// As the prisms count them.
     pub parallel_lights: &'a [ParallelLight],
 }
@@ -141,6 +141,7 @@ impl Relief {
                 shadow_triangles: &lights.triangles,
                 parallel_lights: &buffers.parallel_lights,
                 webs: &lights.webs,
+                light_polygons: &lights.polygons,
             },
         )
     }
@@ -182,16 +183,16 @@ impl Buffers {
                 (0..HULL.len()).map(turn)
             })
             .collect();
-        let storage = BufferUse::Storage;
+        let texels = BufferUse::Texels;
         Ok(Self {
-            prisms: upload(device, "relief prisms", parts.prisms, storage)?,
-            surfaces: upload(device, "relief surfaces", parts.surfaces, storage)?,
-            tiles: upload(device, "relief tiles", parts.tiles, storage)?,
-            pyramids: upload(device, "relief pyramids", parts.pyramids, storage)?,
-            factors: upload(device, "relief factors", parts.factors, storage)?,
-            coefficients: upload(device, "relief coefficients", parts.coefficients, storage)?,
-            exits: upload(device, "relief exits", parts.exits, storage)?,
-            parallel_lights: upload(device, "relief clusters", parts.parallel_lights, storage)?,
+            prisms: upload(device, "relief prisms", parts.prisms, texels)?,
+            surfaces: upload(device, "relief surfaces", parts.surfaces, texels)?,
+            tiles: upload(device, "relief tiles", parts.tiles, texels)?,
+            pyramids: upload(device, "relief pyramids", parts.pyramids, texels)?,
+            factors: upload(device, "relief factors", parts.factors, texels)?,
+            coefficients: upload(device, "relief coefficients", parts.coefficients, texels)?,
+            exits: upload(device, "relief exits", parts.exits, texels)?,
+            parallel_lights: upload(device, "relief clusters", parts.parallel_lights, texels)?,
             vertices: upload(device, "relief vertices", &vertices, BufferUse::Geometry)?,
             indices: upload(device, "relief indices", &indices, BufferUse::Geometry)?,
         })

@@ -33,12 +33,7 @@ impl ReliefRays {
         rays: &[HeightRay],
     ) -> Result<Vec<HeightHit>> {
         let tiles = upload(&self.device, "height tiles", tiles, BufferUse::Storage)?;
-        let pyramids = upload(
-            &self.device,
-            "height pyramids",
-            pyramids,
-            BufferUse::Storage,
-        )?;
+        let pyramids = upload(&self.device, "height pyramids", pyramids, BufferUse::Texels)?;
         let count = rays.len() as u32;
         let rays = upload(&self.device, "height rays", rays, BufferUse::Storage)?;
         let bytes = u64::from(count) * size_of::<HeightHit>() as u64;

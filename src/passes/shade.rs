@@ -7,8 +7,10 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 
+use super::buffers::upload;
 use super::shaders::shade::{Bindings, SHADER};
-use super::shadow_rays::LightBuffers;
+use super::shadow_rays::{LightBuffers, LightCounts};
+use super::types::LitTriangle;
 use crate::error::Result;
 use crate::vk::{
     Attachment, Buffer, BufferUse, Commands, DescriptorSet, Device, Format, Framebuffer,
@@ -35,12 +37,35 @@ pub struct Vertex {
 /// first.
 pub use super::shaders::shade::Parameters;
 
+/// What is lit straight, on the device.
+pub struct LitBuffers {
+    triangles: Buffer,
+    part_states: Buffer,
+}
+
+impl LitBuffers {
+    /// `[drawn triangle]`, or none where nothing is lit straight; and PART_… of their parts, two
+    /// bits each.
+    ///
+    /// # Errors
+    /// A device without the memory.
+    pub fn new(device: &Arc<Device>, triangles: &[LitTriangle], states: &[u32]) -> Result<Self> {
+        let texels = BufferUse::Texels;
+        Ok(Self {
+            triangles: upload(device, "lit triangles", triangles, texels)?,
+            part_states: upload(device, "parts of lit triangles", states, texels)?,
+        })
+    }
+}
+
 impl Parameters {
-    /// The same, lit straight by so many light points, of which so many are of emitters.
-    pub fn lit_by(self, [light_count, emitter_points]: [u32; 2]) -> Self {
+    /// The same, lit straight by so many lights, in a tile with that sample in its top left corner.
+    pub fn lit_by(self, counts: LightCounts, corner: [u32; 2]) -> Self {
         Self {
-            light_count,
-            emitter_points,
+            light_count: counts.points,
+            emitter_points: counts.of_emitters,
+            polygon_count: counts.polygons,
+            corner,
             ..self
         }
     }
@@ -124,19 +149,16 @@ impl Shade {
     }
 
     /// Binds the texture of a material, the light points with what casts shadows, and what they
-    /// light, [`LitTriangle`]s by the order of the drawn triangles; none are needed where nothing
-    /// is drawn by light points.
+    /// light.
     ///
     /// # Errors
     /// A device without the memory.
-    ///
-    /// [`LitTriangle`]: super::types::LitTriangle
     pub fn bind(
         &self,
         albedo: &Image,
         sampler: &Sampler,
         lights: &LightBuffers,
-        lit: &Buffer,
+        lit: &LitBuffers,
     ) -> Result<DescriptorSet> {
         self.pipeline.bind(
             "shade",
@@ -148,8 +170,10 @@ impl Shade {
                 light_points: &lights.points,
                 shadow_nodes: &lights.nodes,
                 shadow_triangles: &lights.triangles,
-                lit_triangles: lit,
+                lit_triangles: &lit.triangles,
+                part_states: &lit.part_states,
                 webs: &lights.webs,
+                light_polygons: &lights.polygons,
             },
         )
     }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::buffers::{download, upload};
 use super::groups;
 use super::shaders::shadow_rays::{Bindings, Parameters, SHADER};
-use super::types::{LightPoint, ShadowRay};
+use super::types::{LightPoint, LightPolygon, ShadowRay};
 use crate::constants::KIND_SURFACE;
 use crate::error::Result;
 use crate::mesh::shadow_tree::ShadowTree;
@@ -19,29 +19,54 @@ pub struct LightBuffers {
     pub triangles: Buffer,
     /// Shares of the intensity of beams.
     pub webs: Buffer,
-    /// All light points, and those of emitters.
-    pub counts: [u32; 2],
+    pub polygons: Buffer,
+    pub counts: LightCounts,
+}
+
+/// How many lights there are.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct LightCounts {
+    /// All light points.
+    pub points: u32,
+    /// Those of emitters, which come first.
+    pub of_emitters: u32,
+    /// Emitters and suns in closed form; without any, emitters shine by their points alone.
+    pub polygons: u32,
+}
+
+/// Lights that are seen from places.
+#[derive(Debug, Default)]
+pub struct Lights {
+    /// Points of emitters first, LIGHT_SETS · LIGHT_POINTS or none.
+    pub points: Vec<LightPoint>,
+    /// Shares of the intensity of beams.
+    pub webs: Vec<f32>,
+    /// All emitters and suns, or none.
+    pub polygons: Vec<LightPolygon>,
 }
 
 impl LightBuffers {
-    /// Points of emitters first, LIGHT_SETS · LIGHT_POINTS or none.
-    ///
     /// # Errors
     /// A device without the memory.
-    pub fn new(
-        device: &Arc<Device>,
-        points: &[LightPoint],
-        webs: &[f32],
-        tree: &ShadowTree,
-    ) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, lights: &Lights, tree: &ShadowTree) -> Result<Self> {
+        let Lights {
+            points,
+            webs,
+            polygons,
+        } = lights;
         let emitters = points.iter().filter(|p| p.kind == KIND_SURFACE).count();
-        let storage = BufferUse::Storage;
+        let texels = BufferUse::Texels;
         Ok(Self {
-            points: upload(device, "light points", points, storage)?,
-            nodes: upload(device, "shadow nodes", tree.nodes(), storage)?,
-            triangles: upload(device, "shadow triangles", &tree.triangles, storage)?,
-            webs: upload(device, "webs", webs, storage)?,
-            counts: [points.len() as u32, emitters as u32],
+            points: upload(device, "light points", points, texels)?,
+            nodes: upload(device, "shadow nodes", tree.nodes(), texels)?,
+            triangles: upload(device, "shadow triangles", &tree.triangles, texels)?,
+            webs: upload(device, "webs", webs, BufferUse::Storage)?,
+            polygons: upload(device, "light polygons", polygons, texels)?,
+            counts: LightCounts {
+                points: points.len() as u32,
+                of_emitters: emitters as u32,
+                polygons: polygons.len() as u32,
+            },
         })
     }
 }
@@ -67,7 +92,7 @@ impl ShadowRays {
     /// # Errors
     /// A device that lacks the memory or fails.
     pub fn run(&self, tree: &ShadowTree, rays: &[ShadowRay]) -> Result<Vec<bool>> {
-        let scene = LightBuffers::new(&self.device, &[], &[], tree)?;
+        let scene = LightBuffers::new(&self.device, &Lights::default(), tree)?;
         let count = rays.len() as u32;
         let rays = upload(&self.device, "shadow rays", rays, BufferUse::Storage)?;
         let bytes = u64::from(count) * 4;

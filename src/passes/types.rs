@@ -1,5 +1,6 @@
 //! How the structs that shaders read are made.
 
+use bytemuck::Zeroable;
 use glam::Vec3;
 
 use crate::constants::{KIND_SURFACE, NONE};
@@ -105,6 +106,7 @@ impl HeightTile {
             height: pyramid.height,
             top: pyramid.top(),
             highest: pyramid.highest(),
+            ..Self::zeroed()
         }
     }
 }

@@ -18,6 +18,14 @@ pub struct Tile {
     pub height: u32,
 }
 
+impl Tile {
+    /// The sample in its top left corner, counted over the whole picture; `samples` are along a
+    /// pixel's side.
+    pub fn corner(self, samples: u32) -> [u32; 2] {
+        [samples * self.column, samples * self.row]
+    }
+}
+
 /// A camera with its picture's shape.
 pub struct Projection {
     /// Position of the eye, scene units.

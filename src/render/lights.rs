@@ -1,9 +1,10 @@
-//! Light points that represent emitters and point lights where their light is drawn sharply, and
-//! the shadow casters.
+//! Lights where their light is drawn sharply: emitters in closed form, points that stand for them
+//! where shadows are looked for, point lights; and the shadow casters.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -14,8 +15,8 @@ use crate::constants::{KIND_BEAM, KIND_POINT, KIND_SURFACE, LIGHT_POINTS, LIGHT_
 use crate::error::Result;
 use crate::mesh::shadow_tree::ShadowTree;
 use crate::mesh::sources::triangle_area;
-use crate::passes::shadow_rays::LightBuffers;
-use crate::passes::types::{LightPoint, ShadowTriangle};
+use crate::passes::shadow_rays::{LightBuffers, Lights};
+use crate::passes::types::{LightPoint, LightPolygon, ShadowTriangle};
 use crate::picture::Projection;
 use crate::scene::{Beam, Scene, Sun};
 use crate::vk::Device;
@@ -65,6 +66,96 @@ pub(super) fn sun_disc(scene: &Scene, sun: &Sun) -> Vec<[DVec3; 3]> {
     (0..SIDES)
         .map(|i| [middle, corner(i), corner(i + 1)])
         .collect()
+}
+
+/// Most polygons whose light is found in closed form: each costs about as much as a light point.
+const MOST_POLYGONS: usize = 16;
+
+/// An emitter in closed form, its last corner twice if it is a triangle.
+struct Polygon {
+    corners: [DVec3; 4],
+    radiance: [f32; 3],
+}
+
+impl Polygon {
+    /// The same with a triangle that continues it across an edge to a convex quadrangle in one
+    /// plane, of the same radiance.
+    fn joined(&self, corners: [DVec3; 3], radiance: [f32; 3]) -> Option<Self> {
+        let [a, b, c, d] = self.corners;
+        if radiance != self.radiance || c != d {
+            return None;
+        }
+        let own = [a, b, c];
+        // The edge runs the other way in the other triangle.
+        let (k, l) = (0..3)
+            .flat_map(|k| (0..3).map(move |l| (k, l)))
+            .find(|&(k, l)| own[k] == corners[(l + 1) % 3] && own[(k + 1) % 3] == corners[l])?;
+        let new = corners[(l + 2) % 3];
+        let quad = [own[k], new, own[(k + 1) % 3], own[(k + 2) % 3]];
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let turns = |i: usize| {
+            let [p, q, r] = [0, 1, 2].map(|j| quad[(i + j) % 4]);
+            let turn = (q - p).cross(r - q);
+            turn.normalize_or_zero().dot(normal) > 1.0 - 1e-9
+        };
+        (0..4).all(turns).then_some(Self {
+            corners: quad,
+            ..*self
+        })
+    }
+}
+
+/// Emitters and suns whose light is found in closed form: all, or none where they are many.
+fn polygons(scene: &Scene, projection: &Projection) -> Vec<LightPolygon> {
+    let mut found: Vec<Polygon> = Vec::new();
+    for t in &scene.triangles {
+        let material = &scene.materials[t.material as usize];
+        let radiance = material.emitted_over(&t.uv_of_emission());
+        if !radiance.iter().any(|&c| c > 0.0) {
+            continue;
+        }
+        let corners = scene.corners(t);
+        // Those of one lamp come one after another.
+        let joined = found.last().and_then(|last| last.joined(corners, radiance));
+        match (found.last_mut(), joined) {
+            (Some(last), Some(joined)) => *last = joined,
+            _ => {
+                let [a, b, c] = corners;
+                found.push(Polygon {
+                    corners: [a, b, c, c],
+                    radiance,
+                });
+            }
+        }
+        if found.len() > MOST_POLYGONS {
+            return Vec::new();
+        }
+    }
+    let emitters = found.into_iter().map(|polygon| {
+        let seen = |p: DVec3| ((p - projection.eye) / projection.unit).as_vec3();
+        let [a, b, c, d] = polygon.corners.map(seen);
+        let strength = std::f32::consts::PI * Vec3::from(polygon.radiance);
+        LightPolygon {
+            a,
+            b,
+            c,
+            d,
+            strength,
+            far: 0,
+        }
+    });
+    let suns = scene.lights.suns.iter().map(|sun| {
+        let towards = sun.towards.as_vec3();
+        LightPolygon {
+            a: towards,
+            b: towards,
+            c: towards,
+            d: towards,
+            strength: sun.irradiance.into(),
+            far: 1,
+        }
+    });
+    emitters.chain(suns).collect()
 }
 
 /// LIGHT_SETS sets of LIGHT_POINTS points on the emitters, distributed by power, if there are
@@ -186,10 +277,7 @@ impl Shining {
             normal: self.normal.unwrap_or_default().as_vec3(),
             area: (self.area / square) as f32,
             strength: (self.strength / square).as_vec3(),
-            zero: Vec3::ZERO,
-            first_share: 0,
-            rows: 0,
-            columns: 0,
+            ..LightPoint::zeroed()
         };
         if let Some(beam) = &self.beam {
             point.kind = KIND_BEAM;
@@ -221,21 +309,19 @@ pub fn light_buffers(
         projection,
         ..
     } = *seen;
-    let mut webs = Vec::new();
-    let points: Vec<_> = if lighting.sharp() {
-        shining(scene)
-            .iter()
-            .map(|point| point.seen_from(projection, &mut webs))
-            .collect()
-    } else {
-        Vec::new()
-    };
-    if points.is_empty() {
-        let none = LightBuffers::new(device, &points, &[], &ShadowTree::default())?;
+    let mut lights = Lights::default();
+    if lighting.sharp() {
+        let points = shining(scene);
+        let seen = |point: &Shining| point.seen_from(projection, &mut lights.webs);
+        lights.points = points.iter().map(seen).collect();
+        lights.polygons = polygons(scene, projection);
+    }
+    if lights.points.is_empty() {
+        let none = LightBuffers::new(device, &lights, &ShadowTree::default())?;
         return Ok((none, None));
     }
     let tree = ShadowTree::new(casters(scene, lighting, projection));
-    let buffers = LightBuffers::new(device, &points, &webs, &tree)?;
+    let buffers = LightBuffers::new(device, &lights, &tree)?;
     let shafts = if lighting.skip_open {
         Shafts::new(tree, scene, projection)
     } else {
@@ -259,6 +345,7 @@ fn casters(scene: &Scene, lighting: &Lighting<'_>, projection: &Projection) -> V
                 b,
                 c,
                 relief: relief.into(),
+                ..ShadowTriangle::zeroed()
             }
         })
         .collect()

@@ -3,6 +3,7 @@
 use std::f32::consts::PI;
 use std::sync::Arc;
 
+use bytemuck::Zeroable;
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -10,11 +11,13 @@ use super::flat_relief::FlatRelief;
 use super::seen_scene::SeenScene;
 use super::shafts::Shafts;
 use super::textures::Bound;
-use super::{Joined, Light, corner_irradiance};
+use super::{Joined, Light, corner_irradiance, parts};
+use crate::constants::{PART_OPEN, PART_UNSURE};
 use crate::error::Result;
 use crate::mesh::corners::Corners;
 use crate::passes::buffers::upload;
-use crate::passes::shade::{Draw, Parameters, Vertex};
+use crate::passes::shade::{Draw, LitBuffers, Parameters, Vertex};
+use crate::passes::shadow_rays::LightCounts;
 use crate::passes::types::LitTriangle;
 use crate::picture::{NEAR, Projection, Tile};
 use crate::scene::{Material, Scene};
@@ -24,10 +27,12 @@ use crate::vk::{Buffer, BufferUse, Device};
 pub struct Mesh {
     pub vertices: Buffer,
     pub indices: Buffer,
-    /// Input of the lighting by light points, `[drawn triangle]`; empty where there is none.
-    pub lit: Buffer,
+    /// Input of the lighting by light points.
+    pub lit: LitBuffers,
     /// Number of lit triangles with nothing between them and the lights, and of all lit triangles.
     pub open: [usize; 2],
+    /// Number of parts of lit triangles, `[PART_…]`.
+    pub parts: [usize; 3],
     ranges: Vec<KindRange>,
 }
 
@@ -145,30 +150,33 @@ impl Mesh {
             });
             first += count;
         }
-        let lit = shafts.map_or_else(Vec::new, |shafts| {
-            lit_triangles(scene, &order, &vertices, shafts)
+        let lit = shafts.map_or_else(Lit::default, |shafts| {
+            let lit = lit_triangles(scene, &order, &vertices);
+            let pixel = projection.sample_angle(1);
+            Lit::new(lit, &order, shafts, pixel.into())
         });
         let fronts = order.iter().filter(|drawn| drawn.kind.is_lit()).count();
-        let open = lit.iter().filter(|t| t.open == 1).count();
         let indices: Vec<u32> = (0..vertices.len() as u32).collect();
         Ok(Self {
             vertices: upload(device, "shade vertices", &vertices, BufferUse::Geometry)?,
             indices: upload(device, "shade indices", &indices, BufferUse::Geometry)?,
-            lit: upload(device, "lit triangles", &lit, BufferUse::Storage)?,
-            open: [open, if lit.is_empty() { 0 } else { fronts }],
+            open: [lit.open, if lit.triangles.is_empty() { 0 } else { fronts }],
+            parts: lit.parts,
+            lit: LitBuffers::new(device, &lit.triangles, &lit.states)?,
             ranges,
         })
     }
 
-    /// Draws of one tile. `lights` counts light points as [`Parameters::lit_by`] does.
+    /// Draws of one tile, lit straight by so many lights.
     pub fn draws<'a>(
         &'a self,
         seen: &SeenScene<'a>,
         tile: Tile,
         textures: &'a Bound,
-        lights: [u32; 2],
+        lights: LightCounts,
     ) -> impl Iterator<Item = Draw<'a>> {
         let rows = seen.projection.rows(tile);
+        let corner = tile.corner(seen.samples);
         let (scene, part) = (seen.scene, seen.lighting.part);
         self.ranges.iter().map(move |range| Draw {
             first_vertex: range.first,
@@ -182,7 +190,7 @@ impl Mesh {
             parameters: match range.kind {
                 Kind::Front(m) => {
                     let material = &scene.materials[m as usize];
-                    let mut own = parameters(rows, Some(material), part).lit_by(lights);
+                    let mut own = parameters(rows, Some(material), part).lit_by(lights, corner);
                     if material.map_ke.is_some() {
                         own.emitted = Vec3::ZERO;
                     }
@@ -202,23 +210,78 @@ impl Mesh {
     }
 }
 
+/// What is lit straight, and the parts of it that see all of each light, or none.
+#[derive(Default)]
+struct Lit {
+    triangles: Vec<LitTriangle>,
+    /// Two bits a part.
+    states: Vec<u32>,
+    /// Triangles that are open as a whole.
+    open: usize,
+    /// `[PART_…]`
+    parts: [usize; 3],
+}
+
+impl Lit {
+    /// `pixel` is the angle of a pixel.
+    fn new(mut triangles: Vec<LitTriangle>, order: &[Drawn], shafts: &Shafts, pixel: f64) -> Self {
+        let levels = parts::levels(&triangles, pixel);
+        let drawn = triangles.par_iter().zip(order).zip(&levels);
+        let states: Vec<Vec<u8>> = drawn
+            .map(|((triangle, drawn), &level)| match drawn.kind.is_lit() {
+                true => parts::states(shafts, triangle, level),
+                false => vec![PART_UNSURE as u8],
+            })
+            .collect();
+        let mut words = Vec::new();
+        let (mut open, mut all) = (0, [0; 3]);
+        for (((triangle, states), level), drawn) in
+            triangles.iter_mut().zip(states).zip(levels).zip(order)
+        {
+            let level = if states.len() == 1 { 0 } else { level };
+            if drawn.kind.is_lit() {
+                let counts = parts::count(&states, level);
+                (0..3).for_each(|k| all[k] += counts[k]);
+            }
+            if let [state] = states[..] {
+                triangle.first_part = state.into();
+                open += usize::from(u32::from(state) == PART_OPEN);
+                continue;
+            }
+            triangle.level = level;
+            triangle.first_part = STATES_IN_WORD as u32 * words.len() as u32;
+            let word = |states: &[u8]| {
+                let bits = states
+                    .iter()
+                    .zip(0..)
+                    .map(|(&s, i)| u32::from(s) << (2 * i));
+                bits.sum::<u32>()
+            };
+            words.extend(states.chunks(STATES_IN_WORD).map(word));
+        }
+        Self {
+            triangles,
+            states: words,
+            open,
+            parts: all,
+        }
+    }
+}
+
+const STATES_IN_WORD: usize = 16;
+
 /// Height of the start of shadow rays above a triangle, as a share of its corners' greatest
 /// coordinate relative to the eye: 2⁻¹⁸. Places on it are interpolated with weights that sum to 1
 /// within about 2⁻²², so that they deviate from its plane by that share.
 const ABOVE: f32 = 1.0 / (1 << 18) as f32;
 
 /// `vertices` are those of the triangles in `order`, three each.
-fn lit_triangles(
-    scene: &Scene,
-    order: &[Drawn],
-    vertices: &[Vertex],
-    shafts: &Shafts,
-) -> Vec<LitTriangle> {
+fn lit_triangles(scene: &Scene, order: &[Drawn], vertices: &[Vertex]) -> Vec<LitTriangle> {
     let neighbours = Corners::new(scene);
     order
         .par_iter()
         .zip(vertices.par_chunks(3))
-        .map(|(&Drawn { kind, triangle: e }, drawn)| {
+        .map(|(&Drawn { triangle: e, .. }, drawn)| {
             let triangle = &scene.triangles[e];
             let plane = neighbours.normals[e];
             let [normal_a, normal_b, normal_c] = triangle.vertices.map(|vertex| {
@@ -228,7 +291,7 @@ fn lit_triangles(
             });
             let [a, b, c] = [0, 1, 2].map(|k| drawn[k].position);
             let furthest = a.abs().max(b.abs()).max(c.abs()).max_element();
-            let mut lit = LitTriangle {
+            LitTriangle {
                 a,
                 b,
                 c,
@@ -237,10 +300,8 @@ fn lit_triangles(
                 normal_c,
                 plane: plane.as_vec3(),
                 above: ABOVE * furthest,
-                open: 0,
-            };
-            lit.open = (kind.is_lit() && shafts.is_open(&lit)).into();
-            lit
+                ..LitTriangle::zeroed()
+            }
         })
         .collect()
 }
@@ -262,6 +323,8 @@ pub fn parameters([x, y, w]: [Vec3; 3], material: Option<&Material>, part: Light
         metered,
         light_count: 0,
         emitter_points: 0,
+        polygon_count: 0,
+        corner: [0; 2],
     }
 }
 

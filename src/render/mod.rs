@@ -17,6 +17,7 @@ mod lighting;
 mod lights;
 mod mesh;
 mod overdraw;
+mod parts;
 mod relief;
 mod relief_mesh;
 mod relief_scene;

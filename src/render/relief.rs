@@ -10,7 +10,7 @@ use super::seen_scene::SeenScene;
 use super::textures::Textures;
 use crate::error::Result;
 use crate::passes;
-use crate::passes::shadow_rays::LightBuffers;
+use crate::passes::shadow_rays::{LightBuffers, LightCounts};
 use crate::picture::Tile;
 use crate::vk::{Commands, DescriptorSet, Device, Sampler};
 
@@ -60,16 +60,17 @@ impl Relief {
     /// Draws one tile within the render pass that has begun.
     pub fn record(&self, cmd: &Commands, seen: &SeenScene<'_>, tile: Tile, lights: &LightBuffers) {
         let rows = seen.projection.rows(tile);
+        let corner = tile.corner(seen.samples);
         let directions = self.mesh.directions;
         let counts = if seen.lighting.shading == ReliefShading::Factored {
             lights.counts
         } else {
-            [0; 2]
+            LightCounts::default()
         };
         let draws = self.mesh.ranges.iter().zip(&self.sets);
         let draws = draws.map(|(range, set)| {
             let material = &seen.scene.materials[range.material as usize];
-            let shade = parameters(rows, Some(material), seen.lighting.part).lit_by(counts);
+            let shade = parameters(rows, Some(material), seen.lighting.part).lit_by(counts, corner);
             passes::relief::Draw {
                 first_prism: range.first,
                 prism_count: range.count,
@@ -84,6 +85,8 @@ impl Relief {
                     metered: shade.metered,
                     light_count: shade.light_count,
                     emitter_points: shade.emitter_points,
+                    polygon_count: shade.polygon_count,
+                    corner: shade.corner,
                     shading: self.shading,
                     view: seen.lighting.show.code(),
                     pixel: seen.projection.sample_angle(seen.samples),

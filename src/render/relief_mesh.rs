@@ -5,7 +5,8 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use glam::{DVec2, DVec3, Vec3};
+use bytemuck::Zeroable;
+use glam::{DVec2, DVec3, Vec3, Vec4};
 
 use super::flat_relief::{FlatRelief, Sorting};
 use super::relief_scene::ReliefScene;
@@ -246,6 +247,7 @@ impl PrismBuilder<'_> {
             first_cluster: clusters.0,
             cluster_count: clusters.1,
             slots: slot_colour(&self.kept.directions, &self.shown[m * k..][..k]),
+            ..Prism::zeroed()
         }
     }
 
@@ -264,7 +266,8 @@ impl PrismBuilder<'_> {
             let inside = coefficients(self.incident.inside);
             let arriving = coefficients(self.incident.arriving.as_deref());
             self.lit.push(&inside, &arriving);
-            self.lit.exits.extend_from_slice(&self.exits[slots]);
+            let exits = &self.exits[slots];
+            self.lit.exits.extend(exits.iter().map(|e| e.extend(0.0)));
         }
         known
     }
@@ -274,9 +277,9 @@ impl PrismBuilder<'_> {
 #[derive(Default)]
 struct LightVertices {
     /// Of the light inside and of the light that arrives, `[light vertex][rank]`.
-    coefficients: Vec<[Vec3; 2]>,
+    coefficients: Vec<[Vec4; 2]>,
     /// Radiosity sent, `[light vertex][slot]`.
-    exits: Vec<Vec3>,
+    exits: Vec<Vec4>,
     /// Index by meso vertex and surface.
     known: HashMap<(u32, u32), u32>,
 }
@@ -284,7 +287,7 @@ struct LightVertices {
 impl LightVertices {
     /// Coefficients `[rank]`; an empty list where there is no light.
     fn push(&mut self, inside: &[Vec3], arriving: &[Vec3]) {
-        let of = |values: &[Vec3], r: usize| values.get(r).copied().unwrap_or_default();
+        let of = |values: &[Vec3], r: usize| values.get(r).map_or(Vec4::ZERO, |c| c.extend(0.0));
         let both = (0..MOST_RANK as usize).map(|r| [of(inside, r), of(arriving, r)]);
         self.coefficients.extend(both);
     }

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use bytemuck::Zeroable;
 use glam::{DVec2, Vec4};
 use rayon::prelude::*;
 
@@ -87,6 +88,7 @@ impl Surfaces {
                 rank: factors.rank as u32,
                 first_factor: all.factors.len() as u32,
                 slope: (range.scale / tile.size).as_vec2(),
+                ..ReliefSurface::zeroed()
             });
             all.steepest.push(tile.field.steepest());
             all.tiles.push(height_tile);

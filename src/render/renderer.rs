@@ -268,6 +268,12 @@ impl<'a> Renderer<'a> {
         self.view.mesh.open
     }
 
+    /// Number of parts of plain triangles that follow shadow rays, that see all of each light, and
+    /// that see none.
+    pub fn parts(&self) -> [usize; 3] {
+        self.view.mesh.parts
+    }
+
     /// Share of a frame's pixels that show relief drawn by rays.
     pub fn relief_coverage(&self) -> Result<f64> {
         let (target, tile) = self.whole()?;

@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 
 use super::lights::sun_disc;
 use crate::mesh::shadow_tree::ShadowTree;
-use crate::passes::types::{LitTriangle, ShadowTriangle};
+use crate::passes::types::{LitTriangle, ShadowNode, ShadowTriangle};
 use crate::picture::Projection;
 use crate::scene::Scene;
 
@@ -128,22 +128,64 @@ impl Shafts {
         all
     }
 
-    /// Whether no shadow ray from the triangle to any light is blocked.
-    pub fn is_open(&self, t: &LitTriangle) -> bool {
-        let starts = starts(t);
+    /// Whether no shadow ray to any light from the part of a triangle with these corners is
+    /// blocked.
+    pub fn is_open(&self, t: &LitTriangle, corners: [DVec3; 3]) -> bool {
+        let starts = starts(t, corners);
+        let mut lamps = self.lamps.iter();
+        !self.lamps.is_empty() && lamps.all(|lamp| self.is_clear(t, &starts, lamp))
+    }
+
+    /// Whether all shadow rays are blocked, each lamp's by one triangle. Where no lamp shines
+    /// towards the part, it is open.
+    pub fn is_hidden(&self, t: &LitTriangle, corners: [DVec3; 3]) -> bool {
+        let starts = starts(t, corners);
+        let mut lamps = self.lamps.iter();
         !self.lamps.is_empty()
-            && self
-                .lamps
-                .iter()
-                .all(|lamp| self.is_clear(t, &starts, lamp))
+            && lamps.all(|lamp| self.is_behind(&starts, lamp) || self.is_covered(&starts, lamp))
+    }
+
+    /// Whether a lamp shines away from the starts.
+    fn is_behind(&self, starts: &[DVec3], lamp: &Lamp) -> bool {
+        lamp.plane.as_ref().is_some_and(|plane| {
+            let behind = |p: &DVec3| plane.normal.dot(*p) < plane.offset - 2.0 * self.margin;
+            starts.iter().all(behind)
+        })
+    }
+
+    /// Whether one triangle stands on all ways from the starts to a lamp. Places where ways between
+    /// two hulls pass a plane lie in the hull of those of ways between the corners.
+    fn is_covered(&self, starts: &[DVec3], lamp: &Lamp) -> bool {
+        let middle = |points: &[DVec3]| points.iter().sum::<DVec3>() / points.len() as f64;
+        let (from, to) = (middle(starts), middle(&lamp.ends));
+        let nodes = self.tree.nodes();
+        let mut at = 0;
+        while let Some(node) = nodes.get(at) {
+            if !enters(node, from, to) {
+                at = node.skip as usize;
+                continue;
+            }
+            let mut casters = self.tree.triangles[node.triangles()].iter();
+            let covers = |t: &ShadowTriangle| {
+                let plane = CasterPlane::new(t);
+                let mut ways = starts
+                    .iter()
+                    .flat_map(|&s| lamp.ends.iter().map(move |&e| (s, e)));
+                t.relief == 0
+                    && plane.is_between(from, to, self.margin)
+                    && ways.all(|(s, e)| plane.is_between(s, e, self.margin))
+            };
+            if casters.any(covers) {
+                return true;
+            }
+            at += 1;
+        }
+        false
     }
 
     fn is_clear(&self, t: &LitTriangle, starts: &[DVec3], lamp: &Lamp) -> bool {
-        if let Some(plane) = &lamp.plane {
-            let behind = |p: &DVec3| plane.normal.dot(*p) < plane.offset - 2.0 * self.margin;
-            if starts.iter().all(behind) {
-                return true;
-            }
+        if self.is_behind(starts, lamp) {
+            return true;
         }
         let hull: Vec<DVec3> = starts.iter().chain(&lamp.ends).copied().collect();
         let sides = self.sides(t, lamp, &hull);
@@ -214,13 +256,14 @@ impl Shafts {
 }
 
 /// Points whose hull contains the starts of all rays from the triangle, see `shade.frag`: the
-/// starts reach up to the tangent planes of its corners.
-fn starts(t: &LitTriangle) -> Vec<DVec3> {
-    let corners = [t.a, t.b, t.c].map(|v| v.as_dvec3());
+/// starts reach up to the tangent planes of its corners. `corners` are those of the part of the
+/// triangle that is asked for.
+fn starts(t: &LitTriangle, corners: [DVec3; 3]) -> Vec<DVec3> {
     let above = f64::from(t.above);
     let raised = corners.map(|c| c + t.plane.as_dvec3() * above);
     let mut starts = raised.to_vec();
-    for (corner, normal) in corners
+    for (corner, normal) in [t.a, t.b, t.c]
+        .map(|v| v.as_dvec3())
         .iter()
         .zip([t.normal_a, t.normal_b, t.normal_c].map(Vec3::as_dvec3))
     {
@@ -232,6 +275,50 @@ fn starts(t: &LitTriangle) -> Vec<DVec3> {
         }
     }
     starts
+}
+
+/// Whether a way passes a node's box.
+fn enters(node: &ShadowNode, from: DVec3, to: DVec3) -> bool {
+    let way = to - from;
+    let each = way.map(|c| 1.0 / if c == 0.0 { f64::MIN_POSITIVE } else { c });
+    let one = (node.low.as_dvec3() - from) * each;
+    let other = (node.high.as_dvec3() - from) * each;
+    let enter = one.min(other).max_element().max(0.0);
+    let leave = one.max(other).min_element().min(1.0);
+    enter <= leave
+}
+
+/// A caster as ways pass it.
+struct CasterPlane {
+    corners: [DVec3; 3],
+    normal: DVec3,
+    /// In its plane, unit, into the triangle from each edge.
+    inward: [DVec3; 3],
+}
+
+impl CasterPlane {
+    fn new(t: &ShadowTriangle) -> Self {
+        let corners = [t.a, t.b, t.c].map(|v| v.as_dvec3());
+        let [a, b, c] = corners;
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let inward = |from: DVec3, to: DVec3| normal.cross(to - from).normalize_or_zero();
+        Self {
+            corners,
+            normal,
+            inward: [inward(a, b), inward(b, c), inward(c, a)],
+        }
+    }
+
+    /// Whether it stands on a way for certain: further than `margin` from its ends and its edges.
+    fn is_between(&self, from: DVec3, to: DVec3, margin: f64) -> bool {
+        let off = |p: DVec3| self.normal.dot(p - self.corners[0]);
+        let (first, last) = (off(from), off(to));
+        if first * last >= 0.0 || first.abs() < margin || last.abs() < margin {
+            return false;
+        }
+        let place = from + (to - from) * (first / (first - last));
+        (0..3).all(|k| self.inward[k].dot(place - self.corners[k]) > margin)
+    }
 }
 
 /// Emitters in a plane, relative to the eye.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::error::Result;
-use crate::passes::shade::Shade;
+use crate::passes::shade::{LitBuffers, Shade};
 use crate::passes::shadow_rays::LightBuffers;
 use crate::scene::{Scene, Texture};
 use crate::vk::{Buffer, BufferUse, Commands, DescriptorSet, Device, Format, Image, Sampler};
@@ -77,7 +77,7 @@ impl Textures {
     ///
     /// # Errors
     /// A device without the memory.
-    pub fn bind(&self, shade: &Shade, lights: &LightBuffers, lit: &Buffer) -> Result<Bound> {
+    pub fn bind(&self, shade: &Shade, lights: &LightBuffers, lit: &LitBuffers) -> Result<Bound> {
         let set = |image| shade.bind(image, &self.sampler, lights, lit);
         Ok(Bound {
             of_material: self.of_material.clone(),
