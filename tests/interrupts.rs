@@ -109,7 +109,13 @@ fn signals_stop_with_their_exit_codes_and_replace_nothing() {
             if earlier {
                 std::fs::write(&output, "an earlier bake").expect("a file");
             }
-            let long = ["--patches", "20000", "--quality", "reference"];
+            let long = [
+                "--patches",
+                "20000",
+                "--no-refine",
+                "--quality",
+                "reference",
+            ];
             let mut command = bake(folder.path(), &long);
             command
                 .args(["-o", "box.safetensors"])
