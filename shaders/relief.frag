@@ -167,7 +167,8 @@ Base base_of(Prism p, ReliefSurface surface, Place place) {
 // from the way as the smooth normals of the triangle say, by triangles like this one, so that the
 // way's height above it is a parabola: bumps beyond a triangle's horizon still rise into the light,
 // and the next triangle's do not shadow what they cannot.
-bool shadowed_by_relief(Prism p, ReliefSurface surface, HeightTile tile, Place place, Base base, vec3 towards, out float leaves) {
+bool shadowed_by_relief(Prism p, ReliefSurface surface, HeightTile tile, Place place, Base base,
+                        vec3 towards, out float leaves) {
     // Slopes over the triangle, not over the tetrahedron of the place, at whose borders they jump.
     float out_of = dot(base.normal, towards) / dot(base.normal, base.axis);
     vec3 tangential = towards - base.axis * out_of;
@@ -284,7 +285,8 @@ vec3 factored(Prism p, ReliefSurface surface, Place place) {
         vec3 arriving = place.share.x * fetch(coefficients, of_a + 2 * r + 1).rgb
                       + place.share.y * fetch(coefficients, of_b + 2 * r + 1).rgb
                       + place.share.z * fetch(coefficients, of_c + 2 * r + 1).rgb;
-        vec4 factor = weight.x * fetch(factors, row + r) + weight.y * fetch(factors, row + surface.rank + r)
+        vec4 factor = weight.x * fetch(factors, row + r)
+                    + weight.y * fetch(factors, row + surface.rank + r)
                     + weight.z * fetch(factors, row + 2 * surface.rank + r)
                     + weight.w * fetch(factors, row + 3 * surface.rank + r);
         sum += factor.rgb * inside + factor.w * arriving;
@@ -328,7 +330,8 @@ void draw() {
         vec3 to_eye = -normalize(along);
         vec3 local = vec3(dot(p.tangent, to_eye), dot(p.bitangent, to_eye), max(dot(p.normal, to_eye), 0.2));
         HeightHit under;
-        bool found = march(tile, vec3(place.uv, surface.top), vec3(place.uv, surface.lowest), under);
+        vec3 down = vec3(place.uv, surface.lowest);
+        bool found = march(tile, vec3(place.uv, surface.top), down, under);
         float height = found ? under.height : surface.mean;
         place.uv += (height - surface.mean) * surface.slope * local.xy / local.z;
     }
@@ -345,7 +348,8 @@ void draw() {
     bool lit = view == VIEW_IRRADIANCE || as_seen && !wide;
     vec3 light = vec3(0.0);
     for (uint turns = lit ? 1 : 0; turns > 0; turns--) {
-        light = factored(p, surface, place) + sharp(p, surface, tile, place, at) + clustered(p, surface, tile, place);
+        light = factored(p, surface, place) + sharp(p, surface, tile, place, at)
+              + clustered(p, surface, tile, place);
     }
     vec3 sent = vec3(0.0);
     for (uint turns = as_seen && wide ? 1 : 0; turns > 0; turns--) {

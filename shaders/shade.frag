@@ -118,7 +118,8 @@ vec3 straight() {
             continue;
         }
         vec3 whole = light.strength * arrives;
-        vec3 open = state == PART_OPEN || !blocked(from, end_of_way(light), 0.0) ? whole : vec3(0.0);
+        bool is_open = state == PART_OPEN || !blocked(from, end_of_way(light), 0.0);
+        vec3 open = is_open ? whole : vec3(0.0);
         if (i < emitters) {
             of_all += whole;
             seen += open;
@@ -127,7 +128,8 @@ vec3 straight() {
         }
     }
     if (polygon_count > 0) {
-        seen = state == PART_OPEN || dark ? exact : shadowed(exact, seen, of_all) * (state == PART_HIDDEN ? 0.0 : 1.0);
+        float lit = state == PART_HIDDEN ? 0.0 : 1.0;
+        seen = state == PART_OPEN || dark ? exact : lit * shadowed(exact, seen, of_all);
     }
     return seen + points;
 }

@@ -1,5 +1,5 @@
-//! Lines to stdout and stderr, whose readers may have left or whose disk may be full: neither ends
-//! the work that the lines are about.
+//! Output to stdout and stderr that does not stop the work when the reader has left or the disk is
+//! full.
 
 use std::fmt::Arguments;
 use std::io::{self, ErrorKind, Write};
@@ -22,7 +22,7 @@ pub fn lost() -> Option<io::Error> {
     lost.take().filter(|e| e.kind() != ErrorKind::BrokenPipe)
 }
 
-/// Stderr without errors: there is nobody to tell.
+/// Stderr whose errors are ignored: they could be reported nowhere.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Stderr;
 

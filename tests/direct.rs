@@ -1,5 +1,5 @@
-//! Light straight from emitters in pictures: in closed form where nothing stands between, and without
-//! a pattern where something does.
+//! Light straight from emitters in pictures: in closed form where nothing stands between, and
+//! without a pattern where something does.
 
 mod common;
 
@@ -74,8 +74,8 @@ fn exact(p: DVec3) -> f64 {
     FLOOR * LAMP * to_polygon(p, DVec3::Y, &contour)
 }
 
-/// Off the closed form, of a pixel's mean. Measured: 9.8e-6; by points on the lamp alone 2.7e-3, and
-/// 7.1e-2 beside a lamp that goes on below the horizon.
+/// Off the closed form, of a pixel's mean. Measured: 9.8e-6; by points on the lamp alone 2.7e-3,
+/// and 7.1e-2 beside a lamp that goes on below the horizon.
 const OFF: f64 = 2e-5;
 
 /// The floor's two triangles are both shadowed somewhere; where they are not, light is exact.
@@ -94,12 +94,12 @@ fn light_is_exact_where_nothing_stands_between() {
     assert_silent();
 }
 
-/// Shares of the parts of triangles that are open and hidden, of all of the floor and of what hides the lamp.
+/// Shares of the parts of all triangles that are open, and that are hidden.
 /// Measured: 0.49 to 0.57, and 0.044 to 0.066.
 const KNOWN: [f64; 2] = [0.25, 0.022];
 
-/// Parts of two large triangles that see all of the lamp, or none, follow no ways, and the picture is
-/// the same to the bit.
+/// Parts of large triangles that see all of the lamp, or none, follow no shadow rays, and the
+/// picture is the same to the bit.
 #[test]
 fn parts_of_triangles_follow_no_ways() {
     let mut build = Build::of(scene());
@@ -220,8 +220,8 @@ fn power(values: &[f64], [u, v]: [usize; 2]) -> f64 {
     re * re + im * im
 }
 
-/// In the penumbra of the card, pixels take other points on the lamp: as noise, with no more power in
-/// the frequencies of a lattice of two, four and eight pixels than in others. Its mean is that of
+/// In the penumbra of the card, pixels take other points on the lamp: as noise, with no more power
+/// in the frequencies of a lattice of two, four and eight pixels than in others. Its mean is that of
 /// the closed form, shadowed place by place in f64.
 #[test]
 fn penumbrae_have_no_pattern() {
@@ -287,8 +287,8 @@ fn penumbrae_have_no_pattern() {
     assert_silent();
 }
 
-/// The largest of 24 powers of noise is 3.8 times the mean, and 5.5 times the median. Measured: 4.2;
-/// with the sets of points in turns 7e10.
+/// The largest of 24 powers of noise is 3.8 times the mean, and 5.5 times the median. Measured:
+/// 4.2; with the sets of points in turns 7e10.
 const PEAK: f64 = 8.4;
 
 /// Bias and rms. Measured: 0.33 and 3.6 %.

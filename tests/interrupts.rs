@@ -1,5 +1,5 @@
-//! What is solved is kept, whoever leaves meanwhile: readers of stdout and stderr, the disk's room,
-//! Ctrl-C and other signals.
+//! A bake keeps its result when stdout or stderr is closed, when the disk is full, and when Ctrl-C or
+//! another signal stops it.
 #![cfg(unix)]
 
 use std::fs::File;
@@ -39,7 +39,7 @@ fn code(mut child: Child) -> i32 {
 }
 
 #[test]
-fn readers_that_leave_end_no_bake() {
+fn closed_streams_do_not_stop_a_bake() {
     let folder = tempfile::tempdir().expect("a folder");
     let output = folder.path().join("box.safetensors");
     for closed in ["stderr", "stdout"] {
@@ -60,7 +60,7 @@ fn readers_that_leave_end_no_bake() {
 /// `--json` to a full disk is an error, after the bake is written.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_full_stdout_is_told() {
+fn a_full_stdout_is_an_error() {
     let folder = tempfile::tempdir().expect("a folder");
     let full = File::options().write(true).open("/dev/full");
     let mut command = bake(folder.path(), &QUICK);
@@ -72,8 +72,8 @@ fn a_full_stdout_is_told() {
     assert!(folder.path().join("box.safetensors").is_file());
 }
 
-/// A bake that finds no room for its form factors is kept, and one that finds none for itself is
-/// kept elsewhere.
+/// The bake is kept when its form factors cannot be written, and kept elsewhere when its own output
+/// cannot be.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_bake_outlives_a_full_disk() {
@@ -98,7 +98,7 @@ fn a_bake_outlives_a_full_disk() {
     assert!(Path::new(kept).is_file(), "{text}");
 }
 
-/// A bake that a signal stops is no whole one: its exit code says so, and an earlier file stays.
+/// A bake that a signal stops has that signal's exit code and does not replace an earlier file.
 #[test]
 fn signals_stop_with_their_exit_codes_and_replace_nothing() {
     let folder = tempfile::tempdir().expect("a folder");

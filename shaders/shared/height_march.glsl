@@ -1,7 +1,7 @@
 // Where a straight segment first passes below a bilinear, periodic height map: exact, by the
 // pyramid of maxima of src/meso/height_pyramid.rs. Including files have shared/types.glsl,
-// shared/texels.glsl and a `usamplerBuffer pyramid`, four values a texel; the steps of all marches are added to the variable ALL_STEPS if there
-// is one.
+// shared/texels.glsl and a `usamplerBuffer pyramid`, four values a texel; the steps of all marches
+// are added to the variable ALL_STEPS if there is one.
 //
 // Lengths are in texels here, x along columns and y along rows (down the image, against v), heights
 // as the map has them. A texel's centre has whole coordinates. f32 keeps no more than 1e-4 of a
@@ -171,7 +171,8 @@ bool march(HeightTile tile, vec3 from, vec3 to, out HeightHit hit) {
         vec3 along = gone * step;
 
         // Look closer where it comes below the highest of the block.
-        bool near = min(at.z, at.z + along.z) < value_of_pyramid(first + block.y * blocks.x + block.x);
+        float highest = value_of_pyramid(first + block.y * blocks.x + block.x);
+        bool near = min(at.z, at.z + along.z) < highest;
         if (near) {
             if (level > 0) {
                 level--;

@@ -1,5 +1,6 @@
-// What comes straight from emitters in closed form, as if nothing stood between. Including files have
-// shared/types.glsl, shared/texels.glsl, a `usamplerBuffer light_polygons`, and `polygon_count`.
+// What comes straight from emitters in closed form, as if nothing stood between. Including files
+// have shared/types.glsl, shared/texels.glsl, a `usamplerBuffer light_polygons`, and
+// `polygon_count`.
 
 #include "lambert.glsl"
 

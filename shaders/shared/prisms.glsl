@@ -119,7 +119,8 @@ bool meet_part(Part part, ReliefSurface surface, HeightTile tile, bool plane, ou
 }
 
 // The same within the prism.
-bool meet(Prism p, ReliefSurface surface, HeightTile tile, vec3 along, bool plane, out Place place) {
+bool meet(Prism p, ReliefSurface surface, HeightTile tile, vec3 along, bool plane,
+          out Place place) {
     const vec3 A = vec3(1.0, 0.0, 0.0);
     const vec3 B = vec3(0.0, 1.0, 0.0);
     const vec3 C = vec3(0.0, 0.0, 1.0);

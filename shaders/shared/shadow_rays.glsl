@@ -1,7 +1,7 @@
 // Whether a triangle stands on a straight way: a walk through the tree of
 // src/passes/shadow_rays.rs. Nodes stand in depth-first order, and each knows the one to go on with
-// if its box is missed: no stack, however deep the tree. Including files have shared/types.glsl, shared/texels.glsl, and `usamplerBuffer`s shadow_nodes and
-// shadow_triangles.
+// if its box is missed: no stack, however deep the tree. Including files have
+// shared/types.glsl, shared/texels.glsl, and `usamplerBuffer`s shadow_nodes and shadow_triangles.
 
 // Components of a way below this count as this, so that their reciprocals are finite: boxes are
 // padded by far more.

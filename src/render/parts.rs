@@ -1,13 +1,13 @@
 //! Parts of triangles that see all of each light, or none: what is drawn there follows no shadow
 //! rays.
 //!
-//! A triangle that is neither as a whole is cut like its corners' shares: lines of equal share of a,
-//! b and c cut each side in 2^level. Parts are judged from coarse to fine.
+//! A triangle that is neither as a whole is cut along lines of equal shares of its corners a, b and
+//! c, each side in 2^level. Parts are judged from coarse to fine.
 
 use glam::DVec3;
 
 use super::shafts::Shafts;
-use crate::constants::{PART_HIDDEN, PART_OPEN, PART_UNSURE};
+use crate::constants::PART_UNSURE;
 use crate::passes::types::LitTriangle;
 
 /// Most cuts of a side in two.
@@ -51,7 +51,7 @@ pub fn states(shafts: &Shafts, triangle: &LitTriangle, level: u32) -> Vec<u8> {
         upper: false,
     };
     let state = whole.state(shafts, triangle);
-    if level == 0 || state != PART_UNSURE {
+    if level == 0 || state != PART_UNSURE || shafts.is_empty() {
         return vec![state as u8];
     }
     let mut states = vec![PART_UNSURE as u8; 2 << (2 * level)];
@@ -151,12 +151,6 @@ impl Part {
     fn state(self, shafts: &Shafts, triangle: &LitTriangle) -> u32 {
         let [a, b, c] = [triangle.a, triangle.b, triangle.c].map(|v| v.as_dvec3());
         let corners = self.shares().map(|s| a * s.x + b * s.y + c * s.z);
-        if shafts.is_open(triangle, corners) {
-            PART_OPEN
-        } else if shafts.is_hidden(triangle, corners) {
-            PART_HIDDEN
-        } else {
-            PART_UNSURE
-        }
+        shafts.state(triangle, corners)
     }
 }

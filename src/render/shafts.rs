@@ -7,6 +7,7 @@
 use glam::{DVec3, Vec3};
 
 use super::lights::sun_disc;
+use crate::constants::{PART_HIDDEN, PART_OPEN, PART_UNSURE};
 use crate::mesh::shadow_tree::ShadowTree;
 use crate::passes::types::{LitTriangle, ShadowNode, ShadowTriangle};
 use crate::picture::Projection;
@@ -128,21 +129,27 @@ impl Shafts {
         all
     }
 
-    /// Whether no shadow ray to any light from the part of a triangle with these corners is
-    /// blocked.
-    pub fn is_open(&self, t: &LitTriangle, corners: [DVec3; 3]) -> bool {
-        let starts = starts(t, corners);
-        let mut lamps = self.lamps.iter();
-        !self.lamps.is_empty() && lamps.all(|lamp| self.is_clear(t, &starts, lamp))
+    /// Whether there are no shafts: then every part is PART_UNSURE.
+    pub fn is_empty(&self) -> bool {
+        self.lamps.is_empty()
     }
 
-    /// Whether all shadow rays are blocked, each lamp's by one triangle. Where no lamp shines
-    /// towards the part, it is open.
-    pub fn is_hidden(&self, t: &LitTriangle, corners: [DVec3; 3]) -> bool {
+    /// PART_… of the part of a triangle with these corners: open where no shadow ray to any light
+    /// is blocked, or none shines towards it; hidden where all are blocked, each lamp's by one
+    /// triangle.
+    pub fn state(&self, t: &LitTriangle, corners: [DVec3; 3]) -> u32 {
+        if self.is_empty() {
+            return PART_UNSURE;
+        }
         let starts = starts(t, corners);
         let mut lamps = self.lamps.iter();
-        !self.lamps.is_empty()
-            && lamps.all(|lamp| self.is_behind(&starts, lamp) || self.is_covered(&starts, lamp))
+        if lamps.clone().all(|lamp| self.is_clear(t, &starts, lamp)) {
+            PART_OPEN
+        } else if lamps.all(|l| self.is_behind(&starts, l) || self.is_covered(&starts, l)) {
+            PART_HIDDEN
+        } else {
+            PART_UNSURE
+        }
     }
 
     /// Whether a lamp shines away from the starts.
