@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// From below. Modules of one line do not use each other.
 const LAYERS: [&[&str]; 10] = [
-    &["constants", "error", "structs"],
+    &["console", "constants", "error", "structs"],
     &["atomic_file", "math", "vk"],
     &["scene"],
     &["meso", "picture"],
