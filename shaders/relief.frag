@@ -1,7 +1,6 @@
-// Relief mapping: the ray through the pixel is followed through the prism over a triangle, cut into
-// three tetrahedra in each of which texture coordinates and height are linear, to where it first
-// passes below the height map. Radiance there is ρ E / π + Le with E = Σ_r a_r β_r, the factors of
-// the relief and the light of the vertices (src/meso/factors.rs).
+// Relief mapping, second how it looks: shades what relief_hits found, each sample once. Radiance is
+// ρ E / π + Le with E = Σ_r a_r β_r, the factors of the relief and the light of the vertices
+// (src/meso/factors.rs).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -9,40 +8,36 @@
 #include "shared/texels.glsl"
 #include "shared/directions.glsl"
 
-layout(location = 0) in vec3 corner_position;
-layout(location = 1) flat in uint corner_prism;
-
 layout(location = 0) out vec4 radiance;
 
 layout(binding = 0) uniform sampler2D albedo;
-// Structs of shared/types.glsl by words, PRISM_TEXELS and so on each.
-layout(binding = 1) uniform usamplerBuffer prisms;
-layout(binding = 2) uniform usamplerBuffer surfaces;
+// See shared/prisms.glsl.
+layout(binding = 1) uniform usampler2D hits;
+layout(binding = 2) uniform usamplerBuffer prisms;
+layout(binding = 3) uniform usamplerBuffer surfaces;
 // [surface]
-layout(binding = 3) uniform usamplerBuffer tiles;
-layout(binding = 4) uniform usamplerBuffer pyramid;
+layout(binding = 4) uniform usamplerBuffer tiles;
+layout(binding = 5) uniform usamplerBuffer pyramid;
 // Irradiance for a unit of β, [surface][cell][corner][rank]: rgb by light from elsewhere in the
 // relief, w from outside.
-layout(binding = 5) uniform usamplerBuffer factors;
+layout(binding = 6) uniform usamplerBuffer factors;
 // β of the light, [light vertex][MOST_RANK][2]: of that which goes on inside the relief, and of
 // that which arrives.
-layout(binding = 6) uniform usamplerBuffer coefficients;
+layout(binding = 7) uniform usamplerBuffer coefficients;
 // Sent light by direction of the vertex's frame, as radiosity πL, [light vertex][direction].
-layout(binding = 7) uniform usamplerBuffer exits;
+layout(binding = 8) uniform usamplerBuffer exits;
 
-layout(binding = 8) uniform usamplerBuffer light_points;
-layout(binding = 9) uniform usamplerBuffer shadow_nodes;
-layout(binding = 10) uniform usamplerBuffer shadow_triangles;
+layout(binding = 9) uniform usamplerBuffer light_points;
+layout(binding = 10) uniform usamplerBuffer shadow_nodes;
+layout(binding = 11) uniform usamplerBuffer shadow_triangles;
 // By prism, where it is lit so.
-layout(binding = 11) uniform usamplerBuffer parallel_lights;
-layout(scalar, binding = 12) readonly buffer Webs { float webs[]; };
-layout(binding = 13) uniform usamplerBuffer light_polygons;
+layout(binding = 12) uniform usamplerBuffer parallel_lights;
+layout(scalar, binding = 13) readonly buffer Webs { float webs[]; };
+layout(binding = 14) uniform usamplerBuffer light_polygons;
 
 layout(push_constant, scalar) uniform Parameters {
-    vec3 x;
-    vec3 y;
-    vec3 w;
-    float near;
+    uint first_prism;    // of those of the material
+    uint prism_count;
     vec3 reflectance;
     vec3 emitted;        // Le, W·m⁻²·sr⁻¹
     float metered;
@@ -56,18 +51,13 @@ layout(push_constant, scalar) uniform Parameters {
     uvec2 corner;        // the tile's top left sample
 };
 
-uint march_steps = 0;
-#define ALL_STEPS march_steps
 #include "shared/height_march.glsl"
+#include "shared/prisms.glsl"
 #include "shared/light_points.glsl"
 #include "shared/light_polygons.glsl"
 #include "shared/shadow_rays.glsl"
 
 const float PI = 3.14159265358979;
-// Texels of a struct.
-const uint PRISM_TEXELS = 12;
-const uint SURFACE_TEXELS = 3;
-const uint TILE_TEXELS = 2;
 // Rays to lights begin so much of the relief's range above it.
 const float LIFT = 1e-4;
 // Shares of the relief's range by which a way to a light may leave the parabola that it is above a
@@ -75,62 +65,55 @@ const float LIFT = 1e-4;
 const float STRAIGHT = 0.01;
 const float CHORD_OFF = 0.02;
 const float MOST_CHORDS = 4.0;
-#include "shared/prisms.glsl"
 
-Prism load_prism(uint prism) {
-    uint first = PRISM_TEXELS * prism;
-    uvec4 words[11];
-    for (uint i = 0; i < 11; i++) {
-        words[i] = fetch_words(prisms, first + i);
-    }
-    Prism p;
-    p.low_a = uintBitsToFloat(words[0].xyz);
-    p.light_a = words[0].w;
-    p.low_b = uintBitsToFloat(words[1].xyz);
-    p.light_b = words[1].w;
-    p.low_c = uintBitsToFloat(words[2].xyz);
-    p.light_c = words[2].w;
-    p.high_a = uintBitsToFloat(words[3].xyz);
-    p.surface = words[3].w;
-    p.high_b = uintBitsToFloat(words[4].xyz);
-    p.first_cluster = words[4].w;
-    p.high_c = uintBitsToFloat(words[5].xyz);
-    p.cluster_count = words[5].w;
-    p.uv_a = uintBitsToFloat(words[6].xy);
-    p.uv_b = uintBitsToFloat(words[6].zw);
-    p.uv_c = uintBitsToFloat(words[7].xy);
-    p.texel = uintBitsToFloat(words[7].z);
-    p.tangent = uintBitsToFloat(words[8].xyz);
-    p.bitangent = uintBitsToFloat(words[9].xyz);
-    p.normal = uintBitsToFloat(words[10].xyz);
-    return p;
+// A place on the relief.
+struct Place {
+    vec2 uv;
+    vec3 share;          // of the triangle's corners a, b, c
+    vec3 at;             // from the eye
+    vec2 gradient;       // dh/du, dh/dv
+    float height;
+    mat3 slopes;         // of u, v and height in space, an internal unit
+};
+
+// dh/du and dh/dv where the texture coordinates are.
+vec2 gradient_at(HeightTile tile, vec2 uv) {
+    vec2 scale = vec2(float(tile.width), -float(tile.height));
+    vec2 texel = uv * scale - 0.5;
+    vec2 low = floor(texel);
+    vec2 size = abs(scale);
+    ivec2 cell = min(ivec2(low - size * floor(low / size)), ivec2(size) - 1);
+    Patch here = patch_of(tile, cell);
+    return (here.slope + here.twist * (texel - low).yx) * scale;
 }
 
-ReliefSurface load_surface(uint surface) {
-    uint first = SURFACE_TEXELS * surface;
-    uvec4 heights = fetch_words(surfaces, first);
-    uvec4 sizes = fetch_words(surfaces, first + 1);
-    ReliefSurface s;
-    s.lowest = uintBitsToFloat(heights.x);
-    s.top = uintBitsToFloat(heights.y);
-    s.mean = uintBitsToFloat(heights.z);
-    s.rank = heights.w;
-    s.columns = sizes.x;
-    s.rows = sizes.y;
-    s.first_factor = sizes.z;
-    s.slope = fetch(surfaces, first + 2).xy;
-    return s;
+// The place of a hit.
+Place place_of(Prism p, ReliefSurface surface, HeightTile tile, uvec4 hit) {
+    Place place;
+    vec2 shares = uintBitsToFloat(hit.yz);
+    place.share = vec3(1.0 - shares.x - shares.y, shares);
+    place.height = uintBitsToFloat(hit.w);
+    place.uv = place.share.x * p.uv_a + place.share.y * p.uv_b + place.share.z * p.uv_c;
+    uint which = hit.x >> PRISM_BITS & 3;
+    bool plane = shading != SHADING_RELIEF || (hit.x & HIT_WIDE) != 0;
+    place.gradient = plane ? vec2(0.0) : gradient_at(tile, place.uv);
+
+    // The shares of the high corners make up that of the height.
+    float risen = (place.height - surface.lowest) / (surface.top - surface.lowest);
+    vec3 high = which == 0 ? vec3(0.0, 0.0, risen)
+              : which == 1 ? vec3(0.0, risen - place.share.z, place.share.z)
+                           : vec3(risen - place.share.y - place.share.z, place.share.yz);
+    place.at = place.share.x * p.low_a + place.share.y * p.low_b + place.share.z * p.low_c
+             + high.x * (p.high_a - p.low_a) + high.y * (p.high_b - p.low_b) + high.z * (p.high_c - p.low_c);
+    Tetrahedron t = tetrahedron_of(p, surface, which);
+    mat3 edges = mat3(t.b.uvh - t.a.uvh, t.c.uvh - t.a.uvh, t.d.uvh - t.a.uvh);
+    place.slopes = transpose(edges * turn_of(t));
+    return place;
 }
 
-HeightTile load_tile(uint surface) {
-    uvec4 words = fetch_words(tiles, TILE_TEXELS * surface);
-    HeightTile t;
-    t.first = words.x;
-    t.width = words.y;
-    t.height = words.z;
-    t.top = words.w;
-    t.highest = fetch(tiles, TILE_TEXELS * surface + 1).x;
-    return t;
+// Of the surface, outward.
+vec3 facet_normal(Place place) {
+    return normalize(place.slopes * vec3(-place.gradient, 1.0));
 }
 
 // The surface that a prism stands on, as ways to lights pass over it.
@@ -226,8 +209,9 @@ bool shadowed_by_relief(Prism p, ReliefSurface surface, HeightTile tile, Place p
 
 // Light straight from emitters and point lights on the surface at a place, by its own normal,
 // shadowed by the relief and by the rest of the scene.
-vec3 sharp(Prism p, ReliefSurface surface, HeightTile tile, Place place, vec3 at) {
-    uint samples = light_samples();
+vec3 sharp(Prism p, ReliefSurface surface, HeightTile tile, Place place) {
+    vec3 at = place.at;
+    uint samples = p.state == PART_HIDDEN ? 0 : light_samples();
     if (samples == 0) {
         return vec3(0.0);
     }
@@ -248,7 +232,7 @@ vec3 sharp(Prism p, ReliefSurface surface, HeightTile tile, Place place, vec3 at
         vec3 whole = light.strength * arrives;
         float leaves;
         bool open = !shadowed_by_relief(p, surface, tile, place, base, towards, leaves)
-                    && !blocked(at, end_of_way(light), leaves * inversesqrt(square));
+                    && (p.state == PART_OPEN || !blocked(at, end_of_way(light), leaves * inversesqrt(square)));
         vec3 arrived = open ? whole : vec3(0.0);
         if (i < emitter_samples()) {
             of_all += whole;
@@ -308,26 +292,14 @@ vec3 mean_sent(Prism p, vec3 share, vec3 to_eye) {
     return sum;
 }
 
-void draw() {
-    // Nothing lies at the depth of 0, so that this is drawn nowhere.
-    radiance = vec4(0.0);
-    gl_FragDepth = 0.0;
-    // The back of a prism is seen from outside and from inside, and once.
-    if (gl_FrontFacing) {
-        return;
-    }
-    Prism p = load_prism(corner_prism);
+// Radiance of a hit on a prism, and whether an exposure meter looks at it.
+vec4 shade(uint prism, uvec4 hit) {
+    Prism p = load_prism(prism);
     ReliefSurface surface = load_surface(p.surface);
     HeightTile tile = load_tile(p.surface);
-    vec3 along = corner_position;
-    float footprint = length(corner_position) * pixel / p.texel;
-    bool wide = shading == SHADING_RELIEF && footprint > float(WIDEST_SAMPLE);
-    Place place;
-    if (!meet(p, surface, tile, along, shading != SHADING_RELIEF || wide, place)) {
-        return;
-    }
+    Place place = place_of(p, surface, tile, hit);
+    vec3 to_eye = -normalize(place.at);
     if (shading == SHADING_PARALLAX) {
-        vec3 to_eye = -normalize(along);
         vec3 local = vec3(dot(p.tangent, to_eye), dot(p.bitangent, to_eye), max(dot(p.normal, to_eye), 0.2));
         HeightHit under;
         vec3 down = vec3(place.uv, surface.lowest);
@@ -335,25 +307,20 @@ void draw() {
         float height = found ? under.height : surface.mean;
         place.uv += (height - surface.mean) * surface.slope * local.xy / local.z;
     }
-    vec3 at = (1.0 + place.along) * corner_position;
-    gl_FragDepth = near / dot(at, w);
-
+    float footprint = length(place.at) * pixel / p.texel;
     float level = log2(max(footprint / float(tile.width) * float(textureSize(albedo, 0).x), 1e-6));
     vec3 rho = reflectance * textureLod(albedo, vec2(place.uv.x, 1.0 - place.uv.y), level).rgb;
-    if (place.under) {
-        return;
-    }
+
     // Loops that take one turn at most: a software device works through what a branch leaves out.
-    bool as_seen = view == VIEW_SHADED || view == VIEW_OVERDRAW;
-    bool lit = view == VIEW_IRRADIANCE || as_seen && !wide;
+    bool wide = (hit.x & HIT_WIDE) != 0;
+    bool lit = view == VIEW_IRRADIANCE || view == VIEW_SHADED && !wide;
     vec3 light = vec3(0.0);
     for (uint turns = lit ? 1 : 0; turns > 0; turns--) {
-        light = factored(p, surface, place) + sharp(p, surface, tile, place, at)
-              + clustered(p, surface, tile, place);
+        light = factored(p, surface, place) + sharp(p, surface, tile, place) + clustered(p, surface, tile, place);
     }
     vec3 sent = vec3(0.0);
-    for (uint turns = as_seen && wide ? 1 : 0; turns > 0; turns--) {
-        sent = mean_sent(p, place.share, -normalize(along));
+    for (uint turns = view == VIEW_SHADED && wide ? 1 : 0; turns > 0; turns--) {
+        sent = mean_sent(p, place.share, to_eye);
     }
     vec3 shown;
     switch (view) {
@@ -370,18 +337,21 @@ void draw() {
         shown = light / PI;
         break;
     case VIEW_SLOTS:
-        shown = fetch(prisms, PRISM_TEXELS * corner_prism + 11).rgb;
+        shown = fetch(prisms, PRISM_TEXELS * prism + 11).rgb;
         break;
     default:
         shown = emitted + (rho * light + sent) / PI;
     }
-    radiance = vec4(shown, metered);
+    bool under = (hit.x & HIT_UNDER) != 0;
+    return under ? vec4(0.0) : vec4(shown, metered);
 }
 
 void main() {
-    draw();
-    // Every fragment is shaded, hidden or not, for its depth is its own; the pipeline adds them up.
-    if (view == VIEW_OVERDRAW && !gl_FrontFacing) {
-        radiance = vec4(1.0, float(march_steps), 0.0, 0.0);
+    uvec4 hit = texelFetch(hits, ivec2(gl_FragCoord.xy), 0);
+    uint prism = (hit.x & (1u << PRISM_BITS) - 1) - 1;
+    // Other materials have draws of their own.
+    if (prism - first_prism >= prism_count) {
+        discard;
     }
+    radiance = shade(min(prism, first_prism + prism_count - 1), hit);
 }

@@ -108,7 +108,6 @@ shared! {
     VIEW_HEIGHT = 3;
     VIEW_IRRADIANCE = 4;
     VIEW_SLOTS = 5;
-    VIEW_OVERDRAW = 6;
     /// Part of a triangle that lights are seen from: they may be hidden in part; nothing stands
     /// between; something stands before all of each.
     PART_UNSURE = 0;

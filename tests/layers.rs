@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// From below. Modules of one line do not use each other.
+/// From below. Modules of one line do not use each other; `say` is the macro of `console`.
 const LAYERS: [&[&str]; 10] = [
-    &["console", "constants", "error", "structs"],
+    &["console", "constants", "error", "say", "structs"],
     &["atomic_file", "math", "vk"],
     &["scene"],
     &["meso", "picture"],

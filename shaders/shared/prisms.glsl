@@ -1,34 +1,76 @@
-// Where a ray through a prism over a triangle meets its relief: the prism is cut into three
-// tetrahedra, in each of which texture coordinates and height are linear. After
-// shared/height_march.glsl.
+// Prisms over triangles with relief, each cut into three tetrahedra in which texture coordinates and
+// height are linear, and where the ray through a sample meets the relief in one: what
+// relief_hits.frag leaves for relief.frag. Including files have shared/types.glsl,
+// shared/texels.glsl and `usamplerBuffer`s prisms, surfaces and tiles: structs of
+// shared/types.glsl, so many texels each.
+const uint PRISM_TEXELS = 12;
+const uint SURFACE_TEXELS = 3;
+const uint TILE_TEXELS = 2;
 
-// Shares of its size that a tetrahedron is padded by.
-const float PADDING = 2e-5;
-// Share of a prism's height that counts as its bottom; MARGIN of src/render/relief_mesh.rs lies
-// below the relief.
-const float BOTTOM = 5e-4;
+// A hit: x is 0 of samples that meet no relief, or 1 + the prism in the lower bits and then the
+// tetrahedron and the marks below; y and z are the shares of the corners b and c, and w the height.
+const uint PRISM_BITS = 28;
+// The sample is wider than the texels, so that it has the mean height.
+const uint HIT_WIDE = 1u << 30;
+// Seen from below.
+const uint HIT_UNDER = 1u << 31;
 
-// A place on the relief.
-struct Place {
-    vec2 uv;
-    vec3 share;          // of the triangle's corners a, b, c
-    float along;         // on the ray, from corner_position
-    vec2 gradient;       // dh/du, dh/dv
-    float height;
-    mat3 slopes;         // of u, v and height in space, an internal unit
-    bool under;          // seen from below
-};
+Prism load_prism(uint prism) {
+    uint first = PRISM_TEXELS * prism;
+    uvec4 words[11];
+    for (uint i = 0; i < 11; i++) {
+        words[i] = fetch_words(prisms, first + i);
+    }
+    Prism p;
+    p.low_a = uintBitsToFloat(words[0].xyz);
+    p.light_a = words[0].w;
+    p.low_b = uintBitsToFloat(words[1].xyz);
+    p.light_b = words[1].w;
+    p.low_c = uintBitsToFloat(words[2].xyz);
+    p.light_c = words[2].w;
+    p.high_a = uintBitsToFloat(words[3].xyz);
+    p.surface = words[3].w;
+    p.high_b = uintBitsToFloat(words[4].xyz);
+    p.first_cluster = words[4].w;
+    p.high_c = uintBitsToFloat(words[5].xyz);
+    p.cluster_count = words[5].w;
+    p.uv_a = uintBitsToFloat(words[6].xy);
+    p.uv_b = uintBitsToFloat(words[6].zw);
+    p.uv_c = uintBitsToFloat(words[7].xy);
+    p.texel = uintBitsToFloat(words[7].z);
+    p.state = words[7].w;
+    p.tangent = uintBitsToFloat(words[8].xyz);
+    p.bitangent = uintBitsToFloat(words[9].xyz);
+    p.normal = uintBitsToFloat(words[10].xyz);
+    return p;
+}
 
-// The part of the ray in a tetrahedron: places on the ray, texture coordinates with height and the
-// shares of the triangle's corners at both ends.
-struct Part {
-    float enter;
-    float leave;
-    vec3 from;
-    vec3 to;
-    vec3 first;
-    vec3 last;
-};
+ReliefSurface load_surface(uint surface) {
+    uint first = SURFACE_TEXELS * surface;
+    uvec4 heights = fetch_words(surfaces, first);
+    uvec4 sizes = fetch_words(surfaces, first + 1);
+    ReliefSurface s;
+    s.lowest = uintBitsToFloat(heights.x);
+    s.top = uintBitsToFloat(heights.y);
+    s.mean = uintBitsToFloat(heights.z);
+    s.rank = heights.w;
+    s.columns = sizes.x;
+    s.rows = sizes.y;
+    s.first_factor = sizes.z;
+    s.slope = fetch(surfaces, first + 2).xy;
+    return s;
+}
+
+HeightTile load_tile(uint surface) {
+    uvec4 words = fetch_words(tiles, TILE_TEXELS * surface);
+    HeightTile t;
+    t.first = words.x;
+    t.width = words.y;
+    t.height = words.z;
+    t.top = words.w;
+    t.highest = fetch(tiles, TILE_TEXELS * surface + 1).x;
+    return t;
+}
 
 // A corner of a tetrahedron.
 struct Corner {
@@ -44,83 +86,8 @@ struct Tetrahedron {
     Corner d;
 };
 
-// From space to the shares of the corners b, c and d.
-mat3 turn_of(Tetrahedron t) {
-    mat3 edges = mat3(t.b.position - t.a.position, t.c.position - t.a.position,
-                      t.d.position - t.a.position);
-    float volume = determinant(edges);
-    return volume == 0.0 ? mat3(0.0) : inverse(edges);
-}
-
-Part cut(Tetrahedron t, vec3 from, vec3 along) {
-    mat3 turn = turn_of(t);
-    vec3 start = turn * (from - t.a.position);
-    vec3 each = turn * along;
-    vec4 at = vec4(1.0 - start.x - start.y - start.z, start);
-    vec4 rate = vec4(-each.x - each.y - each.z, each);
-    // Each share is positive behind its zero or before it. The ray begins at the eye, at s = -1.
-    bvec4 grows = greaterThan(rate, vec4(0.0));
-    bvec4 falls = lessThan(rate, vec4(0.0));
-    // A little wider than it is, so that a ray along a side that two of them share lies in one for
-    // certain.
-    vec4 padded = at + PADDING;
-    vec4 zero = -padded / mix(vec4(1.0), rate, notEqual(rate, vec4(0.0)));
-    vec4 behind = mix(vec4(-1.0), zero, grows);
-    vec4 before = mix(mix(vec4(NEVER), vec4(-NEVER), lessThan(padded, vec4(0.0))),
-                      mix(vec4(NEVER), zero, falls), notEqual(rate, vec4(0.0)));
-    Part part;
-    part.enter = max(max(max(behind.x, behind.y), max(behind.z, behind.w)), -1.0);
-    part.leave = min(min(before.x, before.y), min(before.z, before.w));
-    vec4 first = at + part.enter * rate;
-    vec4 last = at + part.leave * rate;
-    part.from = first.x * t.a.uvh + first.y * t.b.uvh + first.z * t.c.uvh + first.w * t.d.uvh;
-    part.to = last.x * t.a.uvh + last.y * t.b.uvh + last.z * t.c.uvh + last.w * t.d.uvh;
-    part.first = first.x * t.a.share + first.y * t.b.share + first.z * t.c.share
-                 + first.w * t.d.share;
-    part.last = last.x * t.a.share + last.y * t.b.share + last.z * t.c.share + last.w * t.d.share;
-    return part;
-}
-
-// Where the ray first meets the relief (or, for `plane`, the mean height) within a part of it.
-bool meet_part(Part part, ReliefSurface surface, HeightTile tile, bool plane, out Place place) {
-    if (part.leave <= part.enter) {
-        return false;
-    }
-    vec3 from = part.from;
-    vec3 to = part.to;
-    float t;
-    if (plane) {
-        float above = from.z - surface.mean;
-        float below = to.z - surface.mean;
-        if (!(above >= 0.0 && below < 0.0)) {
-            return false;
-        }
-        t = above / (above - below);
-        place.gradient = vec2(0.0);
-        place.height = surface.mean;
-        place.under = false;
-    } else {
-        HeightHit hit;
-        if (!march(tile, from, to, hit)) {
-            return false;
-        }
-        // A ray that comes in through the bottom shows the underside; one that comes in below the
-        // surface through a side, at a seam of heights, shows the step.
-        place.under = hit.t == 0.0
-                      && from.z < surface.lowest + BOTTOM * (surface.top - surface.lowest);
-        t = hit.t;
-        place.gradient = hit.gradient;
-        place.height = hit.height;
-    }
-    place.uv = mix(from.xy, to.xy, t);
-    place.share = mix(part.first, part.last, t);
-    place.along = mix(part.enter, part.leave, t);
-    return true;
-}
-
-// The same within the prism.
-bool meet(Prism p, ReliefSurface surface, HeightTile tile, vec3 along, bool plane,
-          out Place place) {
+// The low one, the middle one or the high one.
+Tetrahedron tetrahedron_of(Prism p, ReliefSurface surface, uint which) {
     const vec3 A = vec3(1.0, 0.0, 0.0);
     const vec3 B = vec3(0.0, 1.0, 0.0);
     const vec3 C = vec3(0.0, 0.0, 1.0);
@@ -133,40 +100,13 @@ bool meet(Prism p, ReliefSurface surface, HeightTile tile, vec3 along, bool plan
     Tetrahedron low = Tetrahedron(low_a, low_b, low_c, high_c);
     Tetrahedron middle = Tetrahedron(low_a, low_b, high_b, high_c);
     Tetrahedron high = Tetrahedron(low_a, high_a, high_b, high_c);
-    Part parts_low = cut(low, corner_position, along);
-    Part parts_middle = cut(middle, corner_position, along);
-    Part parts_high = cut(high, corner_position, along);
-
-    // Nearest first: the middle one lies between the others, so that the ray meets the low or the
-    // high one first.
-    bool from_high = parts_high.enter < parts_low.enter && parts_high.leave > parts_high.enter
-                   || parts_low.leave <= parts_low.enter;
-    bool in_middle_first = parts_middle.leave > parts_middle.enter
-        && parts_middle.enter < min(parts_low.leave > parts_low.enter ? parts_low.enter : NEVER,
-                                    parts_high.leave > parts_high.enter ? parts_high.enter : NEVER);
-    uint found = 3;
-    for (uint round = 0; round < 3 && found == 3; round++) {
-        uint which;
-        if (in_middle_first) {
-            which = round == 0 ? 1 : (round == 1) == from_high ? 2 : 0;
-        } else {
-            which = round == 1 ? 1 : (round == 0) == from_high ? 2 : 0;
-        }
-        Part part = which == 0 ? parts_low : which == 1 ? parts_middle : parts_high;
-        if (meet_part(part, surface, tile, plane, place)) {
-            found = which;
-        }
-    }
-    if (found == 3) {
-        return false;
-    }
-    Tetrahedron t = found == 0 ? low : found == 1 ? middle : high;
-    mat3 edges = mat3(t.b.uvh - t.a.uvh, t.c.uvh - t.a.uvh, t.d.uvh - t.a.uvh);
-    place.slopes = transpose(edges * turn_of(t));
-    return true;
+    return which == 0 ? low : which == 1 ? middle : high;
 }
 
-// Of the surface, outward.
-vec3 facet_normal(Place place) {
-    return normalize(place.slopes * vec3(-place.gradient, 1.0));
+// From space to the shares of the corners b, c and d.
+mat3 turn_of(Tetrahedron t) {
+    mat3 edges = mat3(t.b.position - t.a.position, t.c.position - t.a.position,
+                      t.d.position - t.a.position);
+    float volume = determinant(edges);
+    return volume == 0.0 ? mat3(0.0) : inverse(edges);
 }

@@ -204,15 +204,15 @@ struct Prism {
     vec2 uv_b;
     vec2 uv_c;
     float texel;        // internal units
-    uint unused_a;
+    uint state;         // PART_… of the ways from it to the lights, past other surfaces
     vec3 tangent;       // frame of the triangle
-    uint unused_b;
+    uint unused_a;
     vec3 bitangent;
-    uint unused_c;
+    uint unused_b;
     vec3 normal;
-    uint unused_d;
+    uint unused_c;
     vec3 slots;         // false colour of its light by direction
-    uint unused_e;
+    uint unused_d;
 };
 
 // A parallel light on a face, in place of the light from near-parallel directions.

@@ -30,6 +30,10 @@ pub struct Options<'a> {
     /// whose number grows with the number of lit slots.
     pub shots: u32,
     pub cache: Option<&'a Path>,
+    /// Names of [`SHADINGS`].
+    pub shadings: Vec<String>,
+    /// Numbers of directions.
+    pub directions: Vec<u32>,
 }
 
 /// One kind of frame.
@@ -52,7 +56,7 @@ pub struct Row {
 }
 
 /// How frames are drawn, by name.
-const SHADINGS: [(&str, ReliefShading, Direct); 6] = [
+pub const SHADINGS: [(&str, ReliefShading, Direct); 6] = [
     ("none", ReliefShading::None, Direct::Slots),
     ("normal", ReliefShading::Normal, Direct::Slots),
     ("parallax", ReliefShading::Parallax, Direct::Slots),
@@ -60,18 +64,26 @@ const SHADINGS: [(&str, ReliefShading, Direct); 6] = [
     ("factored, sharp", ReliefShading::Factored, Direct::Sharp),
     ("clusters", ReliefShading::Clusters, Direct::Slots),
 ];
-const DIRECTIONS: [u32; 3] = [16, 32, 64];
+pub const DIRECTIONS: [u32; 3] = [16, 32, 64];
 
-/// Measures frames of one scene, prints them, and appends them to `rows`.
+/// Measures frames of one scene, prints them, and appends them to `rows`. `go_on` is told what is
+/// done next, and asked before it; what has been measured in whole rounds stays.
+///
+/// # Errors
+/// A scene without a camera; a device that lacks the memory or fails.
 pub fn run(
     device: &Arc<Device>,
     scene: &Scene,
     options: &Options<'_>,
     rows: &mut Vec<Row>,
+    go_on: &dyn Fn(String) -> bool,
 ) -> Result<()> {
-    let solutions = DIRECTIONS
-        .iter()
-        .map(|&k| {
+    let mut solutions = Vec::new();
+    for &k in &options.directions {
+        if !go_on(format!("baking {} in {k} directions", scene.name)) {
+            return Ok(());
+        }
+        solutions.push({
             let settings = Settings {
                 shots: Some(options.shots),
                 relief: ReliefOptions {
@@ -81,9 +93,9 @@ pub fn run(
                 },
                 ..Settings::default()
             };
-            bake::bake(device, scene, &settings, |_| true)
-        })
-        .collect::<Result<Vec<Solution>>>()?;
+            bake::bake(device, scene, &settings, |_| true)?
+        });
+    }
     let own = scene.cameras.first().cloned().ok_or_else(|| {
         Error::Usage(format!(
             "scene {} has no camera to draw frames from",
@@ -99,7 +111,7 @@ pub fn run(
                 height,
             };
             let first = rows.len();
-            measure(device, scene, &solutions, &view, options, rows)?;
+            measure(device, scene, &solutions, &view, options, rows, go_on)?;
             for row in &rows[first..] {
                 crate::say!("{}", line(row, &rows[first..]));
             }
@@ -116,13 +128,22 @@ fn measure(
     view: &View<'_>,
     options: &Options<'_>,
     rows: &mut Vec<Row>,
+    go_on: &dyn Fn(String) -> bool,
 ) -> Result<()> {
     let mut found = Vec::new();
     let mut renderers = Vec::new();
-    for (name, shading, direct) in SHADINGS {
-        for (&k, solution) in DIRECTIONS.iter().zip(solutions) {
-            if shading == ReliefShading::None && k != DIRECTIONS[0] {
+    let wanted = |name: &str| options.shadings.iter().any(|wanted| wanted == name);
+    for (name, shading, direct) in SHADINGS.into_iter().filter(|s| wanted(s.0)) {
+        for (&k, solution) in options.directions.iter().zip(solutions) {
+            if shading == ReliefShading::None && k != options.directions[0] {
                 continue;
+            }
+            let camera = &view.camera.name;
+            if !go_on(format!(
+                "{}, {camera}: preparing {name}, K = {k}",
+                scene.name
+            )) {
+                return Ok(());
             }
             let lighting = Lighting {
                 shading,
@@ -146,7 +167,16 @@ fn measure(
             renderers.push(renderer);
         }
     }
-    let times = in_turns(&renderers, options.rounds)?;
+    let rounds = |round| {
+        let camera = &view.camera.name;
+        go_on(format!(
+            "{}, {camera}: round {round} of {}",
+            scene.name, options.rounds
+        ))
+    };
+    let Some(times) = in_turns_while(&renderers, options.rounds, rounds)? else {
+        return Ok(());
+    };
     for (row, (median, low, high)) in found.iter_mut().zip(times) {
         (row.median, row.low, row.high) = (median, low, high);
     }
@@ -162,8 +192,20 @@ fn measure(
 /// # Errors
 /// A device that fails.
 pub fn in_turns(renderers: &[Renderer<'_>], rounds: usize) -> Result<Vec<(f64, f64, f64)>> {
+    Ok(in_turns_while(renderers, rounds, |_| true)?.unwrap_or_default())
+}
+
+/// As [`in_turns`], as long as `go_on` says so before a round; None if not one was measured.
+fn in_turns_while(
+    renderers: &[Renderer<'_>],
+    rounds: usize,
+    go_on: impl Fn(usize) -> bool,
+) -> Result<Option<Vec<(f64, f64, f64)>>> {
     let mut times = vec![Vec::with_capacity(rounds); renderers.len()];
     for round in 0..=rounds {
+        if !go_on(round) {
+            break;
+        }
         for (renderer, times) in renderers.iter().zip(&mut times) {
             let taken = renderer.frames(1)?;
             if round > 0 {
@@ -171,7 +213,10 @@ pub fn in_turns(renderers: &[Renderer<'_>], rounds: usize) -> Result<Vec<(f64, f
             }
         }
     }
-    Ok(times.iter_mut().map(|times| spread(times)).collect())
+    if times.iter().any(Vec::is_empty) {
+        return Ok(None);
+    }
+    Ok(Some(times.iter_mut().map(|times| spread(times)).collect()))
 }
 
 pub const HEADER: &str = "scene             camera        size shading           K  relief   ms a frame (10 % to 90 %)    over K = 16  over none";

@@ -117,6 +117,12 @@ struct FrameOptions {
     /// Rounds; each draws every kind of frame once
     #[arg(long, value_name = "N", default_value_t = 15)]
     rounds: usize,
+    /// Only this shading; may be given again. All if not given
+    #[arg(long, value_name = "NAME", value_parser = frame::SHADINGS.map(|s| s.0))]
+    shading: Vec<String>,
+    /// Only so many directions; may be given again. 16, 32 and 64 if not given
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=64))]
+    directions: Vec<u32>,
     #[command(flatten)]
     builtin: Builtin,
     #[command(flatten)]
@@ -237,15 +243,33 @@ fn run_frame(options: &FrameOptions) -> Result<()> {
         rounds: options.rounds.max(1),
         shots: 1024,
         cache: cache.as_deref(),
+        shadings: match options.shading.is_empty() {
+            true => frame::SHADINGS.map(|s| s.0.to_owned()).to_vec(),
+            false => options.shading.clone(),
+        },
+        directions: match options.directions.is_empty() {
+            true => frame::DIRECTIONS.to_vec(),
+            false => options.directions.clone(),
+        },
+    };
+    super::progress::catch_interrupts();
+    let bar = Bar::new();
+    let go_on = |text| {
+        bar.show(text);
+        !interrupted()
     };
     mesolux::say!("{}", device.name());
     mesolux::say!("{}", frame::HEADER);
     let mut rows = Vec::new();
     for name in &scenes {
         let scene = options.builtin.load(name)?;
-        frame::run(&device, &scene, &wanted, &mut rows)?;
+        frame::run(&device, &scene, &wanted, &mut rows, &go_on)?;
+        if rows.is_empty() {
+            continue;
+        }
         frame::write(&rows, &options.output)?;
     }
+    bar.finish();
     options.device.check()
 }
 

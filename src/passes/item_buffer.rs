@@ -14,7 +14,7 @@ use crate::constants::{FACES, NONE};
 use crate::error::Result;
 use crate::math::hemicube::face_rectangle;
 use crate::vk::{
-    Attachment, Commands, DescriptorSet, Device, Format, GraphicsPipeline, GraphicsState,
+    Attachment, Blending, Commands, DescriptorSet, Device, Format, GraphicsPipeline, GraphicsState,
     RenderPass, Stage, VertexAttribute,
 };
 
@@ -43,7 +43,8 @@ impl ItemBuffer {
                     format: Format::R32G32B32_SFLOAT,
                     offset: 0,
                 }],
-                sums: false,
+                blending: Blending::Nearest,
+                backs_alone: false,
             },
         )?;
         Ok(Self {
@@ -97,7 +98,7 @@ impl ItemBuffer {
     ) {
         let hemicubes = batch.hemicubes();
         cmd.begin_render_pass(pass, &hemicubes.framebuffer, [NONE; 4]);
-        cmd.bind_graphics(&self.pipeline, set, &scene.vertices);
+        cmd.bind_graphics(&self.pipeline, set, Some(&scene.vertices));
         cmd.bind_indices(&hemicubes.drawn_corners);
         for slot in 0..batch.slot_count {
             for face in 0..FACES {

@@ -24,6 +24,8 @@ pub mod occluder_tree;
 pub mod receiver_blocks;
 pub mod relief;
 pub mod relief_buffers;
+pub mod relief_hits;
+pub mod relief_overdraw;
 pub mod relief_rays;
 pub mod relief_visibility;
 pub mod send_relief;

@@ -13,9 +13,9 @@ use super::shadow_rays::{LightBuffers, LightCounts};
 use super::types::LitTriangle;
 use crate::error::Result;
 use crate::vk::{
-    Attachment, Buffer, BufferUse, Commands, DescriptorSet, Device, Format, Framebuffer,
-    GraphicsPipeline, GraphicsState, Image, ImageUse, RenderPass, Sampled, Sampler, Stage,
-    VertexAttribute,
+    Attachment, Blending, Buffer, BufferUse, Commands, Depths, DescriptorSet, Device, Format,
+    Framebuffer, GraphicsPipeline, GraphicsState, Image, ImageUse, RenderPass, Sampled, Sampler,
+    Stage, VertexAttribute,
 };
 
 /// One corner of an element.
@@ -84,6 +84,8 @@ pub struct Draw<'a> {
 
 pub struct Shade {
     pass: RenderPass,
+    /// The same over depths that another pass has drawn.
+    over_depths: RenderPass,
     /// Whether depths are read back beside the radiance.
     depths: bool,
     pipeline: GraphicsPipeline,
@@ -113,7 +115,12 @@ impl Shade {
     /// A device that fails.
     pub fn new(device: &Arc<Device>, depths: bool, adds: bool) -> Result<Self> {
         let colour = Attachment::copied(FORMAT);
-        let pass = RenderPass::with_depth(device, "shade", colour, depths)?;
+        let after = match depths {
+            true => Depths::Copied,
+            false => Depths::Dropped,
+        };
+        let pass = RenderPass::with_depths(device, "shade", colour, after)?;
+        let over_depths = RenderPass::over_depths(device, "shade", colour, after)?;
         let attribute = |format, offset: usize| VertexAttribute {
             format,
             offset: offset as u32,
@@ -133,13 +140,19 @@ impl Shade {
                 ),
                 attribute(Format::R32G32_SFLOAT, std::mem::offset_of!(Vertex, uv)),
             ],
-            sums: false,
+            blending: Blending::Nearest,
+            backs_alone: false,
         };
-        let adding = adds.then(|| GraphicsPipeline::adding(device, &pass, &state));
+        let added = GraphicsState {
+            blending: Blending::Add,
+            ..state
+        };
+        let adding = adds.then(|| GraphicsPipeline::new(device, &pass, &added));
         Ok(Self {
             depths,
             pipeline: GraphicsPipeline::new(device, &pass, &state)?,
             adding: adding.transpose()?,
+            over_depths,
             pass,
         })
     }
@@ -178,32 +191,37 @@ impl Shade {
         )
     }
 
-    /// Draws into the left top `size` of the target, lets `then` draw there too, and copies all of
-    /// it to where the CPU reads it.
+    /// Lets `first` draw into the left top of the target, draws there too, and copies all of
+    /// it to where the CPU reads it; `drawn` is recorded before the copies.
     pub fn record<'a>(
         &self,
         cmd: &Commands,
         target: &Target,
-        (width, height): (u32, u32),
         mesh: &Mesh<'_>,
+        first: impl FnOnce(),
         draws: impl Iterator<Item = Draw<'a>>,
-        then: impl FnOnce(),
+        drawn: impl FnOnce(),
     ) {
         let clear = [0, 0, 0, mesh.background.to_bits()];
-        cmd.begin_render_pass(&self.pass, &target.framebuffer, clear);
+        let pass = match mesh.over_depths {
+            true => &self.over_depths,
+            false => &self.pass,
+        };
+        cmd.begin_render_pass(pass, &target.framebuffer, clear);
+        cmd.viewport(0, 0, mesh.size.0, mesh.size.1);
+        first();
         cmd.bind_indices(mesh.indices);
-        cmd.viewport(0, 0, width, height);
         for draw in draws {
             let pipeline = match (draw.adds, &self.adding) {
                 (true, Some(adding)) => adding,
                 _ => &self.pipeline,
             };
-            cmd.bind_graphics(pipeline, draw.texture, mesh.vertices);
+            cmd.bind_graphics(pipeline, draw.texture, Some(mesh.vertices));
             cmd.push_graphics(pipeline, &draw.parameters);
             cmd.draw_indexed(draw.first_vertex, draw.vertex_count);
         }
-        then();
         cmd.end_render_pass();
+        drawn();
         cmd.copy_image_to_buffer(&target.colour, &target.readback);
         if let Some(readback) = &target.depth_readback {
             cmd.copy_image_to_buffer(&target.depth, readback);
@@ -212,12 +230,16 @@ impl Shade {
     }
 }
 
-/// What is drawn.
+/// What is drawn, and where.
 pub struct Mesh<'a> {
+    /// Samples across and down, in the left top of the target.
+    pub size: (u32, u32),
     pub vertices: &'a Buffer,
     pub indices: &'a Buffer,
     /// Alpha of samples that show nothing.
     pub background: f32,
+    /// Whether the target's depths are those of another pass.
+    pub over_depths: bool,
 }
 
 impl Target {
@@ -248,6 +270,10 @@ impl Target {
                 false => None,
             },
         })
+    }
+
+    pub(super) fn depth(&self) -> &Image {
+        &self.depth
     }
 
     /// The first `rows` rows of the whole target's width, `[row][column]`: RGB radiance,

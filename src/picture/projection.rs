@@ -80,6 +80,23 @@ impl Projection {
         (2.0 / (self.rows[1].length() * self.size[1] * f64::from(samples))) as f32
     }
 
+    /// Whether the hull of some places, scene units, lies outside the picture for certain.
+    pub fn misses(&self, places: &[DVec3]) -> bool {
+        let [x, y, w] = self.rows;
+        // By a little more than the rows and the places are rounded by.
+        const WIDER: f64 = 1.0 + 1e-4;
+        let outside = |row: DVec3, sign: f64| {
+            let beyond = |p: &DVec3| {
+                let way = *p - self.eye;
+                sign * row.dot(way) > WIDER * w.dot(way)
+            };
+            places.iter().all(beyond)
+        };
+        [x, y]
+            .into_iter()
+            .any(|row| outside(row, 1.0) || outside(row, -1.0))
+    }
+
     /// Rows x, y and w over one tile.
     pub fn rows(&self, tile: Tile) -> [Vec3; 3] {
         let [x, y, w] = self.rows;

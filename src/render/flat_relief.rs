@@ -12,7 +12,8 @@ use crate::constants::WIDEST_SAMPLE;
 
 /// Triangles with relief that need no rays, by their index in the scene.
 pub struct FlatRelief {
-    /// Whether a triangle is drawn as a prism instead, `[triangle]`.
+    /// Whether a triangle is drawn as a prism instead, or would be if the picture showed it,
+    /// `[triangle]`.
     pub prism: Vec<bool>,
     /// Corners of those that face away from the eye, lowered to the relief's lowest height, so that
     /// no ray slips between them and a prism beside them.
@@ -25,6 +26,8 @@ pub struct FlatRelief {
 /// How one triangle with relief is drawn.
 enum DrawnAs {
     Prism,
+    /// A prism outside the picture.
+    Unseen,
     Away([DVec3; 3]),
     Far([Vec3; 3]),
 }
@@ -60,6 +63,7 @@ impl Sorting<'_> {
                 Some(DrawnAs::Far(corners)) => {
                     flat.far.insert(e, corners);
                 }
+                Some(DrawnAs::Unseen) => flat.prism[e] = true,
                 Some(DrawnAs::Prism) => {
                     flat.prism[e] = true;
                     prisms.push(m);
@@ -86,8 +90,16 @@ impl Sorting<'_> {
             let way = (scene.vertices[v as usize] - projection.eye).normalize_or_zero();
             way.dot(self.normals[v as usize]) > steepest
         };
+        let range = &self.kept.surfaces.ranges[surface as usize];
+        let hull = [range.lowest, range.highest].map(|height| {
+            let raised =
+                |v| scene.vertices[v as usize] + self.normals[v as usize] * range.above(height);
+            triangle.vertices.map(raised)
+        });
+        if projection.misses(hull.as_flattened()) {
+            return Some(DrawnAs::Unseen);
+        }
         if triangle.vertices.iter().all(away) {
-            let range = &self.kept.surfaces.ranges[surface as usize];
             let lowest = range.above(range.lowest);
             let lowered = |v| scene.vertices[v as usize] + self.normals[v as usize] * lowest;
             return Some(DrawnAs::Away(triangle.vertices.map(lowered)));

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::bake::solution::{Bake, DirectionalLight, Solution};
 use crate::constants::{
     SHADING_NORMAL, SHADING_PARALLAX, SHADING_RELIEF, VIEW_ALBEDO, VIEW_HEIGHT, VIEW_IRRADIANCE,
-    VIEW_NORMAL, VIEW_OVERDRAW, VIEW_SHADED, VIEW_SLOTS,
+    VIEW_NORMAL, VIEW_SHADED, VIEW_SLOTS,
 };
 use crate::picture::Light;
 use crate::scene::Scene;
@@ -73,21 +73,21 @@ pub enum Show {
     Irradiance,
     /// The strongest slot of each triangle, see [`super::slot_colour`].
     Slots,
-    /// How many fragments of prisms are shaded, see [`super::Overdraw`]; plain triangles are left
-    /// out.
+    /// How many fragments of prisms rays are followed for, see [`super::Overdraw`]; plain triangles
+    /// are left out.
     Overdraw,
 }
 
 impl Show {
     pub(super) fn code(self) -> u32 {
         match self {
-            Self::Shaded => VIEW_SHADED,
+            // Fragments are counted by a shader of their own.
+            Self::Shaded | Self::Overdraw => VIEW_SHADED,
             Self::Albedo => VIEW_ALBEDO,
             Self::Normal => VIEW_NORMAL,
             Self::Height => VIEW_HEIGHT,
             Self::Irradiance => VIEW_IRRADIANCE,
             Self::Slots => VIEW_SLOTS,
-            Self::Overdraw => VIEW_OVERDRAW,
         }
     }
 }

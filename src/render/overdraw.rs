@@ -2,9 +2,9 @@
 
 use crate::picture::Picture;
 
-/// Fragments of prisms that are shaded and steps of their marches, `[row][column]`, means over a
-/// pixel's samples. Hidden ones count: each fragment computes its own depth, so that none is culled
-/// early.
+/// Fragments of prisms whose rays are followed and steps of their marches, `[row][column]`, means
+/// over a pixel's samples. Hidden ones count: each fragment computes its own depth, so that none is
+/// culled early.
 #[derive(Debug, Clone)]
 pub struct Overdraw {
     pub width: u32,

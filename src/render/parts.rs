@@ -6,7 +6,7 @@
 
 use glam::DVec3;
 
-use super::shafts::Shafts;
+use super::shafts::{Shafts, Starts};
 use crate::constants::PART_UNSURE;
 use crate::passes::types::LitTriangle;
 
@@ -151,6 +151,6 @@ impl Part {
     fn state(self, shafts: &Shafts, triangle: &LitTriangle) -> u32 {
         let [a, b, c] = [triangle.a, triangle.b, triangle.c].map(|v| v.as_dvec3());
         let corners = self.shares().map(|s| a * s.x + b * s.y + c * s.z);
-        shafts.state(triangle, corners)
+        shafts.state(&Starts::on_part(triangle, corners))
     }
 }

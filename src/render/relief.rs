@@ -4,23 +4,34 @@ use std::sync::Arc;
 
 use super::ReliefShading;
 use super::mesh::parameters;
-use super::relief_mesh::ReliefMesh;
-use super::relief_scene::ReliefScene;
+use super::relief_mesh::{PrismRange, ReliefMesh};
+use super::relief_scene::{ReliefPasses, ReliefScene};
 use super::seen_scene::SeenScene;
+use super::shafts::Shafts;
 use super::textures::Textures;
 use crate::error::Result;
-use crate::passes;
+use crate::passes::relief::{Draw, Parameters};
+use crate::passes::relief_hits::{self, Hits};
+use crate::passes::shade::Target;
 use crate::passes::shadow_rays::{LightBuffers, LightCounts};
 use crate::picture::Tile;
-use crate::vk::{Commands, DescriptorSet, Device, Sampler};
+use crate::vk::{Commands, DescriptorSet, Device};
 
 /// The relief of a picture, ready to be drawn.
 pub struct Relief {
-    pass: Arc<passes::relief::Relief>,
+    passes: Arc<ReliefPasses>,
     pub mesh: ReliefMesh,
+    /// Of what finds or counts fragments.
+    set: DescriptorSet,
+    shading: u32,
+}
+
+/// Where the relief of a tile is drawn.
+pub struct ReliefTarget {
+    /// None where fragments are counted.
+    hits: Option<Hits>,
     /// `[range of the mesh]`.
     sets: Vec<DescriptorSet>,
-    shading: u32,
 }
 
 impl Relief {
@@ -32,33 +43,86 @@ impl Relief {
         device: &Arc<Device>,
         seen: &SeenScene<'_>,
         kept: Option<&ReliefScene>,
-        textures: &Textures,
-        lights: &LightBuffers,
+        shafts: Option<&Shafts>,
     ) -> Result<Option<Self>> {
         let Some(((light, shading), kept)) = seen.lighting.relief().zip(kept) else {
             return Ok(None);
         };
-        let pass = Arc::clone(&kept.pass);
-        let mesh = ReliefMesh::new(device, seen, light, kept)?;
-        let sampler = Sampler::new(device, "relief albedo", true)?;
-        let sets = mesh
-            .ranges
-            .iter()
-            .map(|range| {
-                let albedo = textures.image(range.material);
-                pass.bind(albedo, &sampler, &mesh.buffers, lights)
-            })
-            .collect::<Result<_>>()?;
+        let mesh = ReliefMesh::new(device, seen, light, kept, shafts)?;
+        let set = match &*kept.passes {
+            ReliefPasses::Shaded(hits, _) => hits.bind(&mesh.shape)?,
+            ReliefPasses::Overdraw(overdraw) => overdraw.bind(&mesh.shape)?,
+        };
         Ok(Some(Self {
-            pass,
+            passes: Arc::clone(&kept.passes),
             mesh,
-            sets,
+            set,
             shading,
         }))
     }
 
-    /// Draws one tile within the render pass that has begun.
-    pub fn record(&self, cmd: &Commands, seen: &SeenScene<'_>, tile: Tile, lights: &LightBuffers) {
+    /// What the relief of a tile needs beside the target of the tile.
+    ///
+    /// # Errors
+    /// A device without the memory.
+    pub fn target(
+        &self,
+        device: &Arc<Device>,
+        target: &Target,
+        textures: &Textures,
+        lights: &LightBuffers,
+    ) -> Result<ReliefTarget> {
+        let ReliefPasses::Shaded(finding, shading) = &*self.passes else {
+            return Ok(ReliefTarget {
+                hits: None,
+                sets: Vec::new(),
+            });
+        };
+        let hits = finding.target(device, target)?;
+        let bind = |range: &PrismRange| {
+            let albedo = textures.image(range.material);
+            shading.bind(&hits, albedo, &self.mesh.shape, &self.mesh.lights, lights)
+        };
+        Ok(ReliefTarget {
+            sets: self.mesh.ranges.iter().map(bind).collect::<Result<_>>()?,
+            hits: Some(hits),
+        })
+    }
+
+    /// Finds what is seen of one tile, with its depths, before the render pass that shows it.
+    /// False where fragments are counted instead.
+    pub fn find(
+        &self,
+        cmd: &Commands,
+        seen: &SeenScene<'_>,
+        tile: Tile,
+        target: &ReliefTarget,
+    ) -> bool {
+        let (ReliefPasses::Shaded(finding, _), Some(hits)) = (&*self.passes, &target.hits) else {
+            return false;
+        };
+        let size = (tile.width * seen.samples, tile.height * seen.samples);
+        let (shape, parameters) = (&self.mesh.shape, self.rays(seen, tile));
+        finding.record(cmd, hits, size, &self.set, shape, &parameters);
+        true
+    }
+
+    /// Draws one tile within the render pass that has begun, before all else.
+    pub fn record(
+        &self,
+        cmd: &Commands,
+        seen: &SeenScene<'_>,
+        tile: Tile,
+        target: &ReliefTarget,
+        lights: &LightBuffers,
+    ) {
+        let shading = match &*self.passes {
+            ReliefPasses::Shaded(_, shading) => shading,
+            ReliefPasses::Overdraw(overdraw) => {
+                let parameters = self.rays(seen, tile);
+                return overdraw.record(cmd, &self.set, &self.mesh.shape, &parameters);
+            }
+        };
         let rows = seen.projection.rows(tile);
         let corner = tile.corner(seen.samples);
         let directions = self.mesh.directions;
@@ -67,19 +131,15 @@ impl Relief {
         } else {
             LightCounts::default()
         };
-        let draws = self.mesh.ranges.iter().zip(&self.sets);
+        let draws = self.mesh.ranges.iter().zip(&target.sets);
         let draws = draws.map(|(range, set)| {
             let material = &seen.scene.materials[range.material as usize];
             let shade = parameters(rows, Some(material), seen.lighting.part).lit_by(counts, corner);
-            passes::relief::Draw {
-                first_prism: range.first,
-                prism_count: range.count,
+            Draw {
                 set,
-                parameters: passes::relief::Parameters {
-                    x: shade.x,
-                    y: shade.y,
-                    w: shade.w,
-                    near: shade.near,
+                parameters: Parameters {
+                    first_prism: range.first,
+                    prism_count: range.count,
                     reflectance: shade.reflectance,
                     emitted: shade.emitted,
                     metered: shade.metered,
@@ -94,6 +154,18 @@ impl Relief {
                 },
             }
         });
-        self.pass.record(cmd, &self.mesh.buffers, draws);
+        shading.record(cmd, draws);
+    }
+
+    fn rays(&self, seen: &SeenScene<'_>, tile: Tile) -> relief_hits::Parameters {
+        let shade = parameters(seen.projection.rows(tile), None, seen.lighting.part);
+        relief_hits::Parameters {
+            x: shade.x,
+            y: shade.y,
+            w: shade.w,
+            near: shade.near,
+            shading: self.shading,
+            pixel: seen.projection.sample_angle(seen.samples),
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! What the relief pass draws: prisms over the triangles with relief, their height maps, factors
+//! What is drawn of relief: prisms over the triangles with relief, their height maps, factors
 //! and light.
 
 use std::borrow::Cow;
@@ -7,10 +7,12 @@ use std::sync::Arc;
 
 use bytemuck::Zeroable;
 use glam::{DVec2, DVec3, Vec3, Vec4};
+use rayon::prelude::*;
 
 use super::flat_relief::{FlatRelief, Sorting};
 use super::relief_scene::ReliefScene;
 use super::seen_scene::SeenScene;
+use super::shafts::{Shafts, Starts};
 use super::slots::slot_colour;
 use super::{Light, Lighting, ReliefShading};
 use crate::bake::solution::DirectionalLight;
@@ -18,14 +20,16 @@ use crate::constants::MOST_RANK;
 use crate::error::Result;
 use crate::math::directions::Directions;
 use crate::mesh::clusters::{Cluster, Face, FaceClusters};
-use crate::passes::relief::{Buffers, Parts};
+use crate::passes::relief::{Buffers, Lights};
+use crate::passes::relief_hits::{Shape, ShapeBuffers};
 use crate::passes::types::{ParallelLight, Prism};
 use crate::scene::{Triangle, relief_normals};
 use crate::vk::Device;
 
 /// The relief of a scene on the device.
 pub struct ReliefMesh {
-    pub buffers: Buffers,
+    pub shape: ShapeBuffers,
+    pub lights: Buffers,
     pub directions: Directions,
     pub ranges: Vec<PrismRange>,
     pub rest: FlatRelief,
@@ -39,7 +43,8 @@ pub struct PrismRange {
 }
 
 impl ReliefMesh {
-    /// Prisms over those triangles of `light` that the eye sees from near and from the front.
+    /// Prisms over those triangles of `light` that the eye sees from near and from the front; what
+    /// `shafts` show to be open or hidden follows no shadow rays past other surfaces.
     ///
     /// # Errors
     /// A device without the memory.
@@ -48,6 +53,7 @@ impl ReliefMesh {
         seen: &SeenScene<'_>,
         light: &DirectionalLight,
         kept: &ReliefScene,
+        shafts: Option<&Shafts>,
     ) -> Result<Self> {
         let (scene, lighting) = (seen.scene, seen.lighting);
         let directions = &kept.directions;
@@ -90,28 +96,36 @@ impl ReliefMesh {
             ),
             lit: LightVertices::default(),
         };
-        let list: Vec<Prism> = (0..faces.len())
+        let mut list: Vec<Prism> = (0..faces.len())
             .map(|i| {
                 let range = clusters.as_ref().map_or((0, 0), |c| c.ranges[i]);
                 prisms.prism(&faces[i], range)
             })
             .collect();
+        if let Some(shafts) = shafts {
+            let judge = |p: &mut Prism| p.state = shafts.state(&Starts::on_prism(p));
+            list.par_iter_mut().for_each(judge);
+        }
         let mirrored: Vec<bool> = faces
             .iter()
             .map(|face| matches!(face.corners, [0, 2, 1] | [1, 0, 2] | [2, 1, 0]))
             .collect();
-        let parts = Parts {
+        let shape = Shape {
             prisms: &list,
+            mirrored: &mirrored,
             surfaces: &kept.surfaces.list,
             tiles: &kept.surfaces.tiles,
             pyramids: &kept.surfaces.pyramids,
+        };
+        let lights = Lights {
             factors: &kept.surfaces.factors,
             coefficients: &prisms.lit.coefficients,
             exits: &prisms.lit.exits,
             parallel_lights: &clusters.as_ref().map_or_else(Vec::new, parallel_lights),
         };
         Ok(Self {
-            buffers: Buffers::new(device, &parts, &mirrored)?,
+            shape: ShapeBuffers::new(device, &shape)?,
+            lights: Buffers::new(device, &lights)?,
             directions: *directions,
             ranges: ranges(drawn.iter().map(|&m| triangle(m).material)),
             rest,

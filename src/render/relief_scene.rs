@@ -14,7 +14,9 @@ use crate::mesh::elements::Elements;
 use crate::mesh::meso_vertices::MesoVertices;
 use crate::mesh::tiles::{Tile, tiles};
 use crate::meso::{Factors, visibility};
-use crate::passes;
+use crate::passes::relief::Relief;
+use crate::passes::relief_hits::ReliefHits;
+use crate::passes::relief_overdraw::ReliefOverdraw;
 use crate::passes::shade::Shade;
 use crate::scene::Scene;
 use crate::vk::Device;
@@ -22,9 +24,16 @@ use crate::vk::Device;
 /// Largest error of the factors, see [`Factors::error`].
 const FACTOR_ERROR: f64 = 0.01;
 
+/// How relief is drawn.
+pub enum ReliefPasses {
+    /// What is seen, then how it looks.
+    Shaded(ReliefHits, Relief),
+    Overdraw(ReliefOverdraw),
+}
+
 /// The relief of a scene, without a view.
 pub struct ReliefScene {
-    pub pass: Arc<passes::relief::Relief>,
+    pub passes: Arc<ReliefPasses>,
     pub directions: Directions,
     pub tiles: Vec<Tile>,
     /// Index into `tiles`, `[triangle]`; `u32::MAX` for triangles without.
@@ -76,11 +85,10 @@ impl ReliefScene {
         let vertices = MesoVertices::new(scene, &light.elements, &light.frames);
         let gather = |moments| vertices.gather(&directions, &light.frames, moments);
         Ok(Some(Self {
-            pass: Arc::new(passes::relief::Relief::new(
-                device,
-                shade,
-                lighting.show == Show::Overdraw,
-            )?),
+            passes: Arc::new(match lighting.show {
+                Show::Overdraw => ReliefPasses::Overdraw(ReliefOverdraw::new(device, shade)?),
+                _ => ReliefPasses::Shaded(ReliefHits::new(device)?, Relief::new(device, shade)?),
+            }),
             surfaces: Surfaces::new(scene, &tiles, &factors),
             all: gather(&light.incident_moment),
             direct: gather(&light.incident_moment_direct),

@@ -6,7 +6,7 @@ use super::background::{BEHIND, draw_sky};
 use super::gathered::Gathered;
 use super::lights::light_buffers;
 use super::mesh::Mesh;
-use super::relief::Relief;
+use super::relief::{Relief, ReliefTarget};
 use super::relief_scene::ReliefScene;
 use super::seen_scene::SeenScene;
 use super::textures::{Bound, Textures};
@@ -63,6 +63,12 @@ struct ViewParts {
     relief: Option<Relief>,
 }
 
+/// Where a tile is drawn.
+struct Canvas {
+    target: Target,
+    relief: Option<ReliefTarget>,
+}
+
 impl ViewParts {
     fn new(fixed: &Fixed<'_>, view: &View<'_>) -> Result<Self> {
         let device = &fixed.device;
@@ -75,7 +81,7 @@ impl ViewParts {
         };
         let (lights, shafts) = light_buffers(device, &seen)?;
         let kept = fixed.relief.as_ref();
-        let relief = Relief::new(device, &seen, kept, &fixed.textures, &lights)?;
+        let relief = Relief::new(device, &seen, kept, shafts.as_ref())?;
         let rest = relief.as_ref().map(|r| &r.mesh.rest);
         let mesh = Mesh::new(device, &seen, rest, shafts.as_ref())?;
         Ok(Self {
@@ -201,11 +207,8 @@ impl<'a> Renderer<'a> {
         mut go_on: impl FnMut() -> bool,
     ) -> Result<Option<(Picture, Vec<f32>)>> {
         let (width, height) = self.view.size;
-        let target = Target::new(
-            &self.fixed.device,
-            &self.fixed.shade,
-            (width.min(side) * SAMPLES, height.min(side) * SAMPLES),
-        )?;
+        let canvas = self.canvas((width.min(side) * SAMPLES, height.min(side) * SAMPLES))?;
+        let target = &canvas.target;
         let mut gathered = Gathered::new(self.view.size);
         let sky = self.fixed.sky();
         let mut distances = Vec::new();
@@ -221,7 +224,7 @@ impl<'a> Renderer<'a> {
                     height: side.min(height - row),
                 };
                 Commands::run(&self.fixed.device, "shade", |cmd| {
-                    self.record(cmd, &target, tile, SAMPLES, None, || ());
+                    self.record(cmd, &canvas, tile, SAMPLES, None, || ());
                     Ok(())
                 })?;
                 let (mut samples, stride) = (target.rows(tile.height * SAMPLES), target.width);
@@ -247,14 +250,14 @@ impl<'a> Renderer<'a> {
     /// Draws the whole view `count` times with one sample a pixel, as a window would. Returns the
     /// seconds of each frame by GPU timestamps.
     pub fn frames(&self, count: usize) -> Result<Vec<f64>> {
-        let (target, tile) = self.whole()?;
+        let (canvas, tile) = self.whole()?;
         let stamps = Timestamps::new(&self.fixed.device, "frame", 2)?;
         (0..count)
             .map(|_| {
                 Commands::run(&self.fixed.device, "frame", |cmd| {
                     cmd.reset_timestamps(&stamps);
                     cmd.timestamp(&stamps, 0);
-                    self.record(cmd, &target, tile, 1, None, || cmd.timestamp(&stamps, 1));
+                    self.record(cmd, &canvas, tile, 1, None, || cmd.timestamp(&stamps, 1));
                     Ok(())
                 })?;
                 Ok(stamps.intervals()?[0])
@@ -276,19 +279,36 @@ impl<'a> Renderer<'a> {
 
     /// Share of a frame's pixels that show relief drawn by rays.
     pub fn relief_coverage(&self) -> Result<f64> {
-        let (target, tile) = self.whole()?;
+        let (canvas, tile) = self.whole()?;
         Commands::run(&self.fixed.device, "coverage", |cmd| {
-            self.record(cmd, &target, tile, 1, Some(NOT_RELIEF), || ());
+            self.record(cmd, &canvas, tile, 1, Some(NOT_RELIEF), || ());
             Ok(())
         })?;
-        let rows = target.rows(tile.height);
+        let rows = canvas.target.rows(tile.height);
         let empty = |p: &&[f32; 4]| p[3] == NOT_RELIEF || **p == [0.0; 4];
         let elsewhere = rows.iter().filter(empty).count();
         Ok(1.0 - elsewhere as f64 / rows.len() as f64)
     }
 
-    /// A target for one sample of each pixel, and the tile that is the whole view.
-    fn whole(&self) -> Result<(Target, Tile)> {
+    /// Where so many samples across and down are drawn.
+    fn canvas(&self, size: (u32, u32)) -> Result<Canvas> {
+        let Fixed {
+            device,
+            shade,
+            textures,
+            ..
+        } = &self.fixed;
+        let target = Target::new(device, shade, size)?;
+        let of_relief = self.view.relief.as_ref();
+        let of_relief = of_relief.map(|r| r.target(device, &target, textures, &self.view.lights));
+        Ok(Canvas {
+            relief: of_relief.transpose()?,
+            target,
+        })
+    }
+
+    /// A canvas for one sample of each pixel, and the tile that is the whole view.
+    fn whole(&self) -> Result<(Canvas, Tile)> {
         let (width, height) = self.view.size;
         let tile = Tile {
             column: 0,
@@ -296,10 +316,7 @@ impl<'a> Renderer<'a> {
             width,
             height,
         };
-        Ok((
-            Target::new(&self.fixed.device, &self.fixed.shade, (width, height))?,
-            tile,
-        ))
+        Ok((self.canvas((width, height))?, tile))
     }
 
     /// `mark` replaces the meter's flag on plain triangles; `drawn` is recorded after all draws and
@@ -307,7 +324,7 @@ impl<'a> Renderer<'a> {
     fn record(
         &self,
         cmd: &Commands,
-        target: &Target,
+        canvas: &Canvas,
         tile: Tile,
         samples: u32,
         mark: Option<f32>,
@@ -339,25 +356,29 @@ impl<'a> Renderer<'a> {
                 }
                 draw
             });
+        let of_relief = relief.as_ref().zip(canvas.relief.as_ref());
+        let over_depths =
+            of_relief.is_some_and(|(relief, target)| relief.find(cmd, &seen, tile, target));
         self.fixed.shade.record(
             cmd,
-            target,
-            (tile.width * samples, tile.height * samples),
+            &canvas.target,
             &shade::Mesh {
+                size: (tile.width * samples, tile.height * samples),
                 vertices: &mesh.vertices,
                 indices: &mesh.indices,
                 background: match (self.fixed.sky(), mark) {
                     (Some(_), None) => BEHIND,
                     _ => 0.0,
                 },
+                over_depths,
+            },
+            || {
+                if let Some((relief, target)) = of_relief {
+                    relief.record(cmd, &seen, tile, target, lights);
+                }
             },
             plain,
-            || {
-                if let Some(relief) = relief {
-                    relief.record(cmd, &seen, tile, lights);
-                }
-                drawn();
-            },
+            drawn,
         );
     }
 }

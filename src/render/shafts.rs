@@ -1,6 +1,7 @@
-//! Triangles with nothing between them and the lights: their samples need no shadow rays.
+//! Places with nothing between them and the lights: their samples need no shadow rays.
 //!
-//! A shaft (Haines and Wallace 1991) contains all shadow rays from a triangle to a lamp. Here it is
+//! A shaft (Haines and Wallace 1991) contains all shadow rays from a part of a triangle, or from the
+//! relief over one, to a lamp. Here it is
 //! bounded by planes about the convex hull of the rays' starts and ends. A triangle wholly outside
 //! one of the planes, or whose own plane has the hull on one side, blocks no ray.
 
@@ -9,7 +10,7 @@ use glam::{DVec3, Vec3};
 use super::lights::sun_disc;
 use crate::constants::{PART_HIDDEN, PART_OPEN, PART_UNSURE};
 use crate::mesh::shadow_tree::ShadowTree;
-use crate::passes::types::{LitTriangle, ShadowNode, ShadowTriangle};
+use crate::passes::types::{LitTriangle, Prism, ShadowNode, ShadowTriangle};
 use crate::picture::Projection;
 use crate::scene::Scene;
 
@@ -43,6 +44,16 @@ struct LampPlane {
 struct Side {
     normal: DVec3,
     limit: f64,
+}
+
+/// Where shadow rays start.
+pub struct Starts {
+    /// They start in the hull of these points,
+    points: Vec<DVec3>,
+    /// and above a plane with this normal, by so much;
+    above: Option<(DVec3, f64)>,
+    /// and they pass triangles with relief below this height along a normal.
+    passed: Option<(DVec3, f64)>,
 }
 
 /// Shadow casters and lamps.
@@ -134,18 +145,17 @@ impl Shafts {
         self.lamps.is_empty()
     }
 
-    /// PART_… of the part of a triangle with these corners: open where no shadow ray to any light
-    /// is blocked, or none shines towards it; hidden where all are blocked, each lamp's by one
-    /// triangle.
-    pub fn state(&self, t: &LitTriangle, corners: [DVec3; 3]) -> u32 {
+    /// PART_… of where shadow rays start: open where no ray to any light is blocked, or none shines
+    /// towards it; hidden where all are blocked, each lamp's by one triangle.
+    pub fn state(&self, starts: &Starts) -> u32 {
         if self.is_empty() {
             return PART_UNSURE;
         }
-        let starts = starts(t, corners);
+        let points = &starts.points;
         let mut lamps = self.lamps.iter();
-        if lamps.clone().all(|lamp| self.is_clear(t, &starts, lamp)) {
+        if lamps.clone().all(|lamp| self.is_clear(starts, lamp)) {
             PART_OPEN
-        } else if lamps.all(|l| self.is_behind(&starts, l) || self.is_covered(&starts, l)) {
+        } else if lamps.all(|l| self.is_behind(points, l) || self.is_covered(points, l)) {
             PART_HIDDEN
         } else {
             PART_UNSURE
@@ -190,12 +200,19 @@ impl Shafts {
         false
     }
 
-    fn is_clear(&self, t: &LitTriangle, starts: &[DVec3], lamp: &Lamp) -> bool {
-        if self.is_behind(starts, lamp) {
+    fn is_clear(&self, starts: &Starts, lamp: &Lamp) -> bool {
+        if self.is_behind(&starts.points, lamp) {
             return true;
         }
-        let hull: Vec<DVec3> = starts.iter().chain(&lamp.ends).copied().collect();
-        let sides = self.sides(t, lamp, &hull);
+        let hull: Vec<DVec3> = starts.points.iter().chain(&lamp.ends).copied().collect();
+        let sides = self.sides(starts, lamp, &hull);
+        let passed = |t: &ShadowTriangle| {
+            let limit = |(normal, height): (DVec3, f64)| {
+                let below = |v: Vec3| normal.dot(v.as_dvec3()) < height - self.margin;
+                [t.a, t.b, t.c].into_iter().all(below)
+            };
+            t.relief == 1 && starts.passed.is_some_and(limit)
+        };
         let nodes = self.tree.nodes();
         let mut at = 0;
         while let Some(node) = nodes.get(at) {
@@ -210,7 +227,7 @@ impl Shafts {
             }
             if self.tree.triangles[node.triangles()]
                 .iter()
-                .any(|t| self.stands_in(t, &sides, &hull))
+                .any(|t| !passed(t) && self.stands_in(t, &sides, &hull))
             {
                 return false;
             }
@@ -233,7 +250,7 @@ impl Shafts {
 
     /// Planes that bound the hull: across the axes, the planes of the triangle and of the lamp, and
     /// planes parallel to an axis that touch the hull.
-    fn sides(&self, t: &LitTriangle, lamp: &Lamp, hull: &[DVec3]) -> Vec<Side> {
+    fn sides(&self, starts: &Starts, lamp: &Lamp, hull: &[DVec3]) -> Vec<Side> {
         let side = |normal: DVec3, margin: f64| Side {
             normal,
             limit: margin + hull.iter().map(|p| normal.dot(*p)).fold(f64::MIN, f64::max),
@@ -242,8 +259,9 @@ impl Shafts {
         for axis in DVec3::AXES {
             sides.extend([side(axis, self.margin), side(-axis, self.margin)]);
         }
-        let above = f64::from(t.above);
-        sides.push(side(-t.plane.as_dvec3(), MARGIN_ABOVE * above));
+        if let Some((normal, above)) = starts.above {
+            sides.push(side(-normal, MARGIN_ABOVE * above));
+        }
         if let Some(plane) = &lamp.plane {
             sides.push(side(-plane.normal, MARGIN_ABOVE * plane.above));
         }
@@ -259,6 +277,42 @@ impl Shafts {
             }
         }
         sides
+    }
+}
+
+/// Cosine of the greatest angle between a flat triangle and the relief's axes at its corners.
+const STRAIGHT: f64 = 1.0 - 5e-7;
+
+impl Starts {
+    /// On the relief of a prism, see `relief.frag`.
+    pub fn on_prism(p: &Prism) -> Self {
+        let low = [p.low_a, p.low_b, p.low_c].map(|v| v.as_dvec3());
+        let high = [p.high_a, p.high_b, p.high_c].map(|v| v.as_dvec3());
+        let normal = (high[1] - high[0]).cross(high[2] - high[0]);
+        let normal = normal.normalize_or_zero();
+        // Mirrored prisms turn the other way round.
+        let normal = normal * normal.dot(p.normal.as_dvec3()).signum();
+        let upright = |k: usize| (high[k] - low[k]).normalize_or_zero().dot(normal) > STRAIGHT;
+        // Where the surface bends, a way may leave the relief lower than the prism's top.
+        let flat = (0..3).all(upright);
+        let top = high
+            .map(|v| normal.dot(v))
+            .into_iter()
+            .fold(f64::MAX, f64::min);
+        Self {
+            points: [low, high].concat(),
+            above: None,
+            passed: flat.then_some((normal, top)),
+        }
+    }
+
+    /// On the part of a triangle that has these corners, see `shade.frag`.
+    pub fn on_part(t: &LitTriangle, corners: [DVec3; 3]) -> Self {
+        Self {
+            points: starts(t, corners),
+            above: Some((t.plane.as_dvec3(), f64::from(t.above))),
+            passed: None,
+        }
     }
 }
 

@@ -10,8 +10,8 @@ use glam::Vec2;
 use crate::error::Result;
 use crate::passes::shaders::panel::{Bindings, Parameters, SHADER};
 use crate::vk::{
-    Buffer, BufferUse, Commands, DescriptorSet, Device, Format, GraphicsPipeline, GraphicsState,
-    Image, ImageUse, RenderPass, Sampled, Sampler, VertexAttribute,
+    Blending, Buffer, BufferUse, Commands, DescriptorSet, Device, Format, GraphicsPipeline,
+    GraphicsState, Image, ImageUse, RenderPass, Sampled, Sampler, VertexAttribute,
 };
 
 /// Draws panels, one frame at a time.
@@ -64,7 +64,7 @@ impl PanelPass {
             format,
             offset: offset as u32,
         };
-        let pipeline = GraphicsPipeline::over(
+        let pipeline = GraphicsPipeline::new(
             device,
             pass,
             &GraphicsState {
@@ -76,7 +76,8 @@ impl PanelPass {
                     attribute(Format::R32G32_SFLOAT, std::mem::offset_of!(Vertex, uv)),
                     attribute(Format::R8G8B8A8_UNORM, std::mem::offset_of!(Vertex, color)),
                 ],
-                sums: false,
+                blending: Blending::Over,
+                backs_alone: false,
             },
         )?;
         let stream = |name| Buffer::new(device, name, roomy(0), BufferUse::Stream);
@@ -238,7 +239,7 @@ impl PanelPass {
                 continue;
             };
             let [left, top, width, height] = draw.clip;
-            cmd.bind_graphics(&self.pipeline, &texture.set, &self.vertices);
+            cmd.bind_graphics(&self.pipeline, &texture.set, Some(&self.vertices));
             let size = prepared.size;
             cmd.push_graphics(&self.pipeline, &Parameters { size });
             cmd.scissor(left, top, width, height);

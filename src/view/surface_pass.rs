@@ -14,8 +14,8 @@ use crate::passes::shaders::{view_mesh, view_mesh_laid, view_mesh_overlaid};
 use crate::render::upload_texture;
 use crate::scene::Scene;
 use crate::vk::{
-    Buffer, BufferUse, Commands, DescriptorSet, Device, Format, GraphicsPipeline, GraphicsShaders,
-    GraphicsState, Image, RenderPass, Sampled, Sampler, VertexAttribute,
+    Blending, Buffer, BufferUse, Commands, DescriptorSet, Device, Format, GraphicsPipeline,
+    GraphicsShaders, GraphicsState, Image, RenderPass, Sampled, Sampler, VertexAttribute,
 };
 
 /// How surfaces show detailed pictures.
@@ -240,7 +240,7 @@ impl SurfacePass {
                 true => &sets.plain,
                 false => &sets.laid,
             };
-            cmd.bind_graphics(pipeline, set, &self.mesh.vertices);
+            cmd.bind_graphics(pipeline, set, Some(&self.mesh.vertices));
             let [all, direct, emission] = shown.parts;
             cmd.push_graphics(
                 pipeline,
@@ -294,7 +294,8 @@ fn pipeline(
                 attribute(three, std::mem::offset_of!(Vertex, normal)),
                 attribute(Format::R32G32_SFLOAT, std::mem::offset_of!(Vertex, uv)),
             ],
-            sums: false,
+            blending: Blending::Nearest,
+            backs_alone: false,
         },
     )
 }

@@ -15,15 +15,17 @@ pub struct VertexAttribute {
     pub offset: u32,
 }
 
-/// What a graphics pipeline is made of. Triangles, no culling, reversed depth (greater wins),
-/// viewport set per draw.
+/// What a graphics pipeline is made of. Triangles, reversed depth (greater wins), viewport set per
+/// draw.
 pub struct GraphicsState<'a> {
     pub name: &'a str,
     pub shaders: &'a GraphicsShaders<'a>,
+    /// Without attributes there is no vertex buffer.
     pub vertex_stride: u32,
     pub attributes: &'a [VertexAttribute],
-    /// Colours of all fragments are summed and depth is ignored.
-    pub sums: bool,
+    pub blending: Blending,
+    /// Only triangles that turn their back to the eye are drawn.
+    pub backs_alone: bool,
 }
 
 /// A graphics pipeline. A clone is another handle to the same pipeline.
@@ -39,10 +41,12 @@ pub(super) const GRAPHICS_STAGES: vk::ShaderStageFlags = vk::ShaderStageFlags::f
 );
 
 /// How a fragment's colour is combined with the colour in the target.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Blending {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Blending {
     /// The nearest wins.
     Nearest,
+    /// Replaces what lies in front of it, and is drawn nowhere else; depths stay.
+    Under,
     /// All are summed; depth is ignored.
     Sum,
     /// The later lies over the earlier by its alpha, with which its colour is premultiplied; depth
@@ -56,44 +60,6 @@ impl GraphicsPipeline {
     /// # Errors
     /// A device that fails.
     pub fn new(device: &Arc<Device>, pass: &RenderPass, state: &GraphicsState<'_>) -> Result<Self> {
-        let blending = match state.sums {
-            true => Blending::Sum,
-            false => Blending::Nearest,
-        };
-        Self::blended(device, pass, state, blending)
-    }
-
-    /// A pipeline that lays premultiplied colours over the target by their alpha; depth is ignored.
-    ///
-    /// # Errors
-    /// A device that fails.
-    pub fn over(
-        device: &Arc<Device>,
-        pass: &RenderPass,
-        state: &GraphicsState<'_>,
-    ) -> Result<Self> {
-        Self::blended(device, pass, state, Blending::Over)
-    }
-
-    /// A pipeline that adds colours to those of what is drawn in the same place, with the same
-    /// shaders and vertices.
-    ///
-    /// # Errors
-    /// A device that fails.
-    pub fn adding(
-        device: &Arc<Device>,
-        pass: &RenderPass,
-        state: &GraphicsState<'_>,
-    ) -> Result<Self> {
-        Self::blended(device, pass, state, Blending::Add)
-    }
-
-    fn blended(
-        device: &Arc<Device>,
-        pass: &RenderPass,
-        state: &GraphicsState<'_>,
-        blending: Blending,
-    ) -> Result<Self> {
         let mut owner = PipelineOwner::with_layouts(
             device,
             state.name,
@@ -111,8 +77,9 @@ impl GraphicsPipeline {
             .stride(state.vertex_stride)
             .input_rate(vk::VertexInputRate::VERTEX)];
         let attributes = state.attribute_descriptions();
+        let used = buffers.len().min(attributes.len());
         let input = vk::PipelineVertexInputStateCreateInfo::default()
-            .vertex_binding_descriptions(&buffers)
+            .vertex_binding_descriptions(&buffers[..used])
             .vertex_attribute_descriptions(&attributes);
         let assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
             .topology(vk::PrimitiveTopology::TRIANGLE_LIST);
@@ -121,19 +88,23 @@ impl GraphicsPipeline {
             .scissor_count(1);
         let raster = vk::PipelineRasterizationStateCreateInfo::default()
             .polygon_mode(vk::PolygonMode::FILL)
-            .cull_mode(vk::CullModeFlags::NONE)
+            .cull_mode(match state.backs_alone {
+                true => vk::CullModeFlags::FRONT,
+                false => vk::CullModeFlags::NONE,
+            })
             .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
             .line_width(1.0);
         let samples = vk::PipelineMultisampleStateCreateInfo::default()
             .rasterization_samples(vk::SampleCountFlags::TYPE_1);
         let depth = vk::PipelineDepthStencilStateCreateInfo::default()
-            .depth_test_enable(matches!(blending, Blending::Nearest | Blending::Add))
-            .depth_write_enable(blending == Blending::Nearest)
-            .depth_compare_op(match blending {
+            .depth_test_enable(!matches!(state.blending, Blending::Sum | Blending::Over))
+            .depth_write_enable(state.blending == Blending::Nearest)
+            .depth_compare_op(match state.blending {
                 Blending::Add => vk::CompareOp::GREATER_OR_EQUAL,
+                Blending::Under => vk::CompareOp::LESS,
                 _ => vk::CompareOp::GREATER,
             });
-        let blends = [blending.attachment()];
+        let blends = [state.blending.attachment()];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
         let dynamic_states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
         let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic_states);
@@ -200,10 +171,10 @@ impl Blending {
     fn attachment(self) -> vk::PipelineColorBlendAttachmentState {
         let kept = match self {
             Self::Over => vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
-            Self::Nearest | Self::Sum | Self::Add => vk::BlendFactor::ONE,
+            Self::Nearest | Self::Under | Self::Sum | Self::Add => vk::BlendFactor::ONE,
         };
         vk::PipelineColorBlendAttachmentState::default()
-            .blend_enable(self != Self::Nearest)
+            .blend_enable(!matches!(self, Self::Nearest | Self::Under))
             .src_color_blend_factor(vk::BlendFactor::ONE)
             .dst_color_blend_factor(kept)
             .color_blend_op(vk::BlendOp::ADD)

@@ -26,11 +26,21 @@ pub enum AfterPass {
 }
 
 /// What happens to the depths after a render pass.
-#[derive(Debug, Clone, Copy)]
-enum Depth {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Depths {
     Dropped,
+    /// Another render pass goes on with them.
     Kept,
+    /// They are copied from.
     Copied,
+}
+
+/// What of a target's content a render pass goes on with; the rest is cleared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Before {
+    Nothing,
+    Depths,
+    All,
 }
 
 impl Attachment {
@@ -65,7 +75,7 @@ impl Attachment {
     }
 }
 
-impl Depth {
+impl Depths {
     fn final_layout(self) -> vk::ImageLayout {
         match self {
             Self::Copied => vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
@@ -81,9 +91,9 @@ impl Depth {
     }
 }
 
-/// A render pass of one subpass: one colour attachment (cleared, stored) and a depth attachment
-/// (cleared, stored on request). In further parts of a render pass, neither is cleared. A clone is
-/// another handle to the same render pass.
+/// A render pass of one subpass: one colour attachment, stored, and a depth attachment, stored on
+/// request. Both are cleared at the start but where it is said. A clone is another handle to the
+/// same render pass.
 ///
 /// Commands that record it keep it alive.
 #[derive(Clone)]
@@ -102,25 +112,31 @@ impl RenderPass {
     /// # Errors
     /// A device that fails.
     pub fn new(device: &Arc<Device>, name: &str, colour: Attachment) -> Result<Self> {
-        Self::with_depth(device, name, colour, false)
+        Self::with_depths(device, name, colour, Depths::Dropped)
     }
 
-    /// With `copied`, the depths are kept to be copied from.
-    ///
     /// # Errors
     /// A device that fails.
-    pub fn with_depth(
+    pub fn with_depths(
         device: &Arc<Device>,
         name: &str,
         colour: Attachment,
-        copied: bool,
+        depths: Depths,
     ) -> Result<Self> {
-        let depth = if copied {
-            Depth::Copied
-        } else {
-            Depth::Dropped
-        };
-        Self::from_attachments(device, name, colour, depth, false)
+        Self::from_attachments(device, name, colour, depths, Before::Nothing)
+    }
+
+    /// A render pass that goes on with the depths that another one kept.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn over_depths(
+        device: &Arc<Device>,
+        name: &str,
+        colour: Attachment,
+        depths: Depths,
+    ) -> Result<Self> {
+        Self::from_attachments(device, name, colour, depths, Before::Depths)
     }
 
     /// Two render passes: the first clears the targets, the second adds to them and may be
@@ -129,18 +145,18 @@ impl RenderPass {
     /// # Errors
     /// A device that fails.
     pub fn in_parts(device: &Arc<Device>, name: &str, colour: Attachment) -> Result<[Self; 2]> {
-        let part = |further| Self::from_attachments(device, name, colour, Depth::Kept, further);
-        Ok([part(false)?, part(true)?])
+        let part = |before| Self::from_attachments(device, name, colour, Depths::Kept, before);
+        Ok([part(Before::Nothing)?, part(Before::All)?])
     }
 
     fn from_attachments(
         device: &Arc<Device>,
         name: &str,
         colour: Attachment,
-        depth: Depth,
-        further: bool,
+        depths: Depths,
+        before: Before,
     ) -> Result<Self> {
-        let attachments = descriptions(colour, depth, further);
+        let attachments = descriptions(colour, depths, before);
         let colours = [vk::AttachmentReference::default()
             .attachment(0)
             .layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)];
@@ -168,11 +184,15 @@ impl RenderPass {
 }
 
 /// The colour attachment, then the depth attachment.
-fn descriptions(colour: Attachment, depth: Depth, further: bool) -> [vk::AttachmentDescription; 2] {
-    let description = |format, layout, store| {
-        let (load, initial_layout) = match further {
-            true => (vk::AttachmentLoadOp::LOAD, layout),
-            false => (vk::AttachmentLoadOp::CLEAR, vk::ImageLayout::UNDEFINED),
+fn descriptions(
+    colour: Attachment,
+    depths: Depths,
+    before: Before,
+) -> [vk::AttachmentDescription; 2] {
+    let description = |format, loaded: Option<vk::ImageLayout>, layout, store| {
+        let (load, initial_layout) = match loaded {
+            Some(layout) => (vk::AttachmentLoadOp::LOAD, layout),
+            None => (vk::AttachmentLoadOp::CLEAR, vk::ImageLayout::UNDEFINED),
         };
         vk::AttachmentDescription::default()
             .format(format)
@@ -185,9 +205,16 @@ fn descriptions(colour: Attachment, depth: Depth, further: bool) -> [vk::Attachm
             .final_layout(layout)
     };
     let stored = vk::AttachmentStoreOp::STORE;
+    let of_colour = (before == Before::All).then(|| colour.final_layout());
+    let of_depths = (before != Before::Nothing).then(|| Depths::Kept.final_layout());
     [
-        description(colour.format, colour.final_layout(), stored),
-        description(DEPTH_FORMAT, depth.final_layout(), depth.store()),
+        description(colour.format, of_colour, colour.final_layout(), stored),
+        description(
+            DEPTH_FORMAT,
+            of_depths,
+            depths.final_layout(),
+            depths.store(),
+        ),
     ]
 }
 

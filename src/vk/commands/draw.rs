@@ -47,13 +47,12 @@ impl Commands {
         &self,
         pipeline: &GraphicsPipeline,
         set: &DescriptorSet,
-        vertices: &Buffer,
+        vertices: Option<&Buffer>,
     ) {
         let pipeline = &pipeline.owner;
         pipeline.check_set(&set.owner);
         self.hold(pipeline);
         self.hold(&set.owner);
-        self.hold(&vertices.owner);
         let raw = &self.device.raw;
         // SAFETY: the set is one of the pipeline, as checked; vertices match by construction of
         // the pass.
@@ -67,7 +66,11 @@ impl Commands {
                 &[set.owner.raw],
                 &[],
             );
-            raw.cmd_bind_vertex_buffers(self.raw, 0, &[vertices.owner.raw], &[0]);
+        }
+        if let Some(vertices) = vertices {
+            self.hold(&vertices.owner);
+            // SAFETY: the buffer feeds vertices.
+            unsafe { raw.cmd_bind_vertex_buffers(self.raw, 0, &[vertices.owner.raw], &[0]) };
         }
     }
 
@@ -130,6 +133,12 @@ impl Commands {
                 .raw
                 .cmd_draw_indexed_indirect(self.raw, draws.owner.raw, offset, 1, 20);
         }
+    }
+
+    /// Draws without vertex and index buffers.
+    pub fn draw(&self, vertex_count: u32) {
+        // SAFETY: the bound pipeline reads no vertices.
+        unsafe { self.device.raw.cmd_draw(self.raw, vertex_count, 1, 0, 0) };
     }
 
     pub fn draw_indexed(&self, first_index: u32, index_count: u32) {

@@ -1,0 +1,34 @@
+// Relief mapping, first what is seen: the ray through the sample is followed through the prism over a
+// triangle to where it first passes below the height map. The nearest hit of all prisms stays.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#include "shared/types.glsl"
+#include "shared/texels.glsl"
+
+layout(location = 0) out uvec4 hit;
+
+layout(binding = 0) uniform usamplerBuffer prisms;
+layout(binding = 1) uniform usamplerBuffer surfaces;
+layout(binding = 2) uniform usamplerBuffer tiles;
+layout(binding = 3) uniform usamplerBuffer pyramid;
+
+layout(push_constant, scalar) uniform Parameters {
+    vec3 x;
+    vec3 y;
+    vec3 w;
+    float near;
+    uint shading;
+    float pixel;         // angle of a sample
+};
+
+#include "shared/height_march.glsl"
+#include "shared/prisms.glsl"
+#include "shared/relief_hit.glsl"
+
+void main() {
+    float depth;
+    hit = hit_of_ray(shading, pixel, depth);
+    // Nothing lies at the depth of 0, so that a miss is drawn nowhere.
+    gl_FragDepth = depth;
+}

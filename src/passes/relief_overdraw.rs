@@ -1,0 +1,45 @@
+//! Counts the fragments of prisms that [`super::relief_hits`] works on, and the steps of their
+//! marches. Shaders: `relief_overdraw.vert`, `relief_overdraw.frag`.
+
+use std::sync::Arc;
+
+use super::relief_hits::{self, Parameters, ShapeBuffers};
+use super::shade::Shade;
+use super::shaders::relief_overdraw::SHADER;
+use crate::error::Result;
+use crate::vk::{Blending, Commands, DescriptorSet, Device, GraphicsPipeline};
+
+pub struct ReliefOverdraw {
+    pipeline: GraphicsPipeline,
+}
+
+impl ReliefOverdraw {
+    /// Draws into the targets of `shade`.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn new(device: &Arc<Device>, shade: &Shade) -> Result<Self> {
+        let name = "relief overdraw";
+        Ok(Self {
+            pipeline: relief_hits::pipeline(device, shade.pass(), name, &SHADER, Blending::Sum)?,
+        })
+    }
+
+    /// # Errors
+    /// A device that fails.
+    pub fn bind(&self, shape: &ShapeBuffers) -> Result<DescriptorSet> {
+        self.pipeline.bind("relief overdraw", &shape.bindings())
+    }
+
+    /// Adds to red a count of fragments and to green one of steps, within the render pass that is
+    /// under way.
+    pub fn record(
+        &self,
+        cmd: &Commands,
+        set: &DescriptorSet,
+        shape: &ShapeBuffers,
+        parameters: &Parameters,
+    ) {
+        shape.draw(cmd, &self.pipeline, set, parameters);
+    }
+}
