@@ -35,6 +35,14 @@ layout(binding = 12) uniform usamplerBuffer parallel_lights;
 layout(scalar, binding = 13) readonly buffer Webs { float webs[]; };
 layout(binding = 14) uniform usamplerBuffer light_polygons;
 
+// What a draw cannot need is left out of its pipeline: a software device works through every branch.
+layout(constant_id = 0) const uint SHADING = SHADING_RELIEF;
+layout(constant_id = 1) const uint VIEW = VIEW_SHADED;
+// Light by factors, by light points, by parallel lights.
+layout(constant_id = 2) const uint FACTORED = 1;
+layout(constant_id = 3) const uint SHARP = 1;
+layout(constant_id = 4) const uint CLUSTERED = 1;
+
 layout(push_constant, scalar) uniform Parameters {
     uint first_prism;    // of those of the material
     uint prism_count;
@@ -44,8 +52,6 @@ layout(push_constant, scalar) uniform Parameters {
     uint light_count;    // of light_points; those of emitters come first
     uint emitter_points;
     uint polygon_count;  // 0: emitters shine by their points alone
-    uint shading;
-    uint view;
     float pixel;         // angle of a sample
     uvec2 cells;         // of the directions
     uvec2 corner;        // the tile's top left sample
@@ -95,7 +101,7 @@ Place place_of(Prism p, ReliefSurface surface, HeightTile tile, uvec4 hit) {
     place.height = uintBitsToFloat(hit.w);
     place.uv = place.share.x * p.uv_a + place.share.y * p.uv_b + place.share.z * p.uv_c;
     uint which = hit.x >> PRISM_BITS & 3;
-    bool plane = shading != SHADING_RELIEF || (hit.x & HIT_WIDE) != 0;
+    bool plane = SHADING != SHADING_RELIEF || (hit.x & HIT_WIDE) != 0;
     place.gradient = plane ? vec2(0.0) : gradient_at(tile, place.uv);
 
     // The shares of the high corners make up that of the height.
@@ -299,7 +305,7 @@ vec4 shade(uint prism, uvec4 hit) {
     HeightTile tile = load_tile(p.surface);
     Place place = place_of(p, surface, tile, hit);
     vec3 to_eye = -normalize(place.at);
-    if (shading == SHADING_PARALLAX) {
+    if (SHADING == SHADING_PARALLAX) {
         vec3 local = vec3(dot(p.tangent, to_eye), dot(p.bitangent, to_eye), max(dot(p.normal, to_eye), 0.2));
         HeightHit under;
         vec3 down = vec3(place.uv, surface.lowest);
@@ -313,17 +319,25 @@ vec4 shade(uint prism, uvec4 hit) {
 
     // Loops that take one turn at most: a software device works through what a branch leaves out.
     bool wide = (hit.x & HIT_WIDE) != 0;
-    bool lit = view == VIEW_IRRADIANCE || view == VIEW_SHADED && !wide;
+    bool lit = VIEW == VIEW_IRRADIANCE || VIEW == VIEW_SHADED && !wide;
     vec3 light = vec3(0.0);
     for (uint turns = lit ? 1 : 0; turns > 0; turns--) {
-        light = factored(p, surface, place) + sharp(p, surface, tile, place) + clustered(p, surface, tile, place);
+        if (FACTORED == 1) {
+            light += factored(p, surface, place);
+        }
+        if (SHARP == 1) {
+            light += sharp(p, surface, tile, place);
+        }
+        if (CLUSTERED == 1) {
+            light += clustered(p, surface, tile, place);
+        }
     }
     vec3 sent = vec3(0.0);
-    for (uint turns = view == VIEW_SHADED && wide ? 1 : 0; turns > 0; turns--) {
+    for (uint turns = VIEW == VIEW_SHADED && wide ? 1 : 0; turns > 0; turns--) {
         sent = mean_sent(p, place.share, to_eye);
     }
     vec3 shown;
-    switch (view) {
+    switch (VIEW) {
     case VIEW_ALBEDO:
         shown = rho;
         break;

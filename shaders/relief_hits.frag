@@ -13,12 +13,13 @@ layout(binding = 1) uniform usamplerBuffer surfaces;
 layout(binding = 2) uniform usamplerBuffer tiles;
 layout(binding = 3) uniform usamplerBuffer pyramid;
 
+layout(constant_id = 0) const uint SHADING = SHADING_RELIEF;
+
 layout(push_constant, scalar) uniform Parameters {
     vec3 x;
     vec3 y;
     vec3 w;
     float near;
-    uint shading;
     float pixel;         // angle of a sample
 };
 
@@ -28,7 +29,7 @@ layout(push_constant, scalar) uniform Parameters {
 
 void main() {
     float depth;
-    hit = hit_of_ray(shading, pixel, depth);
+    hit = hit_of_ray(pixel, depth);
     // Nothing lies at the depth of 0, so that a miss is drawn nowhere.
     gl_FragDepth = depth;
 }

@@ -13,12 +13,13 @@ layout(binding = 1) uniform usamplerBuffer surfaces;
 layout(binding = 2) uniform usamplerBuffer tiles;
 layout(binding = 3) uniform usamplerBuffer pyramid;
 
+layout(constant_id = 0) const uint SHADING = SHADING_RELIEF;
+
 layout(push_constant, scalar) uniform Parameters {
     vec3 x;
     vec3 y;
     vec3 w;
     float near;
-    uint shading;
     float pixel;         // angle of a sample
 };
 
@@ -30,6 +31,6 @@ uint march_steps = 0;
 
 void main() {
     float depth;
-    hit_of_ray(shading, pixel, depth);
+    hit_of_ray(pixel, depth);
     counts = vec4(1.0, float(march_steps), 0.0, 0.0);
 }

@@ -25,6 +25,10 @@ layout(binding = 6) uniform usamplerBuffer light_polygons;
 // States of parts of triangles, STATES_IN_TEXEL a texel: [row along c][column along b][2]
 layout(binding = 7) uniform usamplerBuffer part_states;
 
+// Whether light points light the draw. What a draw cannot need is left out of its pipeline: a software
+// device works through every branch.
+layout(constant_id = 0) const uint LIT = 1;
+
 layout(push_constant, scalar) uniform Parameters {
     vec3 x;
     vec3 y;
@@ -137,7 +141,7 @@ vec3 straight() {
 void main() {
     vec3 rho = reflectance * texture(albedo, corner_uv).rgb;
     vec3 irradiance = corner_irradiance;
-    if (light_count > 0) {
+    if (LIT == 1) {
         irradiance += straight();
     }
     radiance = vec4(rho * irradiance / PI + emitted, metered);

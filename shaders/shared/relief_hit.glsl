@@ -1,5 +1,5 @@
 // Where the ray through a sample meets the relief of the prism that is drawn. Included after
-// shared/height_march.glsl and shared/prisms.glsl.
+// shared/height_march.glsl and shared/prisms.glsl; SHADING is one of SHADING_….
 
 layout(location = 0) in vec3 corner_position;
 layout(location = 1) flat in uint corner_prism;
@@ -66,7 +66,7 @@ bool meet_part(Part part, ReliefSurface surface, HeightTile tile, bool plane, ou
     vec3 from = part.from;
     vec3 to = part.to;
     float t;
-    if (plane) {
+    if (SHADING != SHADING_RELIEF || plane) {
         float above = from.z - surface.mean;
         float below = to.z - surface.mean;
         if (!(above >= 0.0 && below < 0.0)) {
@@ -121,15 +121,15 @@ uint meet(Prism p, ReliefSurface surface, HeightTile tile, bool plane, out Met m
 }
 
 // The hit of the ray, as shared/prisms.glsl says, and its depth; 0 where it meets nothing.
-uvec4 hit_of_ray(uint shading, float pixel, out float depth) {
+uvec4 hit_of_ray(float pixel, out float depth) {
     depth = 0.0;
     Prism p = load_prism(corner_prism);
     ReliefSurface surface = load_surface(p.surface);
     HeightTile tile = load_tile(p.surface);
     float footprint = length(corner_position) * pixel / p.texel;
-    bool wide = shading == SHADING_RELIEF && footprint > float(WIDEST_SAMPLE);
+    bool wide = SHADING == SHADING_RELIEF && footprint > float(WIDEST_SAMPLE);
     Met met;
-    uint which = meet(p, surface, tile, shading != SHADING_RELIEF || wide, met);
+    uint which = meet(p, surface, tile, wide, met);
     if (which == 3) {
         return uvec4(0);
     }

@@ -38,6 +38,7 @@ impl ItemBuffer {
             &GraphicsState {
                 name: "item buffer",
                 shaders: &SHADER,
+                constants: &[],
                 vertex_stride: 12,
                 attributes: &[VertexAttribute {
                     format: Format::R32G32B32_SFLOAT,

@@ -17,9 +17,8 @@ use crate::vk::{
     Image, Sampled, Sampler,
 };
 
-/// Push constants of one draw, most as those of [`super::shade::Parameters`]; `shading` and `view`
-/// are SHADING_… and VIEW_… of [`crate::constants`], `pixel` is the angle of a sample in radians,
-/// and `cells` are the columns and rows of the directions.
+/// Push constants of one draw, most as those of [`super::shade::Parameters`]; `pixel` is the angle
+/// of a sample in radians, and `cells` are the columns and rows of the directions.
 pub use super::shaders::relief::Parameters;
 
 /// The light on a picture's relief.
@@ -49,6 +48,19 @@ pub struct Draw<'a> {
     pub parameters: Parameters,
 }
 
+/// What the pipeline is made for, so that it does nothing else.
+#[derive(Debug, Clone, Copy)]
+pub struct Kind {
+    /// One of SHADING_… of [`crate::constants`].
+    pub shading: u32,
+    /// One of VIEW_….
+    pub view: u32,
+    /// Whether there is light by factors, by light points and by parallel lights.
+    pub factored: bool,
+    pub sharp: bool,
+    pub clustered: bool,
+}
+
 pub struct Relief {
     pipeline: GraphicsPipeline,
     by_texel: Sampler,
@@ -60,7 +72,9 @@ impl Relief {
     ///
     /// # Errors
     /// A device that fails.
-    pub fn new(device: &Arc<Device>, shade: &Shade) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, shade: &Shade, kind: Kind) -> Result<Self> {
+        let lights = [kind.factored, kind.sharp, kind.clustered].map(u32::from);
+        let constants = [&[kind.shading, kind.view], &lights[..]].concat();
         Ok(Self {
             pipeline: GraphicsPipeline::new(
                 device,
@@ -68,6 +82,7 @@ impl Relief {
                 &GraphicsState {
                     name: "relief",
                     shaders: &SHADER,
+                    constants: &constants,
                     vertex_stride: 0,
                     attributes: &[],
                     // Where no relief was found, nothing is shaded.

@@ -19,8 +19,8 @@ use crate::vk::{
     VertexAttribute,
 };
 
-/// Push constants: rows of the projection as those of [`super::shade::Parameters`]; `shading` is
-/// one of SHADING_… of [`crate::constants`], and `pixel` the angle of a sample in radians.
+/// Push constants: rows of the projection as those of [`super::shade::Parameters`], and the angle of
+/// a sample in radians.
 pub use super::shaders::relief_hits::Parameters;
 
 /// One corner of a prism.
@@ -78,12 +78,16 @@ const HULL: [u32; 24] = [
 ];
 
 impl ReliefHits {
+    /// `shading` is one of SHADING_… of [`crate::constants`].
+    ///
     /// # Errors
     /// A device that fails.
-    pub fn new(device: &Arc<Device>) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, shading: u32) -> Result<Self> {
         let hits = Attachment::read_by_shaders(FORMAT);
         let pass = RenderPass::with_depths(device, "relief hits", hits, Depths::Kept)?;
-        let pipeline = pipeline(device, &pass, "relief hits", &SHADER, Blending::Nearest)?;
+        let constants = [shading];
+        let state = prisms("relief hits", &SHADER, &constants);
+        let pipeline = GraphicsPipeline::new(device, &pass, &state)?;
         Ok(Self { pass, pipeline })
     }
 
@@ -125,35 +129,33 @@ impl ReliefHits {
     }
 }
 
-/// A pipeline that draws the backs of prisms, which are seen from outside and from inside, and
-/// once.
-pub(super) fn pipeline(
-    device: &Arc<Device>,
-    pass: &RenderPass,
-    name: &str,
-    shaders: &GraphicsShaders<'_>,
-    blending: Blending,
-) -> Result<GraphicsPipeline> {
-    let attribute = |format, offset: usize| VertexAttribute {
-        format,
-        offset: offset as u32,
-    };
-    let position = std::mem::offset_of!(Vertex, position);
-    GraphicsPipeline::new(
-        device,
-        pass,
-        &GraphicsState {
-            name,
-            shaders,
-            vertex_stride: size_of::<Vertex>() as u32,
-            attributes: &[
-                attribute(Format::R32G32B32_SFLOAT, position),
-                attribute(Format::R32_UINT, std::mem::offset_of!(Vertex, prism)),
-            ],
-            blending,
-            backs_alone: true,
-        },
-    )
+const ATTRIBUTES: [VertexAttribute; 2] = [
+    VertexAttribute {
+        format: Format::R32G32B32_SFLOAT,
+        offset: std::mem::offset_of!(Vertex, position) as u32,
+    },
+    VertexAttribute {
+        format: Format::R32_UINT,
+        offset: std::mem::offset_of!(Vertex, prism) as u32,
+    },
+];
+
+/// State of pipelines that draw the backs of prisms: these are seen from outside and from inside,
+/// and once.
+pub(super) fn prisms<'a>(
+    name: &'a str,
+    shaders: &'a GraphicsShaders<'a>,
+    constants: &'a [u32],
+) -> GraphicsState<'a> {
+    GraphicsState {
+        name,
+        shaders,
+        constants,
+        vertex_stride: size_of::<Vertex>() as u32,
+        attributes: &ATTRIBUTES,
+        blending: Blending::Nearest,
+        backs_alone: true,
+    }
 }
 
 impl ShapeBuffers {

@@ -7,21 +7,25 @@ use super::relief_hits::{self, Parameters, ShapeBuffers};
 use super::shade::Shade;
 use super::shaders::relief_overdraw::SHADER;
 use crate::error::Result;
-use crate::vk::{Blending, Commands, DescriptorSet, Device, GraphicsPipeline};
+use crate::vk::{Blending, Commands, DescriptorSet, Device, GraphicsPipeline, GraphicsState};
 
 pub struct ReliefOverdraw {
     pipeline: GraphicsPipeline,
 }
 
 impl ReliefOverdraw {
-    /// Draws into the targets of `shade`.
+    /// Draws into the targets of `shade`; `shading` is one of SHADING_… of [`crate::constants`].
     ///
     /// # Errors
     /// A device that fails.
-    pub fn new(device: &Arc<Device>, shade: &Shade) -> Result<Self> {
-        let name = "relief overdraw";
+    pub fn new(device: &Arc<Device>, shade: &Shade, shading: u32) -> Result<Self> {
+        let constants = [shading];
+        let state = GraphicsState {
+            blending: Blending::Sum,
+            ..relief_hits::prisms("relief overdraw", &SHADER, &constants)
+        };
         Ok(Self {
-            pipeline: relief_hits::pipeline(device, shade.pass(), name, &SHADER, Blending::Sum)?,
+            pipeline: GraphicsPipeline::new(device, shade.pass(), &state)?,
         })
     }
 

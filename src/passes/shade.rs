@@ -88,7 +88,9 @@ pub struct Shade {
     over_depths: RenderPass,
     /// Whether depths are read back beside the radiance.
     depths: bool,
-    pipeline: GraphicsPipeline,
+    /// For draws that light points light, and for others.
+    lit: GraphicsPipeline,
+    unlit: GraphicsPipeline,
     /// For draws that add; None unless asked for.
     adding: Option<GraphicsPipeline>,
 }
@@ -128,6 +130,7 @@ impl Shade {
         let state = GraphicsState {
             name: "shade",
             shaders: &SHADER,
+            constants: &[0],
             vertex_stride: size_of::<Vertex>() as u32,
             attributes: &[
                 attribute(
@@ -150,7 +153,15 @@ impl Shade {
         let adding = adds.then(|| GraphicsPipeline::new(device, &pass, &added));
         Ok(Self {
             depths,
-            pipeline: GraphicsPipeline::new(device, &pass, &state)?,
+            lit: GraphicsPipeline::new(
+                device,
+                &pass,
+                &GraphicsState {
+                    constants: &[1],
+                    ..state
+                },
+            )?,
+            unlit: GraphicsPipeline::new(device, &pass, &state)?,
             adding: adding.transpose()?,
             over_depths,
             pass,
@@ -173,7 +184,7 @@ impl Shade {
         lights: &LightBuffers,
         lit: &LitBuffers,
     ) -> Result<DescriptorSet> {
-        self.pipeline.bind(
+        self.lit.bind(
             "shade",
             &Bindings {
                 albedo: Sampled {
@@ -214,7 +225,8 @@ impl Shade {
         for draw in draws {
             let pipeline = match (draw.adds, &self.adding) {
                 (true, Some(adding)) => adding,
-                _ => &self.pipeline,
+                _ if draw.parameters.light_count > 0 => &self.lit,
+                _ => &self.unlit,
             };
             cmd.bind_graphics(pipeline, draw.texture, Some(mesh.vertices));
             cmd.push_graphics(pipeline, &draw.parameters);

@@ -23,7 +23,6 @@ pub struct Relief {
     pub mesh: ReliefMesh,
     /// Of what finds or counts fragments.
     set: DescriptorSet,
-    shading: u32,
 }
 
 /// Where the relief of a tile is drawn.
@@ -45,7 +44,7 @@ impl Relief {
         kept: Option<&ReliefScene>,
         shafts: Option<&Shafts>,
     ) -> Result<Option<Self>> {
-        let Some(((light, shading), kept)) = seen.lighting.relief().zip(kept) else {
+        let Some(((light, _), kept)) = seen.lighting.relief().zip(kept) else {
             return Ok(None);
         };
         let mesh = ReliefMesh::new(device, seen, light, kept, shafts)?;
@@ -57,7 +56,6 @@ impl Relief {
             passes: Arc::clone(&kept.passes),
             mesh,
             set,
-            shading,
         }))
     }
 
@@ -147,8 +145,6 @@ impl Relief {
                     emitter_points: shade.emitter_points,
                     polygon_count: shade.polygon_count,
                     corner: shade.corner,
-                    shading: self.shading,
-                    view: seen.lighting.show.code(),
                     pixel: seen.projection.sample_angle(seen.samples),
                     cells: [directions.columns, directions.rows],
                 },
@@ -164,7 +160,6 @@ impl Relief {
             y: shade.y,
             w: shade.w,
             near: shade.near,
-            shading: self.shading,
             pixel: seen.projection.sample_angle(seen.samples),
         }
     }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::relief_surfaces::Surfaces;
-use super::{Lighting, Show};
+use super::{Light, Lighting, ReliefShading, Show};
 use crate::bake::marcher;
 use crate::error::Result;
 use crate::math::directions::Directions;
@@ -14,7 +14,7 @@ use crate::mesh::elements::Elements;
 use crate::mesh::meso_vertices::MesoVertices;
 use crate::mesh::tiles::{Tile, tiles};
 use crate::meso::{Factors, visibility};
-use crate::passes::relief::Relief;
+use crate::passes::relief::{Kind, Relief};
 use crate::passes::relief_hits::ReliefHits;
 use crate::passes::relief_overdraw::ReliefOverdraw;
 use crate::passes::shade::Shade;
@@ -47,6 +47,20 @@ pub struct ReliefScene {
     pub direct: Vec<[Vec3; 3]>,
 }
 
+/// What is shaded; `shading` is the code of the lighting's.
+fn kind(lighting: &Lighting<'_>, shading: u32) -> Kind {
+    let sharp = lighting.sharp() && lighting.shading == ReliefShading::Factored;
+    let clustered = lighting.shading == ReliefShading::Clusters;
+    Kind {
+        shading,
+        view: lighting.show.code(),
+        // Light inside the relief, which is indirect, and that which arrives by slots.
+        factored: lighting.part != Light::Direct || !(sharp || clustered),
+        sharp,
+        clustered,
+    }
+}
+
 impl ReliefScene {
     /// None where no relief is drawn by rays or its response.
     ///
@@ -58,7 +72,7 @@ impl ReliefScene {
         scene: &Scene,
         lighting: &Lighting<'_>,
     ) -> Result<Option<Self>> {
-        let Some((light, _)) = lighting.relief() else {
+        let Some((light, shading)) = lighting.relief() else {
             return Ok(None);
         };
         let directions = Directions::new(light.directions.len() as u32)?;
@@ -86,8 +100,13 @@ impl ReliefScene {
         let gather = |moments| vertices.gather(&directions, &light.frames, moments);
         Ok(Some(Self {
             passes: Arc::new(match lighting.show {
-                Show::Overdraw => ReliefPasses::Overdraw(ReliefOverdraw::new(device, shade)?),
-                _ => ReliefPasses::Shaded(ReliefHits::new(device)?, Relief::new(device, shade)?),
+                Show::Overdraw => {
+                    ReliefPasses::Overdraw(ReliefOverdraw::new(device, shade, shading)?)
+                }
+                _ => ReliefPasses::Shaded(
+                    ReliefHits::new(device, shading)?,
+                    Relief::new(device, shade, kind(lighting, shading))?,
+                ),
             }),
             surfaces: Surfaces::new(scene, &tiles, &factors),
             all: gather(&light.incident_moment),

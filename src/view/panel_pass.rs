@@ -70,6 +70,7 @@ impl PanelPass {
             &GraphicsState {
                 name: "panel",
                 shaders: &SHADER,
+                constants: &[],
                 vertex_stride: size_of::<Vertex>() as u32,
                 attributes: &[
                     attribute(Format::R32G32_SFLOAT, std::mem::offset_of!(Vertex, pos)),

@@ -288,6 +288,7 @@ fn pipeline(
         &GraphicsState {
             name,
             shaders,
+            constants: &[],
             vertex_stride: size_of::<Vertex>() as u32,
             attributes: &[
                 attribute(three, std::mem::offset_of!(Vertex, position)),

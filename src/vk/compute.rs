@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::pipeline::{Module, PipelineOwner};
+use super::pipeline::{Module, PipelineOwner, constant_entries};
 use super::{ComputeShader, DescriptorSet, Device, ShaderBindings};
 use crate::error::Result;
 
@@ -61,14 +61,7 @@ impl ComputePipeline {
         let stages = vk::ShaderStageFlags::COMPUTE;
         let mut owner = PipelineOwner::with_layouts(device, name, shader.interface, stages)?;
         let module = Module::new(device, shader.spirv)?;
-        let entries: Vec<_> = (0..constants.len() as u32)
-            .map(|id| {
-                vk::SpecializationMapEntry::default()
-                    .constant_id(id)
-                    .offset(id * 4)
-                    .size(4)
-            })
-            .collect();
+        let entries = constant_entries(constants);
         let specialisation = vk::SpecializationInfo::default()
             .map_entries(&entries)
             .data(bytemuck::cast_slice(constants));

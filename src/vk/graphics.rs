@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::pipeline::{Module, PipelineOwner};
+use super::pipeline::{Module, PipelineOwner, constant_entries};
 use super::{DescriptorSet, Device, GraphicsShaders, RenderPass, ShaderBindings};
 use crate::error::Result;
 
@@ -20,6 +20,8 @@ pub struct VertexAttribute {
 pub struct GraphicsState<'a> {
     pub name: &'a str,
     pub shaders: &'a GraphicsShaders<'a>,
+    /// The fragment shader's specialisation constants 0, 1, …
+    pub constants: &'a [u32],
     /// Without attributes there is no vertex buffer.
     pub vertex_stride: u32,
     pub attributes: &'a [VertexAttribute],
@@ -68,9 +70,13 @@ impl GraphicsPipeline {
         )?;
         let vertex = Module::new(device, state.shaders.vertex)?;
         let fragment = Module::new(device, state.shaders.fragment)?;
+        let entries = constant_entries(state.constants);
+        let specialisation = vk::SpecializationInfo::default()
+            .map_entries(&entries)
+            .data(bytemuck::cast_slice(state.constants));
         let stages = [
             stage(vk::ShaderStageFlags::VERTEX, &vertex),
-            stage(vk::ShaderStageFlags::FRAGMENT, &fragment),
+            stage(vk::ShaderStageFlags::FRAGMENT, &fragment).specialization_info(&specialisation),
         ];
         let buffers = [vk::VertexInputBindingDescription::default()
             .binding(0)
@@ -142,10 +148,10 @@ impl GraphicsPipeline {
     }
 }
 
-fn stage(
+fn stage<'a>(
     stage: vk::ShaderStageFlags,
     module: &Module<'_>,
-) -> vk::PipelineShaderStageCreateInfo<'static> {
+) -> vk::PipelineShaderStageCreateInfo<'a> {
     vk::PipelineShaderStageCreateInfo::default()
         .stage(stage)
         .module(module.raw)

@@ -103,3 +103,14 @@ impl Drop for Module<'_> {
         unsafe { self.device.raw.destroy_shader_module(self.raw, None) };
     }
 }
+
+/// Where each of the specialisation constants 0, 1, … stands among their words.
+pub(super) fn constant_entries(constants: &[u32]) -> Vec<vk::SpecializationMapEntry> {
+    let entry = |id| {
+        vk::SpecializationMapEntry::default()
+            .constant_id(id)
+            .offset(id * 4)
+            .size(4)
+    };
+    (0..constants.len() as u32).map(entry).collect()
+}
