@@ -42,6 +42,8 @@ layout(constant_id = 1) const uint VIEW = VIEW_SHADED;
 layout(constant_id = 2) const uint FACTORED = 1;
 layout(constant_id = 3) const uint SHARP = 1;
 layout(constant_id = 4) const uint CLUSTERED = 1;
+// Whether point lights have beams.
+layout(constant_id = 5) const uint BEAMS = 1;
 
 layout(push_constant, scalar) uniform Parameters {
     uint first_prism;    // of those of the material
@@ -180,35 +182,34 @@ bool shadowed_by_relief(Prism p, ReliefSurface surface, HeightTile tile, Place p
     leaves = local.z > 0.0 ? short_of / local.z : NEVER;
     float past = leaves - edge;
     bool straight = past <= 0.0 || local.z > 0.0 && abs(bend) * past * (past + chord) < 2.0 * STRAIGHT * rise;
-    if (straight) {
-        return march(tile, from, vec3(from.xy + local.xy * leaves, surface.top), hit);
-    }
 
     // Past the edge the height is at_edge + slope x + bend x² / 2.
     float at_edge = from.z + local.z * edge;
     float slope = local.z + 0.5 * bend * chord;
     float deepest = bend > 0.0 && slope < 0.0 ? at_edge - 0.5 * slope * slope / bend : at_edge;
-    if (deepest < surface.lowest || bend <= 0.0 && slope <= 0.0) {
+    if (!straight && (deepest < surface.lowest || bend <= 0.0 && slope <= 0.0)) {
         return true;
     }
     float square = slope * slope + 2.0 * bend * (surface.top - at_edge);
     // In a hollow the way may sink again before it is out: what shadows it then is the scene.
     float root = sqrt(max(square, 0.0));
     float run = slope > 0.0 && square > 0.0 ? 2.0 * (surface.top - at_edge) / (slope + root) : (root - slope) / bend;
-    leaves = edge + run;
-    vec3 last = vec3(from.xy + local.xy * edge, at_edge);
-    if (march(tile, from, last, hit)) {
-        return true;
-    }
     // A chord of the parabola lies off it by bend / 8 times its length's square.
-    float chords = clamp(ceil(run * sqrt(abs(bend) / (8.0 * CHORD_OFF * rise))), 1.0, MOST_CHORDS);
-    for (float i = 1.0; i <= chords; i++) {
-        float x = run * i / chords;
-        vec3 next = vec3(from.xy + local.xy * (edge + x), at_edge + x * (slope + 0.5 * bend * x));
+    float chords = straight ? 0.0 : clamp(ceil(run * sqrt(abs(bend) / (8.0 * CHORD_OFF * rise))), 1.0, MOST_CHORDS);
+    if (!straight) {
+        leaves = edge + run;
+    }
+
+    // One loop over all parts of the way: a software device works through each march that is written.
+    vec3 next = straight ? vec3(from.xy + local.xy * leaves, surface.top) : vec3(from.xy + local.xy * edge, at_edge);
+    vec3 last = from;
+    for (float i = 0.0; i <= chords; i++) {
         if (march(tile, last, next, hit)) {
             return true;
         }
         last = next;
+        float x = run * (i + 1.0) / chords;
+        next = vec3(from.xy + local.xy * (edge + x), at_edge + x * (slope + 0.5 * bend * x));
     }
     return false;
 }

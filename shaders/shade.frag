@@ -25,9 +25,11 @@ layout(binding = 6) uniform usamplerBuffer light_polygons;
 // States of parts of triangles, STATES_IN_TEXEL a texel: [row along c][column along b][2]
 layout(binding = 7) uniform usamplerBuffer part_states;
 
-// Whether light points light the draw. What a draw cannot need is left out of its pipeline: a software
-// device works through every branch.
-layout(constant_id = 0) const uint LIT = 1;
+// LIT_…: how light points light the draw. What a draw cannot need is left out of its pipeline: a
+// software device works through every branch.
+layout(constant_id = 0) const uint LIT = LIT_IN_PARTS;
+// Whether point lights have beams.
+layout(constant_id = 1) const uint BEAMS = 1;
 
 layout(push_constant, scalar) uniform Parameters {
     vec3 x;
@@ -100,7 +102,7 @@ vec3 straight() {
     // where light grazes.
     vec3 from = at + t.above * t.plane + lift(at, t.a, t.normal_a, share.x) + lift(at, t.b, t.normal_b, share.y)
               + lift(at, t.c, t.normal_c, share.z);
-    uint state = state_at(t, share);
+    uint state = LIT == LIT_OPEN ? PART_OPEN : state_at(t, share);
     // By points, if not in closed form: polygon_count is 0 then.
     vec3 exact = unshadowed(at, normal);
     bool dark = polygon_count > 0 && exact == vec3(0.0);
@@ -141,7 +143,7 @@ vec3 straight() {
 void main() {
     vec3 rho = reflectance * texture(albedo, corner_uv).rgb;
     vec3 irradiance = corner_irradiance;
-    if (LIT == 1) {
+    if (LIT != LIT_NOT) {
         irradiance += straight();
     }
     radiance = vec4(rho * irradiance / PI + emitted, metered);

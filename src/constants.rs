@@ -108,6 +108,10 @@ shared! {
     VIEW_HEIGHT = 3;
     VIEW_IRRADIANCE = 4;
     VIEW_SLOTS = 5;
+    /// How light points light a draw: not at all, without anything between, as its parts say.
+    LIT_NOT = 0;
+    LIT_OPEN = 1;
+    LIT_IN_PARTS = 2;
     /// Part of a triangle that lights are seen from: they may be hidden in part; nothing stands
     /// between; something stands before all of each.
     PART_UNSURE = 0;

@@ -1,7 +1,8 @@
 // Points that light comes straight from: those of emitters, which samples take turns at, then point
 // lights. Including files have shared/types.glsl, shared/texels.glsl, a `usamplerBuffer
 // light_points`, a buffer `float webs[]`, shares of the intensity of beams, `light_count`,
-// `emitter_points`, and `corner`, the sample in the top left corner of the tile that is drawn.
+// `emitter_points`, `corner`, the sample in the top left corner of the tile that is drawn, and BEAMS,
+// 1 where there are beams.
 
 // Ends of ways lie so much of their distance from the eye above what they start and end on:
 // coordinates and their interpolation round by a few 2^-24 of it.
@@ -38,8 +39,7 @@ LightPoint load_light(uint i) {
     light.area = normal.w;
     light.strength = uintBitsToFloat(strength.xyz);
     light.first_share = strength.w;
-    // A loop that mostly takes no turn: a software device works through both sides of a branch.
-    for (uint turns = light.kind == KIND_BEAM ? 1 : 0; turns > 0; turns--) {
+    if (BEAMS == 1 && light.kind == KIND_BEAM) {
         uvec4 zero = fetch_words(light_points, first + 3);
         light.zero = uintBitsToFloat(zero.xyz);
         light.rows = zero.w;
@@ -82,8 +82,7 @@ float share_of(LightPoint light, vec3 way) {
 float arriving(LightPoint light, vec3 towards, float cosine, float square) {
     if (light.kind != KIND_SURFACE) {
         float share = 1.0;
-        // A loop that mostly takes no turn: a software device works through both sides of a branch.
-        for (uint turns = light.kind == KIND_BEAM ? 1 : 0; turns > 0; turns--) {
+        if (BEAMS == 1 && light.kind == KIND_BEAM) {
             share = share_of(light, -towards);
         }
         return share * cosine / square;

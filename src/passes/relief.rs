@@ -59,6 +59,8 @@ pub struct Kind {
     pub factored: bool,
     pub sharp: bool,
     pub clustered: bool,
+    /// Whether point lights have beams.
+    pub beams: bool,
 }
 
 pub struct Relief {
@@ -73,7 +75,7 @@ impl Relief {
     /// # Errors
     /// A device that fails.
     pub fn new(device: &Arc<Device>, shade: &Shade, kind: Kind) -> Result<Self> {
-        let lights = [kind.factored, kind.sharp, kind.clustered].map(u32::from);
+        let lights = [kind.factored, kind.sharp, kind.clustered, kind.beams].map(u32::from);
         let constants = [&[kind.shading, kind.view], &lights[..]].concat();
         Ok(Self {
             pipeline: GraphicsPipeline::new(

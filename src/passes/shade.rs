@@ -11,6 +11,7 @@ use super::buffers::upload;
 use super::shaders::shade::{Bindings, SHADER};
 use super::shadow_rays::{LightBuffers, LightCounts};
 use super::types::LitTriangle;
+use crate::constants::{LIT_IN_PARTS, LIT_NOT, LIT_OPEN};
 use crate::error::Result;
 use crate::vk::{
     Attachment, Blending, Buffer, BufferUse, Commands, Depths, DescriptorSet, Device, Format,
@@ -77,6 +78,8 @@ pub struct Draw<'a> {
     pub first_vertex: u32,
     pub vertex_count: u32,
     pub texture: &'a DescriptorSet,
+    /// LIT_… of [`crate::constants`].
+    pub lit: u32,
     /// Whether its colours are added to what is there in the same place.
     pub adds: bool,
     pub parameters: Parameters,
@@ -88,9 +91,8 @@ pub struct Shade {
     over_depths: RenderPass,
     /// Whether depths are read back beside the radiance.
     depths: bool,
-    /// For draws that light points light, and for others.
-    lit: GraphicsPipeline,
-    unlit: GraphicsPipeline,
+    /// `[LIT_…]`
+    lit: [GraphicsPipeline; 3],
     /// For draws that add; None unless asked for.
     adding: Option<GraphicsPipeline>,
 }
@@ -111,11 +113,12 @@ const FORMAT: Format = Format::R32G32B32A32_SFLOAT;
 const TEXEL_BYTES: u64 = 16;
 
 impl Shade {
-    /// With `depths`, these are read back beside the radiance; only with `adds` draws can add.
+    /// With `depths`, these are read back beside the radiance; only with `adds` draws can add, and
+    /// only with `beams` point lights shine in beams.
     ///
     /// # Errors
     /// A device that fails.
-    pub fn new(device: &Arc<Device>, depths: bool, adds: bool) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, depths: bool, adds: bool, beams: bool) -> Result<Self> {
         let colour = Attachment::copied(FORMAT);
         let after = match depths {
             true => Depths::Copied,
@@ -130,7 +133,7 @@ impl Shade {
         let state = GraphicsState {
             name: "shade",
             shaders: &SHADER,
-            constants: &[0],
+            constants: &[LIT_NOT, 0],
             vertex_stride: size_of::<Vertex>() as u32,
             attributes: &[
                 attribute(
@@ -150,18 +153,18 @@ impl Shade {
             blending: Blending::Add,
             ..state
         };
+        let lit = |how| {
+            let constants = [how, beams.into()];
+            let state = GraphicsState {
+                constants: &constants,
+                ..state
+            };
+            GraphicsPipeline::new(device, &pass, &state)
+        };
         let adding = adds.then(|| GraphicsPipeline::new(device, &pass, &added));
         Ok(Self {
             depths,
-            lit: GraphicsPipeline::new(
-                device,
-                &pass,
-                &GraphicsState {
-                    constants: &[1],
-                    ..state
-                },
-            )?,
-            unlit: GraphicsPipeline::new(device, &pass, &state)?,
+            lit: [lit(LIT_NOT)?, lit(LIT_OPEN)?, lit(LIT_IN_PARTS)?],
             adding: adding.transpose()?,
             over_depths,
             pass,
@@ -184,7 +187,7 @@ impl Shade {
         lights: &LightBuffers,
         lit: &LitBuffers,
     ) -> Result<DescriptorSet> {
-        self.lit.bind(
+        self.lit[0].bind(
             "shade",
             &Bindings {
                 albedo: Sampled {
@@ -225,8 +228,7 @@ impl Shade {
         for draw in draws {
             let pipeline = match (draw.adds, &self.adding) {
                 (true, Some(adding)) => adding,
-                _ if draw.parameters.light_count > 0 => &self.lit,
-                _ => &self.unlit,
+                _ => &self.lit[draw.lit as usize],
             };
             cmd.bind_graphics(pipeline, draw.texture, Some(mesh.vertices));
             cmd.push_graphics(pipeline, &draw.parameters);

@@ -12,7 +12,7 @@ use super::seen_scene::SeenScene;
 use super::shafts::Shafts;
 use super::textures::Bound;
 use super::{Joined, Light, corner_irradiance, parts};
-use crate::constants::{PART_OPEN, PART_UNSURE};
+use crate::constants::{LIT_IN_PARTS, LIT_NOT, LIT_OPEN, PART_HIDDEN, PART_OPEN, PART_UNSURE};
 use crate::error::Result;
 use crate::mesh::corners::Corners;
 use crate::passes::buffers::upload;
@@ -39,6 +39,8 @@ pub struct Mesh {
 /// Drawn triangles of one kind.
 struct KindRange {
     kind: Kind,
+    /// LIT_…
+    lit: u32,
     /// First vertex.
     first: u32,
     /// Number of vertices.
@@ -139,22 +141,36 @@ impl Mesh {
                 corners(uv, places, light, projection)
             })
             .collect();
+        let mut lit = shafts.map_or_else(Lit::default, |shafts| {
+            let lit = lit_triangles(scene, &order, &vertices);
+            let pixel = projection.sample_angle(1);
+            Lit::new(lit, &order, shafts, pixel.into())
+        });
+        // Those that need the same shading come together.
+        let kind = |i: usize| (order[i].kind, lit.how(i, order[i].kind));
+        let mut places: Vec<usize> = (0..order.len()).collect();
+        places.sort_by_key(|&i| kind(i));
         let mut ranges = Vec::new();
         let mut first = 0;
-        for same in order.chunk_by(|a, b| a.kind == b.kind) {
+        for same in places.chunk_by(|&a, &b| kind(a) == kind(b)) {
             let count = 3 * same.len() as u32;
+            let (kind, lit) = kind(same[0]);
             ranges.push(KindRange {
-                kind: same[0].kind,
+                kind,
+                lit,
                 first,
                 count,
             });
             first += count;
         }
-        let lit = shafts.map_or_else(Lit::default, |shafts| {
-            let lit = lit_triangles(scene, &order, &vertices);
-            let pixel = projection.sample_angle(1);
-            Lit::new(lit, &order, shafts, pixel.into())
-        });
+        let vertices: Vec<Vertex> = places
+            .iter()
+            .flat_map(|&i| &vertices[3 * i..][..3])
+            .copied()
+            .collect();
+        if !lit.triangles.is_empty() {
+            lit.triangles = places.iter().map(|&i| lit.triangles[i]).collect();
+        }
         let fronts = order.iter().filter(|drawn| drawn.kind.is_lit()).count();
         let indices: Vec<u32> = (0..vertices.len() as u32).collect();
         Ok(Self {
@@ -181,6 +197,7 @@ impl Mesh {
         self.ranges.iter().map(move |range| Draw {
             first_vertex: range.first,
             vertex_count: range.count,
+            lit: range.lit,
             texture: match range.kind {
                 Kind::Front(m) => textures.of_material(m),
                 Kind::Glow(m) => textures.of_emission(m),
@@ -264,6 +281,19 @@ impl Lit {
             states: words,
             open,
             parts: all,
+        }
+    }
+
+    /// LIT_… of a triangle of that kind.
+    fn how(&self, i: usize, kind: Kind) -> u32 {
+        let Some(triangle) = self.triangles.get(i).filter(|_| kind.is_lit()) else {
+            return LIT_NOT;
+        };
+        match (triangle.level, triangle.first_part) {
+            (0, PART_OPEN) => LIT_OPEN,
+            // Nothing arrives from lights.
+            (0, PART_HIDDEN) => LIT_NOT,
+            _ => LIT_IN_PARTS,
         }
     }
 }

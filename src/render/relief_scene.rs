@@ -48,7 +48,7 @@ pub struct ReliefScene {
 }
 
 /// What is shaded; `shading` is the code of the lighting's.
-fn kind(lighting: &Lighting<'_>, shading: u32) -> Kind {
+fn kind(scene: &Scene, lighting: &Lighting<'_>, shading: u32) -> Kind {
     let sharp = lighting.sharp() && lighting.shading == ReliefShading::Factored;
     let clustered = lighting.shading == ReliefShading::Clusters;
     Kind {
@@ -58,6 +58,7 @@ fn kind(lighting: &Lighting<'_>, shading: u32) -> Kind {
         factored: lighting.part != Light::Direct || !(sharp || clustered),
         sharp,
         clustered,
+        beams: scene.lights.have_beams(),
     }
 }
 
@@ -105,7 +106,7 @@ impl ReliefScene {
                 }
                 _ => ReliefPasses::Shaded(
                     ReliefHits::new(device, shading)?,
-                    Relief::new(device, shade, kind(lighting, shading))?,
+                    Relief::new(device, shade, kind(scene, lighting, shading))?,
                 ),
             }),
             surfaces: Surfaces::new(scene, &tiles, &factors),

@@ -130,7 +130,7 @@ impl<'a> Renderer<'a> {
         );
         view.check()?;
         let glows = scene.materials.iter().any(|m| m.map_ke.is_some());
-        let shade = Shade::new(device, depths, glows)?;
+        let shade = Shade::new(device, depths, glows, scene.lights.have_beams())?;
         let fixed = Fixed {
             textures: Textures::new(device, scene)?,
             relief: ReliefScene::new(device, &shade, scene, &lighting)?,

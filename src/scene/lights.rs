@@ -57,13 +57,18 @@ impl Lights {
         sky: None,
     };
 
+    /// Whether a point light shines in a beam.
+    pub fn have_beams(&self) -> bool {
+        self.points.iter().any(|light| light.beam.is_some())
+    }
+
     /// What there is besides points that shine evenly, in the plural: the pixel estimator and most
     /// peers of `bench pareto` do not know it.
     pub fn beyond_points(&self) -> Option<&'static str> {
         let kinds = [
             (!self.suns.is_empty(), "suns"),
             (self.sky.is_some(), "skies"),
-            (self.points.iter().any(|l| l.beam.is_some()), "beams"),
+            (self.have_beams(), "beams"),
         ];
         kinds.into_iter().find(|kind| kind.0).map(|kind| kind.1)
     }
