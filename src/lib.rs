@@ -39,6 +39,7 @@ pub mod constants;
 pub mod error;
 #[cfg(feature = "export")]
 pub mod export;
+pub mod input_file;
 pub mod math;
 pub mod mesh;
 pub mod meso;

@@ -140,3 +140,22 @@ fn signals_stop_with_their_exit_codes_and_replace_nothing() {
         }
     }
 }
+
+/// A file beyond the limit on its size is an error, and leaves nothing behind.
+#[test]
+fn a_limit_on_files_is_an_error() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let whole = bake(folder.path(), &QUICK);
+    let mut limited = Command::new("sh");
+    limited
+        .args(["-c", "ulimit -f 8; exec \"$@\"", "sh"])
+        .arg(whole.get_program())
+        .args(whole.get_args())
+        .current_dir(folder.path())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .env("TMPDIR", folder.path());
+    assert_eq!(code(limited.spawn().expect("the program starts")), 2);
+    let left = std::fs::read_dir(folder.path()).expect("a folder").count();
+    assert_eq!(left, 0);
+}

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// From below. Modules of one line do not use each other; `say` is the macro of `console`.
 const LAYERS: [&[&str]; 10] = [
     &["console", "constants", "error", "say", "structs"],
-    &["atomic_file", "math", "vk"],
+    &["atomic_file", "input_file", "math", "vk"],
     &["scene"],
     &["meso", "picture"],
     &["mesh", "path_tracer"],

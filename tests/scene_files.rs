@@ -306,3 +306,66 @@ fn a_write_that_fails_leaves_what_was_there() {
     write_atomically(dir.path(), |_| Ok(())).unwrap_err();
     write_atomically(&dir.path().join("no/folder"), |_| Ok(())).unwrap_err();
 }
+
+/// A link stays, and what it leads to is written, there or not; a name need not be UTF-8; what a
+/// killed program left an hour ago is cleared away; a pipe that nothing reads is an error.
+#[cfg(unix)]
+#[test]
+fn links_pipes_and_strange_names_are_written() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    use std::os::unix::fs::symlink;
+    use std::time::{Duration, SystemTime};
+
+    use mesolux::atomic_file::{with_ending, write_atomically};
+
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    fs::create_dir(at("there")).unwrap();
+    symlink("there/file", at("link")).unwrap();
+    for text in [&b"first"[..], b"second"] {
+        write_atomically(&at("link"), |out| out.write_all(text)).unwrap();
+        assert_eq!(fs::read(at("there/file")).unwrap(), text);
+        assert!(fs::symlink_metadata(at("link")).unwrap().is_symlink());
+    }
+
+    let strange = dir.path().join(OsStr::from_bytes(b"\xff.exr"));
+    let beside = with_ending(&strange, "-0001.png");
+    assert_eq!(
+        beside.file_name(),
+        Some(OsStr::from_bytes(b"\xff-0001.png"))
+    );
+
+    let other = tempfile::tempdir().unwrap();
+    let (old, new) = (".mesolux-0123456789abcdef", ".mesolux-fedcba9876543210");
+    for name in [old, new] {
+        fs::write(other.path().join(name), "left").unwrap();
+    }
+    let hours_ago = SystemTime::now() - Duration::from_secs(7200);
+    let file = fs::File::options()
+        .append(true)
+        .open(other.path().join(old))
+        .unwrap();
+    file.set_modified(hours_ago).unwrap();
+    write_atomically(&other.path().join("out"), |_| Ok(())).unwrap();
+    assert!(!other.path().join(old).exists());
+    assert!(other.path().join(new).exists());
+
+    let pipe = at("pipe");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+    assert!(made.unwrap().success());
+    let error = write_atomically(&pipe, |_| Ok(())).unwrap_err().to_string();
+    assert!(
+        error.ends_with("pipe: cannot be written: nothing reads this pipe"),
+        "{error}"
+    );
+    let reader = std::thread::spawn({
+        let pipe = pipe.clone();
+        move || fs::read(pipe).unwrap()
+    });
+    let write = || write_atomically(&pipe, |out| out.write_all(b"read"));
+    while write().is_err() {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    assert_eq!(reader.join().unwrap(), b"read");
+}

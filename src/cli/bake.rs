@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::progress::{Bar, catch_interrupts, interrupted};
 use super::{BakingDevices, Builtin};
+use mesolux::atomic_file::with_ending;
 use mesolux::bake::quality::{self, Quality};
 use mesolux::bake::solution::{Origin, Solution};
 use mesolux::error::{Error, Result};
@@ -315,7 +316,8 @@ pub fn cache_folder() -> Option<PathBuf> {
 struct Printed<'a> {
     scene: &'a str,
     scene_hash: &'a str,
-    output: &'a std::path::Path,
+    /// Names need not be UTF-8.
+    output: String,
     read_seconds: f64,
     wall_seconds: f64,
     peak_resident_bytes: Option<u64>,
@@ -388,7 +390,7 @@ pub fn run(options: &Options) -> Result<()> {
         let printed = Printed {
             scene: &options.scene,
             scene_hash: &origin.hash,
-            output: &output,
+            output: output.display().to_string(),
             read_seconds,
             wall_seconds: start.elapsed().as_secs_f64(),
             peak_resident_bytes: peak_resident_bytes(),
@@ -405,10 +407,7 @@ fn unfinished(output: &Path) -> PathBuf {
     if !output.is_file() {
         return output.to_owned();
     }
-    let stem = output.file_stem().unwrap_or_default();
-    let mut name = stem.to_owned();
-    name.push(".unfinished.safetensors");
-    let path = output.with_file_name(name);
+    let path = with_ending(output, ".unfinished.safetensors");
     tracing::warn!(
         "{} is left as it is; what is solved goes to {}",
         output.display(),
@@ -426,13 +425,10 @@ fn save_somewhere(output: &Path, save: impl Fn(&Path) -> Result<()>) -> Result<(
         Ok(()) => return Ok(()),
         Err(error) => error,
     };
-    let folder = tempfile::Builder::new()
-        .prefix("mesolux-")
-        .disable_cleanup(true)
-        .tempdir();
+    let folder = tempfile::Builder::new().prefix("mesolux-").tempdir();
     let kept = folder.ok().and_then(|folder| {
-        let path = folder.path().join("bake.safetensors");
-        save(&path).ok().map(|()| path)
+        save(&folder.path().join("bake.safetensors")).ok()?;
+        Some(folder.keep().join("bake.safetensors"))
     });
     match kept {
         Some(path) => tracing::warn!("the bake is kept as {}", path.display()),
@@ -542,7 +538,7 @@ pub fn writable(path: &std::path::Path) -> Result<()> {
         return Err(Error::write(path, std::io::ErrorKind::IsADirectory.into()));
     }
     tempfile::Builder::new()
-        .prefix(".mesolux")
+        .prefix(".mesolux-")
         .tempfile_in(folder)
         .map(|_| ())
         // Its own text names the file that was tried.

@@ -326,6 +326,7 @@ pub fn main() -> ExitCode {
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let given = matches.subcommand().map_or(&matches, |(_, given)| given);
     log_to_stderr(&cli);
+    progress::survive_limits();
     let done = match &cli.command {
         Command::Bake(options) => bake::run(options),
         Command::Render(options) => render::run(options, given),

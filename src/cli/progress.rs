@@ -39,6 +39,18 @@ static CAUGHT: LazyLock<Caught> = LazyLock::new(|| {
     caught
 });
 
+/// Makes a write beyond the limit on a file's size fail, as one to a full disk does, where by
+/// default it kills the program.
+pub fn survive_limits() {
+    #[cfg(unix)]
+    {
+        let too_large = rustix::process::Signal::XFSZ.as_raw();
+        if let Err(error) = flag::register(too_large, Arc::default()) {
+            tracing::warn!("a file beyond the limit on its size will end the program: {error}");
+        }
+    }
+}
+
 /// The first Ctrl-C, or another signal to stop, asks the work in progress to stop and keep its
 /// result; the second ends the program. Another call resets one that has been handled.
 pub fn catch_interrupts() {

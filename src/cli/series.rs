@@ -7,6 +7,7 @@ use clap::{Args, ValueEnum};
 
 use super::bake::writable;
 use super::progress::{Bar, catch_interrupts, interrupted};
+use mesolux::atomic_file::with_ending;
 use mesolux::error::Result;
 use mesolux::render::{Development, Picture};
 use mesolux::scene::{Camera, Scene, camera_path};
@@ -57,10 +58,9 @@ impl SeriesOptions {
 /// The file of a picture of the series, counted from 1, with as many digits as the last number, at
 /// least four.
 fn numbered(output: &Path, number: usize, of: usize) -> PathBuf {
-    let stem = output.file_stem().unwrap_or_default().to_string_lossy();
     let ending = output.extension().unwrap_or_default().to_string_lossy();
     let digits = of.to_string().len().max(4);
-    output.with_file_name(format!("{stem}-{number:0digits$}.{ending}"))
+    with_ending(output, &format!("-{number:0digits$}.{ending}"))
 }
 
 /// Draws and writes the series; `draw` returns the picture from a camera, or None if it was

@@ -12,7 +12,7 @@ use image::codecs::png::PngEncoder;
 use super::ktx2;
 use super::light_map::LightMap;
 use super::texels::NOTHING;
-use crate::atomic_file::write_atomically;
+use crate::atomic_file::{with_ending, write_atomically};
 use crate::error::{Error, Result};
 use crate::picture::tone::coded;
 use crate::solver::LightAt;
@@ -138,10 +138,16 @@ impl LightMap {
         if self.pages.count == 1 {
             return vec![path.to_owned()];
         }
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let (stem, ending) = name.split_once('.').unwrap_or((&name, ""));
+        let is_rgbm = matches!(MapFile::of(path), Ok(MapFile::Rgbm));
+        let (before, ending) = match is_rgbm {
+            true => (path.with_extension(""), "rgbm.png".into()),
+            false => {
+                let ending = path.extension().unwrap_or_default();
+                (path.to_owned(), ending.to_string_lossy())
+            }
+        };
         (1..=self.pages.count)
-            .map(|number| path.with_file_name(format!("{stem}-{number}.{ending}")))
+            .map(|number| with_ending(&before, &format!("-{number}.{ending}")))
             .collect()
     }
 }

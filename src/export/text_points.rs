@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::error::{Error, Result};
+use crate::input_file::read_text;
 
 /// A line that is not empty and does not begin with `#`.
 pub(super) struct Row<'a> {
@@ -29,7 +30,7 @@ pub(super) fn read_rows<T>(
     columns: &str,
     point: impl Fn(Row<'_>) -> Result<T>,
 ) -> Result<Vec<T>> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
+    let text = read_text(path)?;
     let mut points = Vec::new();
     for (number, line) in (1..).zip(text.lines()) {
         let line = line.trim();

@@ -8,6 +8,7 @@ use super::HeightField;
 use crate::atomic_file::write_atomically;
 use crate::constants::{AZIMUTHS, RAY_STRATA};
 use crate::error::Result;
+use crate::input_file;
 
 /// The parts of the sky and of the relief that each facet of a [`HeightField`] sees.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,7 +47,7 @@ impl Visibility {
 
     /// The cached visibility of a height field; None if there is none or its file is damaged.
     pub fn load(field: &HeightField, cache: &Path) -> Option<Self> {
-        let bytes = std::fs::read(Self::file(field, cache)).ok()?;
+        let bytes = input_file::read(&Self::file(field, cache)).ok()?;
         let facets = field.facet_count();
         let (body, sum) = bytes.split_at_checked(4 * facets * (AZIMUTHS as usize + RAYS))?;
         if Sha256::digest(body).as_slice() != sum {

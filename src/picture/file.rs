@@ -17,6 +17,7 @@ use super::develop::{Codes, Development};
 use super::tone;
 use crate::atomic_file::write_atomically;
 use crate::error::{Error, Result};
+use crate::input_file;
 
 /// Samples of a pixel along each side.
 pub const SAMPLES: u32 = 4;
@@ -204,7 +205,7 @@ impl Picture {
                 return Err(Error::file(path, what));
             }
         };
-        let bytes = std::fs::read(path).map_err(|e| Error::read(path, e))?;
+        let bytes = input_file::read(path)?;
         let decoded = image::load_from_memory_with_format(&bytes, format)
             .map_err(|e| Error::file(path, e.to_string()))?
             .into_rgb32f();

@@ -91,6 +91,10 @@ pub(super) struct Assembly {
     projected: usize,
     /// Of meshes.
     names: Names,
+    /// Index of each material by its name.
+    materials: HashMap<String, u32>,
+    /// The next number for materials of a name that is taken.
+    numbers: HashMap<String, u32>,
     /// What is left to be found of the sides of each triangle, `[triangle]`.
     choices: Vec<Choice>,
 }
@@ -107,6 +111,8 @@ impl Assembly {
             known: HashSet::new(),
             projected: 0,
             names: Names::default(),
+            materials: HashMap::new(),
+            numbers: HashMap::new(),
             choices: Vec::new(),
         }
     }
@@ -119,15 +125,18 @@ impl Assembly {
 
     fn add_material(&mut self, material: &Material) -> u32 {
         let known = &mut self.scene.materials;
-        if let Some(index) = known.iter().position(|m| m == material) {
-            return index as u32;
+        let same = self.materials.get(&material.name);
+        if let Some(&index) = same.filter(|&&index| known[index as usize] == *material) {
+            return index;
         }
         let mut material = material.clone();
         let name = material.name.clone();
-        let mut number = 2;
-        while known.iter().any(|m| m.name == material.name) {
-            material.name = format!("{name}.{number}");
-            number += 1;
+        if same.is_some() {
+            let number = self.numbers.entry(name.clone()).or_insert(2);
+            while self.materials.contains_key(&material.name) {
+                material.name = format!("{name}.{number}");
+                *number += 1;
+            }
         }
         if material.name != name {
             self.scene.notes.push(format!(
@@ -135,8 +144,10 @@ impl Assembly {
                 material.name
             ));
         }
+        let index = known.len() as u32;
+        self.materials.insert(material.name.clone(), index);
         known.push(material);
-        known.len() as u32 - 1
+        index
     }
 
     /// Adds the triangles of a mesh in their order; `materials` gives the scene's index for each of
@@ -213,7 +224,7 @@ impl Assembly {
         match sides {
             None if two_sided.contains(&true) => {
                 let of_scene = (materials.iter().zip(&two_sided)).filter(|(_, two)| **two);
-                let two_sided: Vec<u32> = of_scene.map(|(&material, _)| material).collect();
+                let two_sided: HashSet<u32> = of_scene.map(|(&material, _)| material).collect();
                 let of = |t: &Triangle| match two_sided.contains(&t.material) {
                     true => Choice::Two,
                     false => Choice::One,

@@ -8,7 +8,7 @@ use super::assemble::Assembly;
 use super::material::TextureCache;
 #[cfg(feature = "formats")]
 use super::scene_file;
-use super::text_file::stem;
+use super::stem::stem;
 use super::{Scene, builtin, check, mesh_file};
 use crate::error::{Error, Result};
 

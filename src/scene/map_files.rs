@@ -1,7 +1,6 @@
 //! Textures and relief maps of a scene that is written out.
 
 use std::collections::HashMap;
-use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,6 +11,7 @@ use super::texture::srgb_table;
 use super::{HeightMap, NormalMap, Scene, Texture};
 use crate::atomic_file::write_atomically;
 use crate::error::{Error, Result};
+use crate::input_file;
 
 /// The names of the files in the folder.
 #[derive(Default)]
@@ -47,8 +47,7 @@ pub(super) fn write(scene: &Scene, dir: &Path) -> Result<MapFiles> {
         let is_file = scene.path.is_some()
             || Texture::load(&texture.path).is_ok_and(|there| there == **texture);
         let (name, bytes) = if is_file {
-            let read = fs::read(&texture.path);
-            let bytes = read.map_err(|source| Error::read(&texture.path, source))?;
+            let bytes = input_file::read(&texture.path)?;
             (copy_name("texture", &texture.path, number), bytes)
         } else {
             let (extension, bytes) = encode_colours(texture)?;
@@ -104,7 +103,7 @@ fn add<T>(
     }
     let number = files.maps.len();
     let (name, bytes) = if same {
-        let bytes = fs::read(path).map_err(|source| Error::read(path, source))?;
+        let bytes = input_file::read(path)?;
         (copy_name(kind, path, number), bytes)
     } else {
         let (extension, bytes) = encode(map)?;

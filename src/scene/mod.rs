@@ -53,7 +53,7 @@ mod scene_file;
 pub mod shapes;
 mod sides;
 pub mod sky;
-mod text_file;
+mod stem;
 mod texture;
 mod tile;
 mod uv;

@@ -1,6 +1,7 @@
 //! Wavefront MTL material libraries: `Kd`, `Ke` and maps; what else would change the light is
 //! reported.
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use super::Material;
@@ -8,9 +9,9 @@ use super::material::{DEFAULT_KD, MadeUp, TextureCache};
 use super::mtl_maps::{self, Maps};
 use super::obj_lint::{brief, finite, statements};
 use super::said::Said;
-use super::text_file::read_text;
 use super::uv::OnSurface;
 use crate::error::{Error, Result};
+use crate::input_file::read_text;
 
 #[derive(Default)]
 pub(super) struct Library {
@@ -116,6 +117,7 @@ const NOT_DIFFUSE: [&str; 23] = [
 fn check(path: &Path, text: &str) -> Result<Checked> {
     let mut checked = Checked::default();
     let mut names: Vec<String> = Vec::new();
+    let mut known = HashSet::new();
     for (line, statement) in statements(text) {
         let statement = statement.trim();
         if statement.is_empty() || statement.starts_with('#') {
@@ -131,7 +133,7 @@ fn check(path: &Path, text: &str) -> Result<Checked> {
             format!("{}:{line}: {material}{what}", path.display())
         };
         let done = match keyword {
-            "newmtl" => new_material(rest, &mut names),
+            "newmtl" => new_material(rest, &mut names, &mut known),
             "Kd" | "Ke" => colour(keyword, rest),
             "d" | "Tr" => match opacity(keyword, operands) {
                 Ok(opacity) if opacity < 1.0 => {
@@ -183,11 +185,15 @@ fn opacity(keyword: &str, operands: &str) -> Result<f64, String> {
     })
 }
 
-fn new_material(name: &str, names: &mut Vec<String>) -> Result<(), String> {
+fn new_material(
+    name: &str,
+    names: &mut Vec<String>,
+    known: &mut HashSet<String>,
+) -> Result<(), String> {
     if name.is_empty() {
         return Err("newmtl has no name".into());
     }
-    if names.iter().any(|known| known == name) {
+    if !known.insert(name.to_owned()) {
         return Err(format!("material \"{}\" is defined twice", brief(name)));
     }
     names.push(name.to_owned());

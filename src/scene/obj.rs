@@ -1,6 +1,6 @@
 //! Wavefront OBJ meshes.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use glam::DVec3;
@@ -9,10 +9,11 @@ use super::assemble::{Mesh, MeshTriangle};
 use super::material::{DEFAULT_KD, MadeUp, TextureCache};
 use super::meshes::Part;
 use super::obj_lint::{self, Checked, brief};
-use super::text_file::{read_text, stem};
+use super::stem::stem;
 use super::uv::UvTransform;
 use super::{Material, mtl};
 use crate::error::{Error, Result};
+use crate::input_file::read_text;
 
 /// The material of faces that name none.
 const NO_MATERIAL: &str = "default";
@@ -69,10 +70,11 @@ fn materials(
     textures: &mut TextureCache,
     mesh: &mut Mesh,
 ) -> Result<()> {
+    let mut known: HashSet<String> = HashSet::new();
     for (line, names) in &checked.libraries {
         for name in library_files(path, names) {
             let file = path.with_file_name(&name);
-            if !file.is_file() {
+            if !file.exists() {
                 let what = format!("mtllib \"{}\": there is no such file", brief(&name));
                 return Err(Error::line(path, *line, what));
             }
@@ -81,7 +83,7 @@ fn materials(
             mesh.said.notes.append(&mut textures.notes);
             mesh.on_surface.extend(read.on_surface);
             for material in read.materials {
-                if mesh.materials.iter().any(|m| m.name == material.name) {
+                if !known.insert(material.name.clone()) {
                     return Err(Error::Material {
                         path: file,
                         material: material.name,
@@ -94,7 +96,7 @@ fn materials(
         }
     }
     for (line, name) in &checked.used {
-        if mesh.materials.iter().any(|m| m.name == *name) {
+        if !known.insert(name.clone()) {
             continue;
         }
         if !checked.libraries.is_empty() {
@@ -195,10 +197,11 @@ fn faces(path: &Path, checked: &Checked, mesh: &mut Mesh) -> Result<()> {
 
 /// Faces without texture coordinates are projected in one way, whatever `-s` and `-o` say.
 fn warn_of_moved_maps(mesh: &mut Mesh) {
-    for (index, on) in mesh.on_surface.iter().enumerate() {
-        let is_bare = |t: &MeshTriangle| t.material as usize == index && t.uv.is_none();
+    let bare = mesh.triangles.iter().filter(|t| t.uv.is_none());
+    let bare: HashSet<u32> = bare.map(|t| t.material).collect();
+    for (on, index) in mesh.on_surface.iter().zip(0..) {
         if let Some(warning) = &on.moved
-            && mesh.triangles.iter().any(is_bare)
+            && bare.contains(&index)
         {
             mesh.said.warnings.push(warning.clone());
         }
@@ -207,13 +210,14 @@ fn warn_of_moved_maps(mesh: &mut Mesh) {
 
 /// Maps repeat, also those that `-clamp` would keep from it: a warning where that shows.
 fn warn_of_clamped_maps(path: &Path, mesh: &mut Mesh) {
+    let outside = |uv: [[f32; 2]; 3]| uv.as_flattened().iter().any(|c| !(0.0..=1.0).contains(c));
+    let repeats = mesh.triangles.iter().filter(|t| t.uv.is_some_and(outside));
+    let repeats: HashSet<u32> = repeats.map(|t| t.material).collect();
     for (index, on) in mesh.on_surface.iter().enumerate() {
         let Some((keyword, line)) = &on.clamped else {
             continue;
         };
-        let own = |t: &&MeshTriangle| t.material as usize == index;
-        let mut uv = mesh.triangles.iter().filter(own).filter_map(|t| t.uv);
-        if uv.any(|uv| uv.as_flattened().iter().any(|c| !(0.0..=1.0).contains(c))) {
+        if repeats.contains(&(index as u32)) {
             mesh.said.warnings.push(format!(
                 "{}: material \"{}\": {keyword} in line {line} of its library repeats outside \
                  0..1: -clamp is not used",

@@ -3,6 +3,7 @@
 //! tobj silently accepts `nan`, `inf` and faces of one or two corners, reads a polyline as a face,
 //! invents texture coordinates in a mesh where only some faces have them, and reports no lines.
 
+use std::collections::HashSet;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -18,6 +19,7 @@ pub(super) struct Checked {
     pub libraries: Vec<(usize, String)>,
     /// The materials that `usemtl` names, each once, with the first line that does.
     pub used: Vec<(usize, String)>,
+    used_names: HashSet<String>,
     /// For each triangle of the fans, in order, whether its face has texture coordinates.
     pub has_uv: Vec<bool>,
     /// Objects, and groups, by their first triangle.
@@ -266,7 +268,7 @@ impl Checked {
         if name.is_empty() {
             return Err("usemtl names no material".into());
         }
-        if !self.used.iter().any(|(_, used)| used == name) {
+        if self.used_names.insert(name.to_owned()) {
             self.used.push((line, name.to_owned()));
         }
         self.push("usemtl", &[name]);

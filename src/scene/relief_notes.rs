@@ -16,8 +16,12 @@ const AGREEING: f64 = 0.8;
 /// One sentence for each note on a material that a triangle uses.
 pub(super) fn collect(scene: &Scene) -> Vec<String> {
     let mut notes = Vec::new();
+    let mut used = vec![false; scene.materials.len()];
+    for triangle in &scene.triangles {
+        used[triangle.material as usize] = true;
+    }
     for (index, material) in scene.materials.iter().enumerate() {
-        if !scene.triangles.iter().any(|t| t.material as usize == index) {
+        if !used[index] {
             continue;
         }
         let found = match (&material.map_height, &material.map_normal) {

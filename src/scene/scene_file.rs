@@ -14,9 +14,10 @@ use super::masks::{AlphaMask, DEFAULT_CUTOFF};
 use super::material::{Asked, DEFAULT_KD, MadeUp, TextureCache};
 use super::placement::{Placement, Scale};
 use super::sides::Sides;
-use super::text_file::{read_text, stem};
+use super::stem::stem;
 use super::{Camera, ImportOptions, Material, Scene, check, mesh_file};
 use crate::error::{Error, Result};
+use crate::input_file::read_text;
 
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]

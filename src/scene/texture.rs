@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use image::DynamicImage;
 
 use crate::error::{Error, Result};
+use crate::input_file;
 use crate::math::random;
 
 /// A linear RGB image; repeats outside 0..1.
@@ -151,13 +152,29 @@ impl Texture {
     }
 }
 
+/// Most texels of an image: 8192 × 16384. As colours they take 1.6 GB.
+const MOST_TEXELS: u64 = 1 << 27;
+
 /// An image as its file stores it; the first bytes give the format.
 pub(super) fn decode(path: &Path) -> Result<DynamicImage> {
-    image::ImageReader::open(path)
-        .and_then(image::ImageReader::with_guessed_format)
-        .map_err(|source| Error::read(path, source))?
-        .decode()
-        .map_err(|error| Error::file(path, format!("cannot be decoded: {error}")))
+    let bytes = input_file::read(path)?;
+    let refuse = |error| Error::file(path, format!("cannot be decoded: {error}"));
+    let reader = || {
+        image::ImageReader::new(std::io::Cursor::new(&bytes))
+            .with_guessed_format()
+            .map_err(|source| Error::read(path, source))
+    };
+    let (width, height) = reader()?.into_dimensions().map_err(refuse)?;
+    if u64::from(width) * u64::from(height) > MOST_TEXELS {
+        return Err(Error::file(
+            path,
+            format!("{width} × {height} texels are more than {MOST_TEXELS}"),
+        ));
+    }
+    let mut whole = reader()?;
+    // What is decoded is bounded by the texels.
+    whole.no_limits();
+    whole.decode().map_err(refuse)
 }
 
 /// The two texels about a coordinate in repeats, and the weight of the second.

@@ -13,6 +13,7 @@ use super::{Problem, Settings};
 use crate::atomic_file::write_atomically;
 use crate::constants::NONE;
 use crate::error::{Error, Result};
+use crate::input_file;
 use crate::mesh::elements::Elements;
 use crate::mesh::near::NearPairs;
 use crate::mesh::sources::Source;
@@ -358,8 +359,7 @@ impl Visibility {
     /// Reads what [`Self::save`] wrote; refuses damaged files.
     pub fn load(path: &Path) -> Result<Self> {
         let bad = |what: &str| Error::file(path, what);
-        let file = std::fs::File::open(path).map_err(|e| Error::read(path, e))?;
-        let length = file.metadata().map_err(|e| Error::read(path, e))?.len();
+        let (file, length) = input_file::open(path)?;
         let mut input = std::io::BufReader::new(file);
         let mut read = |bytes: &mut [u8]| {
             input

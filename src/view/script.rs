@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::event::{Event, Key, PointerButton};
 use crate::error::{Error, Result};
+use crate::input_file::read_text;
 
 /// One step of a script.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,7 +44,7 @@ pub enum Step {
 /// # Errors
 /// A file that cannot be read; a line that is not a step.
 pub fn read(path: &Path) -> Result<Vec<Step>> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
+    let text = read_text(path)?;
     let mut steps = Vec::new();
     for (number, line) in (1..).zip(text.lines()) {
         let line = line.split('#').next().unwrap_or_default();

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 
 use crate::scene::{ImportOptions, builtin};
 
@@ -16,6 +16,8 @@ pub struct Origin {
     #[serde(default)]
     pub relative: Option<String>,
     pub patches: Option<usize>,
+    /// Kept as text: what is not UTF-8 is found again by its file alone.
+    #[serde(serialize_with = "as_text")]
     pub statue: Option<PathBuf>,
     #[serde(default)]
     pub import: ImportOptions,
@@ -69,6 +71,12 @@ impl Origin {
             ..self.clone()
         }
     }
+}
+
+fn as_text<S: Serializer>(path: &Option<PathBuf>, to: S) -> Result<S::Ok, S::Error> {
+    path.as_ref()
+        .map(|path| path.to_string_lossy())
+        .serialize(to)
 }
 
 /// The way from the folder of one file to another, where there is one.

@@ -11,6 +11,7 @@ use serde_json::Value;
 use super::write::{VERSION, checksum};
 use super::{DirectionalLight, Origin};
 use crate::error::{Error, Result};
+use crate::input_file::read;
 use crate::scene::OnInput;
 use crate::scene::contents::{Contents, ElementCounts};
 use crate::solver::BY_PAPER;
@@ -55,6 +56,9 @@ impl Bake {
             by_paper: file.json::<Value>("report")?["estimator"] == BY_PAPER,
             irradiance,
         };
+        if file.words("material")?.len() != bake.irradiance.len() {
+            return Err(file.bad("material", "not of as many triangles as irradiance"));
+        }
         let alike = [&bake.irradiance_direct, &bake.radiosity].map(Vec::len);
         match alike == [bake.irradiance.len(); 2] {
             true => Ok(bake),
@@ -111,10 +115,6 @@ impl About {
             report: file.json("report")?,
         })
     }
-}
-
-fn read(path: &Path) -> Result<Vec<u8>> {
-    std::fs::read(path).map_err(|e| Error::read(path, e))
 }
 
 /// A bake file whose version and tensors are right.

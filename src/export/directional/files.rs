@@ -11,7 +11,7 @@ use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 
 use super::{Basis, Directional, Frame, L1, Limits};
-use crate::atomic_file::write_atomically;
+use crate::atomic_file::{with_ending, write_atomically};
 use crate::error::Result;
 use crate::export::light_map::LightMap;
 use crate::export::map_files::{MapFile, Page};
@@ -62,10 +62,7 @@ impl Encoding {
 
     /// Files of a page, given the path of its `.exr`.
     pub fn paths(self, page: &Path) -> Vec<PathBuf> {
-        let beside = |ending: &str| {
-            let stem = page.file_stem().unwrap_or_default().to_string_lossy();
-            page.with_file_name(format!("{stem}{ending}"))
-        };
+        let beside = |ending: &str| with_ending(page, ending);
         match self {
             Self::Unity => vec![page.to_owned(), beside("_dir.png")],
             Self::Bakery => ["_L0.exr", "_L1x.png", "_L1y.png", "_L1z.png"]

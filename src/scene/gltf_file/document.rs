@@ -7,6 +7,7 @@ use gltf::buffer::Data;
 use gltf::{Accessor, Document, Semantic};
 
 use crate::error::{Error, Result};
+use crate::input_file;
 
 /// Extensions whose content is used, or whose absence changes nothing that is.
 const KNOWN: [&str; 9] = [
@@ -36,7 +37,7 @@ impl File {
     /// # Errors
     /// See [`super::read`].
     pub fn open(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|source| Error::read(path, source))?;
+        let bytes = input_file::read(path)?;
         let refuse = |error: gltf::Error| {
             let text = error.to_string();
             Error::file(
@@ -68,6 +69,14 @@ impl File {
         }
         let gltf = gltf::Gltf::from_slice(&bytes).map_err(refuse)?;
         let base = path.parent();
+        // The crate would wait at a pipe, and read a device without end.
+        for buffer in gltf.document.buffers() {
+            if let (gltf::buffer::Source::Uri(uri), Some(base)) = (buffer.source(), base)
+                && base.join(uri).exists()
+            {
+                input_file::open(&base.join(uri))?;
+            }
+        }
         let buffers =
             gltf::import_buffers(&gltf.document, base, gltf.blob).map_err(|error| match error {
                 gltf::Error::Io(error) => {

@@ -9,6 +9,7 @@ use std::path::Path;
 
 use super::Web;
 use crate::error::{Error, Result};
+use crate::input_file;
 use fields::Photometry;
 pub use writing::web_text;
 
@@ -37,7 +38,7 @@ impl Luminaire {
     /// A file that cannot be read; one that is not LM-63; a lamp whose tilt stands in another file;
     /// angles that do not ascend or are out of range; intensities that are negative, or all 0.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|source| Error::read(path, source))?;
+        let bytes = input_file::read(path)?;
         // Names of makers come in many encodings; nothing of them is used.
         let text = String::from_utf8_lossy(&bytes);
         let file = text::parse(path, &text)?;
