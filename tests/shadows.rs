@@ -353,6 +353,59 @@ fn open_triangles_follow_no_ways() {
     assert_silent();
 }
 
+/// A floor of 8 × 8 cells with bumps, a lamp above, and a card that hides it from some of them.
+fn bumps_under_a_card() -> Scene {
+    let mut build = Build::new();
+    let floor = build.material(0.6, 0.0);
+    let lamp = build.material(0.0, 20.0);
+    let dark = build.material(0.1, 0.0);
+    build.relief(floor, TEXELS, |x, y| 0.12 * REPEAT * bumps(x, y));
+    let (x, z) = (DVec3::X, DVec3::Z);
+    build.quad(DVec3::ZERO, 2.0 * z, 2.0 * x, (8, 8), floor);
+    build.quad(DVec3::new(0.5, 1.5, 0.5), 0.2 * x, 0.2 * z, (1, 1), lamp);
+    build.quad(DVec3::new(0.9, 0.7, 0.4), 0.6 * z, 0.5 * x, (1, 1), dark);
+    build.weld();
+    build.0.scene
+}
+
+/// The same of relief, on a floor, where other triangles of it do not count, and on a ball. The
+/// least share of prisms that see all of the lamp, and that see none of it, where there is a card.
+#[test]
+fn prisms_that_see_all_or_nothing_follow_no_ways() {
+    const ALL: f64 = 0.4;
+    const NOTHING: f64 = 0.02;
+    let above = camera(DVec3::new(1.3, 1.3, 1.9), DVec3::new(0.9, 0.0, 0.9), 80.0);
+    let beside = camera(DVec3::new(1.9, 1.2, 1.9), DVec3::new(1.0, 0.2, 0.8), 75.0);
+    for (name, scene, camera) in [
+        ("a card", &bumps_under_a_card(), &above),
+        ("a block", &room(true, 0.3), &beside),
+        ("a ball", &ball(6), &beside),
+    ] {
+        let solution = baked(scene);
+        let [with, without] = [true, false].map(|skip_open| {
+            let lighting = Lighting {
+                part: Light::Direct,
+                skip_open,
+                ..Lighting::from(&solution)
+            };
+            let device = device();
+            let renderer = Renderer::new(&device, scene, lighting, &view(camera), SAMPLES);
+            let renderer = renderer.expect("a picture");
+            let picture = renderer.picture().expect("a picture");
+            (picture.radiance, renderer.prisms())
+        });
+        let [unsure, open, hidden] = with.1;
+        println!("{name}: {open} prisms are open, {hidden} hidden, {unsure} neither");
+        assert!(with.0 == without.0, "{name}: another picture");
+        let all = unsure + open + hidden;
+        assert_eq!(without.1, [all, 0, 0]);
+        if name == "a card" {
+            assert!(open as f64 > ALL * all as f64 && hidden as f64 > NOTHING * all as f64);
+        }
+    }
+    assert_silent();
+}
+
 /// Shares by which a crossing in f32 may lie on another side than in f64: coordinates of up to 4
 /// round by 2⁻²², a volume of three such by some 2⁻²⁰ against triangles of 10⁻² and ways of 1: 10⁻⁴
 /// of a share.

@@ -112,3 +112,64 @@ impl Projection {
         ]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Camera;
+
+    /// Every place that the picture shows is in no hull that misses it; of hulls all about, most
+    /// miss it.
+    #[test]
+    fn what_misses_the_picture_shows_nowhere() {
+        let camera = Camera {
+            name: "test".into(),
+            position: DVec3::new(0.3, 0.2, 2.0),
+            look_at: DVec3::new(-0.2, 0.1, 0.0),
+            up: DVec3::Y,
+            fov_y: 40.0,
+        };
+        let (width, height) = (160, 90);
+        let view = View {
+            camera: &camera,
+            width,
+            height,
+        };
+        let projection = Projection::new(&Scene::default(), &view).expect("a view");
+        let rows = projection.rows(Tile {
+            column: 0,
+            row: 0,
+            width,
+            height,
+        });
+        let [x, y, w] = rows.map(Vec3::as_dvec3);
+        let (mut state, mut missing, mut shown) = (1_u64, 0, 0);
+        let mut next = || {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (state >> 40) as f64 / f64::from(1 << 24) - 0.5
+        };
+        for _ in 0..2000 {
+            let middle = 6.0 * DVec3::new(next(), next(), next());
+            let corners = [(); 4].map(|()| middle + DVec3::new(next(), next(), next()));
+            let misses = projection.misses(&corners);
+            missing += usize::from(misses);
+            for _ in 0..20 {
+                let shares = [(); 4].map(|()| next() + 0.5);
+                let sum: f64 = shares.iter().sum();
+                let place: DVec3 = corners
+                    .iter()
+                    .zip(shares)
+                    .map(|(c, s)| *c * (s / sum))
+                    .sum();
+                let way = place - projection.eye;
+                let (x, y, w) = (x.dot(way), y.dot(way), w.dot(way));
+                let is_shown = w > 0.0 && x.abs() <= w && y.abs() <= w;
+                shown += usize::from(is_shown);
+                assert!(!(is_shown && misses));
+            }
+        }
+        assert!(missing > 1000 && shown > 1000, "{missing}; {shown}");
+    }
+}

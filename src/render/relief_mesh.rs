@@ -33,6 +33,8 @@ pub struct ReliefMesh {
     pub directions: Directions,
     pub ranges: Vec<PrismRange>,
     pub rest: FlatRelief,
+    /// Number of prisms in each state, `[PART_…]`.
+    pub states: [usize; 3],
 }
 
 /// Prisms of one material.
@@ -106,6 +108,8 @@ impl ReliefMesh {
             let judge = |p: &mut Prism| p.state = shafts.state(&Starts::on_prism(p));
             list.par_iter_mut().for_each(judge);
         }
+        let mut states = [0; 3];
+        list.iter().for_each(|p| states[p.state as usize] += 1);
         let mirrored: Vec<bool> = faces
             .iter()
             .map(|face| matches!(face.corners, [0, 2, 1] | [1, 0, 2] | [2, 1, 0]))
@@ -129,6 +133,7 @@ impl ReliefMesh {
             directions: *directions,
             ranges: ranges(drawn.iter().map(|&m| triangle(m).material)),
             rest,
+            states,
         })
     }
 }

@@ -277,6 +277,13 @@ impl<'a> Renderer<'a> {
         self.view.mesh.parts
     }
 
+    /// Number of prisms over relief in the picture whose ways to lights are followed past other
+    /// surfaces, of those that see all of each light, and of those that see none.
+    pub fn prisms(&self) -> [usize; 3] {
+        let relief = self.view.relief.as_ref();
+        relief.map_or([0; 3], |relief| relief.mesh.states)
+    }
+
     /// Share of a frame's pixels that show relief drawn by rays.
     pub fn relief_coverage(&self) -> Result<f64> {
         let (canvas, tile) = self.whole()?;

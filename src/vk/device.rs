@@ -207,6 +207,7 @@ fn create(instance: &Instance, candidate: &Candidate, family: u32) -> Result<ash
         .shader_buffer_int64_atomics(candidate.int64_atomics);
     let mut f13 = vk::PhysicalDeviceVulkan13Features::default()
         .synchronization2(true)
+        .shader_demote_to_helper_invocation(true)
         .maintenance4(true)
         .subgroup_size_control(true)
         .compute_full_subgroups(true);

@@ -283,6 +283,10 @@ impl Instance {
             (f12.buffer_device_address != 0, "bufferDeviceAddress"),
             (f13.synchronization2 != 0, "synchronization2"),
             (
+                f13.shader_demote_to_helper_invocation != 0,
+                "shaderDemoteToHelperInvocation",
+            ),
+            (
                 f13.maintenance4 != 0,
                 "maintenance4 (LocalSizeId in compute shaders)",
             ),
