@@ -361,7 +361,8 @@ fn bumps_under_a_card() -> Scene {
     let dark = build.material(0.1, 0.0);
     build.relief(floor, TEXELS, |x, y| 0.12 * REPEAT * bumps(x, y));
     let (x, z) = (DVec3::X, DVec3::Z);
-    build.quad(DVec3::ZERO, 2.0 * z, 2.0 * x, (8, 8), floor);
+    let cells = build.quad(DVec3::ZERO, 2.0 * z, 2.0 * x, (8, 8), floor);
+    build.cover(cells, floor, (z, x));
     build.quad(DVec3::new(0.5, 1.5, 0.5), 0.2 * x, 0.2 * z, (1, 1), lamp);
     build.quad(DVec3::new(0.9, 0.7, 0.4), 0.6 * z, 0.5 * x, (1, 1), dark);
     build.weld();

@@ -137,10 +137,11 @@ fn many_materials_are_read() {
     let faces: String = (0..COUNT)
         .map(|i| format!("v {i} 0 0\nv {i} 1 0\nv {i} 0 1\nusemtl paint{i}\nf -3 -2 -1\n"))
         .collect();
+    let lamp = "v 0 2 0\nv 1 2 0\nv 0 2 1\nusemtl lamp\nf -3 -2 -1\n";
     fs::write(folder.path().join("a.mtl"), format!("{MTL}{materials}")).expect("written");
     fs::write(
         folder.path().join("a.obj"),
-        format!("mtllib a.mtl\n{faces}"),
+        format!("mtllib a.mtl\n{faces}{lamp}"),
     )
     .expect("written");
     let scene = mesolux::scene::load(
@@ -148,7 +149,7 @@ fn many_materials_are_read() {
         &mesolux::scene::LoadOptions::default(),
     )
     .expect("a scene");
-    assert_eq!(scene.triangles.len(), COUNT);
+    assert_eq!(scene.triangles.len(), COUNT + 1);
     assert_eq!(scene.materials.len(), COUNT + 1);
 }
 
