@@ -353,7 +353,7 @@ fn open_triangles_follow_no_ways() {
     assert_silent();
 }
 
-/// A floor of 8 × 8 cells with bumps, a lamp above, and a card that hides it from some of them.
+/// A floor of 16 × 16 cells with bumps, a lamp above, and a card that hides it from some of them.
 fn bumps_under_a_card() -> Scene {
     let mut build = Build::new();
     let floor = build.material(0.6, 0.0);
@@ -361,7 +361,7 @@ fn bumps_under_a_card() -> Scene {
     let dark = build.material(0.1, 0.0);
     build.relief(floor, TEXELS, |x, y| 0.12 * REPEAT * bumps(x, y));
     let (x, z) = (DVec3::X, DVec3::Z);
-    let cells = build.quad(DVec3::ZERO, 2.0 * z, 2.0 * x, (8, 8), floor);
+    let cells = build.quad(DVec3::ZERO, 2.0 * z, 2.0 * x, (16, 16), floor);
     build.cover(cells, floor, (z, x));
     build.quad(DVec3::new(0.5, 1.5, 0.5), 0.2 * x, 0.2 * z, (1, 1), lamp);
     build.quad(DVec3::new(0.9, 0.7, 0.4), 0.6 * z, 0.5 * x, (1, 1), dark);
