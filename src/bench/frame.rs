@@ -66,8 +66,8 @@ pub const SHADINGS: [(&str, ReliefShading, Direct); 6] = [
 ];
 pub const DIRECTIONS: [u32; 3] = [16, 32, 64];
 
-/// Measures frames of one scene, prints them, and appends them to `rows`. `go_on` is told what is
-/// done next, and asked before it; what has been measured in whole rounds stays.
+/// Measures frames of one scene, prints them, and appends them to `rows`. `go_on` gets a line about
+/// each step before it begins; if it returns false, this returns with the rounds that are complete.
 ///
 /// # Errors
 /// A scene without a camera; a device that lacks the memory or fails.
@@ -83,18 +83,17 @@ pub fn run(
         if !go_on(format!("baking {} in {k} directions", scene.name)) {
             return Ok(());
         }
-        solutions.push({
-            let settings = Settings {
-                shots: Some(options.shots),
-                relief: ReliefOptions {
-                    directions: Directions::new(k)?,
-                    cache: options.cache.map(Path::to_owned),
-                    ..ReliefOptions::default()
-                },
-                ..Settings::default()
-            };
-            bake::bake(device, scene, &settings, |_| true)?
-        });
+        let settings = Settings {
+            shots: Some(options.shots),
+            relief: ReliefOptions {
+                directions: Directions::new(k)?,
+                cache: options.cache.map(Path::to_owned),
+                ..ReliefOptions::default()
+            },
+            ..Settings::default()
+        };
+        let shown = |_: &_| go_on(format!("baking {} in {k} directions", scene.name));
+        solutions.push(bake::bake(device, scene, &settings, shown)?);
     }
     let own = scene.cameras.first().cloned().ok_or_else(|| {
         Error::Usage(format!(

@@ -19,8 +19,8 @@ use crate::vk::{
     VertexAttribute,
 };
 
-/// Push constants: rows of the projection as those of [`super::shade::Parameters`], and the angle of
-/// a sample in radians.
+/// Push constants: rows of the projection as those of [`super::shade::Parameters`], and the angle
+/// of a sample in radians.
 pub use super::shaders::relief_hits::Parameters;
 
 /// One corner of a prism.
