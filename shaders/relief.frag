@@ -35,7 +35,8 @@ layout(binding = 12) uniform usamplerBuffer parallel_lights;
 layout(scalar, binding = 13) readonly buffer Webs { float webs[]; };
 layout(binding = 14) uniform usamplerBuffer light_polygons;
 
-// What a draw cannot need is left out of its pipeline: a software device works through every branch.
+// What a draw cannot need is left out of its pipeline: a software device works through every
+// branch.
 layout(constant_id = 0) const uint SHADING = SHADING_RELIEF;
 layout(constant_id = 1) const uint VIEW = VIEW_SHADED;
 // Light by factors, by light points, by parallel lights.
@@ -112,7 +113,8 @@ Place place_of(Prism p, ReliefSurface surface, HeightTile tile, uvec4 hit) {
               : which == 1 ? vec3(0.0, risen - place.share.z, place.share.z)
                            : vec3(risen - place.share.y - place.share.z, place.share.yz);
     place.at = place.share.x * p.low_a + place.share.y * p.low_b + place.share.z * p.low_c
-             + high.x * (p.high_a - p.low_a) + high.y * (p.high_b - p.low_b) + high.z * (p.high_c - p.low_c);
+             + high.x * (p.high_a - p.low_a) + high.y * (p.high_b - p.low_b)
+             + high.z * (p.high_c - p.low_c);
     Tetrahedron t = tetrahedron_of(p, surface, which);
     mat3 edges = mat3(t.b.uvh - t.a.uvh, t.c.uvh - t.a.uvh, t.d.uvh - t.a.uvh);
     place.slopes = transpose(edges * turn_of(t));
@@ -195,13 +197,16 @@ bool shadowed_by_relief(Prism p, ReliefSurface surface, HeightTile tile, Place p
     float root = sqrt(max(square, 0.0));
     float run = slope > 0.0 && square > 0.0 ? 2.0 * (surface.top - at_edge) / (slope + root) : (root - slope) / bend;
     // A chord of the parabola lies off it by bend / 8 times its length's square.
-    float chords = straight ? 0.0 : clamp(ceil(run * sqrt(abs(bend) / (8.0 * CHORD_OFF * rise))), 1.0, MOST_CHORDS);
+    float wanted = ceil(run * sqrt(abs(bend) / (8.0 * CHORD_OFF * rise)));
+    float chords = straight ? 0.0 : clamp(wanted, 1.0, MOST_CHORDS);
     if (!straight) {
         leaves = edge + run;
     }
 
-    // One loop over all parts of the way: a software device works through each march that is written.
-    vec3 next = straight ? vec3(from.xy + local.xy * leaves, surface.top) : vec3(from.xy + local.xy * edge, at_edge);
+    // One loop over all parts of the way: a software device works through each march that is
+    // written.
+    vec3 next = straight ? vec3(from.xy + local.xy * leaves, surface.top)
+                         : vec3(from.xy + local.xy * edge, at_edge);
     vec3 last = from;
     for (float i = 0.0; i <= chords; i++) {
         if (march(tile, last, next, hit)) {
@@ -239,7 +244,8 @@ vec3 sharp(Prism p, ReliefSurface surface, HeightTile tile, Place place) {
         vec3 whole = light.strength * arrives;
         float leaves;
         bool open = !shadowed_by_relief(p, surface, tile, place, base, towards, leaves)
-                    && (p.state == PART_OPEN || !blocked(at, end_of_way(light), leaves * inversesqrt(square)));
+                    && (p.state == PART_OPEN
+                        || !blocked(at, end_of_way(light), leaves * inversesqrt(square)));
         vec3 arrived = open ? whole : vec3(0.0);
         if (i < emitter_samples()) {
             of_all += whole;

@@ -1,5 +1,5 @@
-// Relief mapping, first what is seen: the ray through the sample is followed through the prism over a
-// triangle to where it first passes below the height map. The nearest hit of all prisms stays.
+// Relief mapping, first what is seen: the ray through the sample is followed through the prism over
+// a triangle to where it first passes below the height map. The nearest hit of all prisms stays.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,5 +1,5 @@
-// Counts the fragments of prisms and the steps of their marches: each computes its own depth, so that
-// none is left out, hidden or not; the pipeline adds them up.
+// Counts the fragments of prisms and the steps of their marches: each computes its own depth, so
+// that none is left out, hidden or not; the pipeline adds them up.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

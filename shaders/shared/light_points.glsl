@@ -1,8 +1,8 @@
 // Points that light comes straight from: those of emitters, which samples take turns at, then point
 // lights. Including files have shared/types.glsl, shared/texels.glsl, a `usamplerBuffer
 // light_points`, a buffer `float webs[]`, shares of the intensity of beams, `light_count`,
-// `emitter_points`, `corner`, the sample in the top left corner of the tile that is drawn, and BEAMS,
-// 1 where there are beams.
+// `emitter_points`, `corner`, the sample in the top left corner of the tile that is drawn, and
+// BEAMS, 1 where there are beams.
 
 // Ends of ways lie so much of their distance from the eye above what they start and end on:
 // coordinates and their interpolation round by a few 2^-24 of it.

@@ -1,5 +1,5 @@
-// Prisms over triangles with relief, each cut into three tetrahedra in which texture coordinates and
-// height are linear, and where the ray through a sample meets the relief in one: what
+// Prisms over triangles with relief, each cut into three tetrahedra in which texture coordinates
+// and height are linear, and where the ray through a sample meets the relief in one: what
 // relief_hits.frag leaves for relief.frag. Including files have shared/types.glsl,
 // shared/texels.glsl and `usamplerBuffer`s prisms, surfaces and tiles: structs of
 // shared/types.glsl, so many texels each.

@@ -102,7 +102,8 @@ uint meet(Prism p, ReliefSurface surface, HeightTile tile, bool plane, out Met m
     // Nearest first: the middle one lies between the others, so that the ray meets the low or the
     // high one first.
     bool from_high = high.enter < low.enter && high.leave > high.enter || low.leave <= low.enter;
-    float others = min(low.leave > low.enter ? low.enter : NEVER, high.leave > high.enter ? high.enter : NEVER);
+    float others = min(low.leave > low.enter ? low.enter : NEVER,
+                       high.leave > high.enter ? high.enter : NEVER);
     bool in_middle_first = middle.leave > middle.enter && middle.enter < others;
     uint found = 3;
     for (uint round = 0; round < 3 && found == 3; round++) {
@@ -135,5 +136,6 @@ uvec4 hit_of_ray(float pixel, out float depth) {
     }
     depth = near / dot((1.0 + met.along) * corner_position, w);
     uint marks = (wide ? HIT_WIDE : 0) | (met.under ? HIT_UNDER : 0);
-    return uvec4(1 + corner_prism | which << PRISM_BITS | marks, floatBitsToUint(vec3(met.share.yz, met.height)));
+    return uvec4(1 + corner_prism | which << PRISM_BITS | marks,
+                 floatBitsToUint(vec3(met.share.yz, met.height)));
 }

@@ -1,7 +1,7 @@
 //! Places with nothing between them and the lights: their samples need no shadow rays.
 //!
-//! A shaft (Haines and Wallace 1991) contains all shadow rays from a part of a triangle, or from the
-//! relief over one, to a lamp. Here it is
+//! A shaft (Haines and Wallace 1991) contains all shadow rays from a part of a triangle, or from
+//! the relief over one, to a lamp. Here it is
 //! bounded by planes about the convex hull of the rays' starts and ends. A triangle wholly outside
 //! one of the planes, or whose own plane has the hull on one side, blocks no ray.
 
