@@ -27,38 +27,9 @@ impl CachedBake {
     /// The place of the bake of a scene by these settings.
     /// `maker` identifies the program and the device: the bake of another one is not used.
     pub fn new(folder: &Path, scene: &Scene, settings: &Settings, maker: &str) -> Self {
-        let Settings {
-            estimator,
-            hemicube,
-            emitter_hemicube: _,
-            emitter_places,
-            places,
-            residual,
-            // A bake that this stopped is not kept.
-            budget: _,
-            shots,
-            seed,
-            grouping,
-            nearness,
-            silhouettes,
-            normalise,
-            carries,
-            culling,
-            merging,
-            batch,
-            // This does not affect the result.
-            list_room: _,
-            visibility_memory,
-            coupling_memory,
-            relief,
-        } = settings;
-        let emitter_shadows = settings.emitter_shadows();
         let scene_hash = scene.hash();
-        let key = format!(
-            "bake cache 9, layout {VERSION}\n{maker}\n{scene_hash}\n{estimator:?} {hemicube} {emitter_shadows:?} {emitter_places} {places} {residual:?} {shots:?} {seed} \
-             {grouping:?} {nearness:?} {silhouettes} {normalise} {carries} {culling:?} {merging} {batch} {visibility_memory:?} {coupling_memory} {:?} {:?}",
-            relief.transport, relief.directions
-        );
+        let settings = settings.key();
+        let key = format!("bake cache 10, layout {VERSION}\n{maker}\n{scene_hash}\n{settings}");
         let name: String = Sha256::digest(key)[..16]
             .iter()
             .map(|byte| format!("{byte:02x}"))

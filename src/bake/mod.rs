@@ -46,7 +46,8 @@ pub fn solve(
     solve_on(&[Arc::clone(device)], scene, settings, kept, go_on)
 }
 
-/// As [`solve`], with several devices; see [`Solver::on_devices`].
+/// As [`solve`], with several devices; see [`Solver::on_devices`]. With
+/// [`Settings::checkpoints`] it goes on from what a bake of the same kind has left that was killed.
 pub fn solve_on(
     devices: &[Arc<Device>],
     scene: &Scene,
@@ -61,6 +62,10 @@ pub fn solve_on(
     }
     let lights = &scene.lights;
     let mut solver = Solver::on_devices(devices, elements, lights, settings, kept)?;
+    if settings.checkpoints.is_some() {
+        let rows = kept.map(Visibility::described).unwrap_or_default();
+        solver.keep_checkpoints(&format!("{} {rows}", scene.hash()))?;
+    }
     solver.run(go_on)?;
     Ok(solver)
 }

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
+use super::baked::program;
 use super::progress::{Bar, catch_interrupts, interrupted};
 use super::{BakingDevices, Builtin};
 use mesolux::atomic_file::with_ending;
@@ -17,7 +18,9 @@ use mesolux::math::directions::Directions;
 use mesolux::mesh::sources::Grouping;
 use mesolux::meso::{self, Transport};
 use mesolux::scene::Scene;
-use mesolux::solver::{Estimator, Report, Settings, Solver, StopReason, Update, Visibility};
+use mesolux::solver::{
+    Checkpoints, Estimator, Report, Settings, Solver, StopReason, Update, Visibility,
+};
 use mesolux::vk::Device;
 
 /// Solve a scene and write the light on every element
@@ -44,6 +47,11 @@ pub struct Options {
     /// were kept with this bake
     #[arg(long, value_name = "BAKE.safetensors", conflicts_with_all = ["estimator", "preset"])]
     relight: Option<PathBuf>,
+    /// While a bake runs, keep what is done every so many seconds in the folder OUT.checkpoint, from
+    /// which the same command goes on after a crash, a kill or Ctrl-C; it is removed once the bake
+    /// is done. 0 keeps nothing and begins anew. --preset paper keeps nothing
+    #[arg(long, value_name = "SECONDS", default_value_t = 60.0)]
+    checkpoint: f64,
     #[command(flatten)]
     solve: SolveOptions,
     #[command(flatten)]
@@ -328,7 +336,10 @@ struct Printed<'a> {
 pub fn run(options: &Options) -> Result<()> {
     let start = Instant::now();
     set_threads(options.threads)?;
-    let settings = options.solve.settings()?;
+    let settings = Settings {
+        checkpoints: options.checkpoints()?,
+        ..options.solve.settings()?
+    };
     settings.check()?;
     if (options.output.extension()).is_some_and(|e| !e.eq_ignore_ascii_case("safetensors")) {
         return Err(Error::file(
@@ -358,6 +369,16 @@ pub fn run(options: &Options) -> Result<()> {
     };
     let filled = options.solve.filled()?;
     save_somewhere(&output, |path| solution.save(path, &origin, &filled))?;
+    match (report.stop, &settings.checkpoints) {
+        (_, None) => {}
+        (StopReason::Interrupted, Some(checkpoints)) => {
+            if checkpoints.exist() {
+                let folder = checkpoints.folder.display();
+                tracing::info!("the same command goes on from {folder}");
+            }
+        }
+        (_, Some(checkpoints)) => checkpoints.remove(),
+    }
     if options.keep_visibility {
         let path = beside(&output);
         match solver.visibility(&scene)? {
@@ -400,6 +421,21 @@ pub fn run(options: &Options) -> Result<()> {
         mesolux::say!("{text}");
     }
     Ok(())
+}
+
+impl Options {
+    fn checkpoints(&self) -> Result<Option<Checkpoints>> {
+        let seconds = self.checkpoint;
+        if !(0.0..=1e9).contains(&seconds) {
+            let what = format!("--checkpoint {seconds}: must be seconds, 0 or more");
+            return Err(Error::Usage(what));
+        }
+        Ok((seconds > 0.0).then(|| Checkpoints {
+            folder: with_ending(&self.output, ".checkpoint"),
+            every: Duration::from_secs_f64(seconds),
+            maker: program(),
+        }))
+    }
 }
 
 /// Where a bake goes that was stopped: not over a file that may be a whole one.

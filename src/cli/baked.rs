@@ -142,7 +142,7 @@ fn kept_bake(cached: &CachedBake) -> Option<Bake> {
 }
 
 /// Identity of the program's build: a rebuilt one may bake differently.
-fn program() -> String {
+pub fn program() -> String {
     let version = env!("CARGO_PKG_VERSION");
     let built = std::env::current_exe()
         .and_then(std::fs::metadata)

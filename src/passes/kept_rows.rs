@@ -9,7 +9,7 @@ use super::fresh_rows::RowShape;
 use super::types::{KeptRow, KeptState};
 use crate::constants::GROUP;
 use crate::error::Result;
-use crate::vk::{Buffer, BufferUse, Device, TEXEL_BYTES};
+use crate::vk::{Buffer, BufferUse, Commands, Device, Stage, TEXEL_BYTES};
 
 /// Chunks of device memory with rows, and how far they are filled.
 pub struct KeptRows {
@@ -118,17 +118,10 @@ impl KeptRows {
     /// How far the chunks are filled, and what they hold.
     pub fn download(&self, device: &Arc<Device>) -> Result<(KeptState, Vec<Vec<u32>>)> {
         let state = download::<KeptState>(device, &self.state, 1)?[0];
-        let full = self.chunks[..self.lasting]
-            .iter()
-            .enumerate()
-            .map(|(i, chunk)| {
-                let words = match (i as u32).cmp(&state.chunk) {
-                    Ordering::Less => self.chunk_words,
-                    Ordering::Equal => state.used,
-                    Ordering::Greater => 0,
-                };
-                download(device, chunk, words as usize)
-            });
+        let full = (0..self.lasting).map(|chunk| {
+            let end = self.words_before(chunk, state);
+            download(device, &self.chunks[chunk], end)
+        });
         Ok((state, full.collect::<Result<_>>()?))
     }
 
@@ -139,6 +132,86 @@ impl KeptRows {
             buffer.set(words)?;
         }
         Ok(())
+    }
+
+    /// Words of a chunk that were filled before the state was this.
+    fn words_before(&self, chunk: usize, state: KeptState) -> usize {
+        match (chunk as u32).cmp(&state.chunk) {
+            Ordering::Less => self.chunk_words as usize,
+            Ordering::Equal => state.used as usize,
+            Ordering::Greater => 0,
+        }
+    }
+
+    /// What was filled between two states: chunks, and their words.
+    fn filled(
+        &self,
+        [from, to]: [KeptState; 2],
+    ) -> impl Iterator<Item = (&Buffer, std::ops::Range<usize>)> {
+        let words = move |chunk: usize| {
+            let words = self.words_before(chunk, from)..self.words_before(chunk, to);
+            (!words.is_empty()).then_some((&self.chunks[chunk], words))
+        };
+        (0..self.lasting).filter_map(words)
+    }
+
+    /// Words that were filled between two states.
+    pub fn words_between(&self, states: [KeptState; 2]) -> usize {
+        self.filled(states).map(|(_, words)| words.len()).sum()
+    }
+
+    /// What was filled between two states.
+    pub fn download_between(
+        &self,
+        device: &Arc<Device>,
+        states: [KeptState; 2],
+    ) -> Result<Vec<u32>> {
+        let bytes = 4 * self.words_between(states) as u64;
+        let readback = Buffer::new(device, "kept rows", bytes.max(4), BufferUse::Readback)?;
+        Commands::run(device, "download kept rows", |cmd| {
+            cmd.barrier(&[Stage::Compute, Stage::Transfer], &[Stage::Transfer]);
+            let mut at = 0;
+            for (chunk, words) in self.filled(states) {
+                let bytes = 4 * words.len() as u64;
+                cmd.copy(chunk, 4 * words.start as u64, &readback, at, bytes);
+                at += bytes;
+            }
+            cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
+            Ok(())
+        })?;
+        Ok(readback.read(0, (bytes / 4) as usize))
+    }
+
+    /// Fills with `words` what [`Self::download_between`] gave, and goes on from the second state.
+    pub fn restore_between(
+        &self,
+        device: &Arc<Device>,
+        states: [KeptState; 2],
+        words: &[u32],
+    ) -> Result<()> {
+        assert_eq!(
+            words.len(),
+            self.words_between(states),
+            "as many as were kept"
+        );
+        self.state.set(&[states[1]])?;
+        if words.is_empty() {
+            return Ok(());
+        }
+        let bytes = size_of_val(words) as u64;
+        let mut upload = Buffer::new(device, "restored rows", bytes, BufferUse::Upload)?;
+        upload.write(0, words);
+        Commands::run(device, "restore kept rows", |cmd| {
+            cmd.barrier(&[Stage::Compute, Stage::Transfer], &[Stage::Transfer]);
+            let mut at = 0;
+            for (chunk, words) in self.filled(states) {
+                let bytes = 4 * words.len() as u64;
+                cmd.copy(&upload, at, chunk, 4 * words.start as u64, bytes);
+                at += bytes;
+            }
+            cmd.barrier(&[Stage::Transfer], &[Stage::Compute, Stage::Transfer]);
+            Ok(())
+        })
     }
 
     /// Forgets rows that were kept, and gives back the room of those behind all others.

@@ -155,6 +155,18 @@ impl CouplingRow {
         (end <= words && count == values.len()).then_some(Self { runs, values })
     }
 
+    /// All its words, of so many.
+    pub fn words(&self, count: usize) -> Vec<f32> {
+        let mut words = vec![0.0; count];
+        let mut values = &self.values[..];
+        for &[first, count] in &self.runs {
+            let (run, rest) = values.split_at(count as usize);
+            words[first as usize..][..run.len()].copy_from_slice(run);
+            values = rest;
+        }
+        words
+    }
+
     /// Runs and values.
     pub fn lists(&self) -> (&[[u32; 2]], &[f32]) {
         (&self.runs, &self.values)

@@ -286,11 +286,16 @@ impl Ledger {
         }
     }
 
+    /// Of [`Self::missing`], what sources lack that were not drawn.
+    pub fn undrawn_missing(&self) -> f64 {
+        let undrawn = (0..self.sources.len()).filter(|&s| !self.system.is_drawn(s));
+        undrawn.map(|s| self.system.missing(s)).sum()
+    }
+
     /// Whether undrawn sources lack more than they may, now that their light is carried: then less
     /// is to be left to them.
     pub fn lacks(&mut self) -> bool {
-        let undrawn = (0..self.sources.len()).filter(|&s| !self.system.is_drawn(s));
-        let missing: f64 = undrawn.map(|s| self.system.missing(s)).sum();
+        let missing = self.undrawn_missing();
         let most = UNDRAWN * self.bound.most_missing();
         if missing <= most {
             return false;

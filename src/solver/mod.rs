@@ -12,6 +12,7 @@ mod devices;
 mod drawing;
 mod estimate;
 mod gather;
+mod journal;
 mod ledger;
 mod look;
 mod makers;
@@ -31,11 +32,13 @@ mod system;
 mod team;
 mod turns;
 mod visibility;
+mod word_file;
 
 use std::sync::Arc;
 use std::time::Instant;
 
 use glam::{DVec3, Vec3, Vec4};
+use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Result};
 use crate::mesh::elements::Elements;
@@ -46,6 +49,7 @@ use crate::vk::Device;
 
 pub use ambient::Ambient;
 pub use devices::{check_devices, open_devices};
+pub use journal::Checkpoints;
 pub use look::ItemPicture;
 pub use places::{Arriving, LightAt, Lit, Place, Senders, SentByDirection};
 pub use problem::Problem;
@@ -168,6 +172,27 @@ impl Solver {
         self.report = Report::new(&spine.devices, &self.problem);
         self.report.seconds.setup = start.elapsed().as_secs_f64();
         Ok(())
+    }
+
+    /// Goes on from the checkpoint of the settings, if there is one, and writes one from now on.
+    /// `scene` is what names the bake: another one's checkpoint is not used. The paper's method
+    /// writes none.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn keep_checkpoints(&mut self, scene: &str) -> Result<()> {
+        let Method::Rows(spine) = &mut self.method else {
+            return Ok(());
+        };
+        let settings = &self.problem.settings;
+        let Some(checkpoints) = &settings.checkpoints else {
+            return Ok(());
+        };
+        let devices: Vec<&str> = spine.devices.iter().map(|device| device.name()).collect();
+        let maker = &checkpoints.maker;
+        let key = format!("{maker}\n{devices:?}\n{scene}\n{}", settings.key());
+        let key = word_file::hexadecimal(Sha256::new_with_prefix(key));
+        spine.keep_checkpoints(checkpoints, key, &mut self.report)
     }
 
     /// Solves until a stop rule holds, or `go_on` says no. What has been solved so far is always

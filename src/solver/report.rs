@@ -172,6 +172,9 @@ pub struct Report {
     pub kept_sources: u64,
     /// Rows that were drawn again, since they had found no room.
     pub drawn_again: u64,
+    /// Rows that an earlier run had drawn, which was stopped; see [`super::Checkpoints`]. Times are
+    /// of this run alone.
+    pub resumed: u64,
     /// Rows that light was gathered by, each time that it was.
     pub gathered_rows: u64,
     /// Gauss–Seidel sweeps among the sources.

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
+use super::coupling::CouplingRow;
 use super::drawing::{Drawing, read_items};
 use super::estimate::Evaluate;
 use super::{EmitterShadows, Settings};
@@ -20,7 +21,7 @@ use crate::passes::keep::Keep;
 use crate::passes::kept_rows::KeptRows;
 use crate::passes::light_rows::LightRows;
 use crate::passes::occluder_tree::OccluderTree;
-use crate::passes::types::{CouplingTarget, KeptRow, ReceiverList, Slot};
+use crate::passes::types::{CouplingTarget, KeptRow, KeptState, ReceiverList, Slot};
 use crate::vk::{Buffer, BufferUse, Commands, Device, Stage, Timestamps};
 
 /// The row of one source, and what was counted while it was made.
@@ -31,8 +32,7 @@ pub(super) struct Row {
     /// Share of the source that its form factors take together, before they are scaled; none of a
     /// point light, and in open scenes.
     pub share: Option<f32>,
-    /// Words of the coupling row, not scaled.
-    pub coupling: Vec<f32>,
+    pub coupling: CouplingRow,
     pub factors: Factors,
     /// `[face]`: meshlets kept, triangles tested, triangles drawn. Empty where rays found what is
     /// seen.
@@ -101,6 +101,8 @@ impl AddAssign for Stages {
 pub(super) struct Made {
     pub rows: Vec<Row>,
     pub stages: Stages,
+    /// How far the chunks of kept rows were filled then; none where nothing is kept.
+    pub state: Option<KeptState>,
 }
 
 /// What row makers of one device share.
@@ -141,6 +143,8 @@ pub(super) struct RowMaker {
     /// Which of the sets is submitted next.
     next: usize,
     layout: Layout,
+    /// Whether rows stay on the device.
+    keeps: bool,
     device: Arc<Device>,
     batch: Batch,
 }
@@ -212,7 +216,9 @@ impl RowMaker {
         };
         let slot_bytes = u64::from(batch.slot_count) * size_of::<Slot>() as u64;
         let wanted = make("wanted sources", slot_bytes, BufferUse::Upload)?;
-        let readback = make("made rows", layout.bytes, BufferUse::Readback)?;
+        let state_bytes = size_of::<KeptState>() as u64;
+        let readback_bytes = layout.bytes + state_bytes;
+        let readback = make("made rows", readback_bytes, BufferUse::Readback)?;
         let stamps = || Timestamps::new(device, "row timestamps", STAMPS);
         let timestamps = [stamps()?, stamps()?];
         let record = |i: usize| {
@@ -244,6 +250,9 @@ impl RowMaker {
                 cmd.timestamp(stamps, 6);
                 cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
                 layout.record(cmd, &readback[i]);
+                if let Some(kept) = parts.kept {
+                    cmd.copy(&kept.state, 0, &readback[i], layout.bytes, state_bytes);
+                }
                 cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
                 Ok(())
             })
@@ -257,6 +266,7 @@ impl RowMaker {
             ended: None,
             next: 0,
             layout,
+            keeps: kept,
             device: Arc::clone(device),
             batch,
         })
@@ -304,7 +314,12 @@ impl RowMaker {
             keep,
             idle,
         };
-        Ok(Some(Made { rows, stages }))
+        let state = || self.readback[i].read(self.layout.bytes, 1)[0];
+        Ok(Some(Made {
+            rows,
+            stages,
+            state: self.keeps.then(state),
+        }))
     }
 
     /// The item buffers of the last batch, `[row][slot][column]`.
@@ -396,13 +411,14 @@ impl Layout {
         let words = |part: usize| from.read(at(part), bytes(part) / 4);
         let drawn: Slot = from.read(at(SLOT), 1)[0];
         assert_eq!(drawn.source, source, "a slot holds what was asked for");
+        let coupling: Vec<f32> = from.read(at(COUPLING), bytes(COUPLING) / 4);
         Row {
             source,
             scale: drawn.scale,
             share: (self.parts[SHARES].from.is_some())
                 .then(|| from.read(at(SHARES), 1)[0])
                 .filter(|&share| share >= 0.0),
-            coupling: from.read(at(COUPLING), bytes(COUPLING) / 4),
+            coupling: CouplingRow::new(&coupling, drawn.scale),
             factors: match self.parts[ROW].from {
                 Some(_) => Factors::Kept(from.read::<KeptRow>(at(ROW), 1)[0]),
                 None => Factors::Host(FactorWords {

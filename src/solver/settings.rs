@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use super::Checkpoints;
 use crate::constants::SOURCE_EYES;
 use crate::error::{Error, Result};
 use crate::mesh::near::Nearness;
@@ -91,6 +92,8 @@ pub struct Settings {
     pub coupling_memory: u64,
     /// How relief takes part; see [`crate::bake::elements`].
     pub relief: meso::Options,
+    /// Where a long bake keeps its rows while it runs; see [`crate::bake::solve_on`].
+    pub checkpoints: Option<Checkpoints>,
 }
 
 impl Default for Settings {
@@ -117,6 +120,7 @@ impl Default for Settings {
             visibility_memory: None,
             coupling_memory: COUPLING_MEMORY,
             relief: meso::Options::default(),
+            checkpoints: None,
         }
     }
 }
@@ -150,6 +154,44 @@ impl Settings {
                 EmitterShadows::Hemicubes(finer)
             }
         }
+    }
+
+    /// All that a whole result depends on, as text: equal texts, equal results.
+    pub fn key(&self) -> String {
+        let Self {
+            estimator,
+            hemicube,
+            emitter_hemicube: _,
+            emitter_places,
+            places,
+            residual,
+            // A bake that this stopped is not whole.
+            budget: _,
+            shots,
+            seed,
+            grouping,
+            nearness,
+            silhouettes,
+            normalise,
+            carries,
+            culling,
+            merging,
+            batch,
+            // These do not affect the result.
+            list_room: _,
+            checkpoints: _,
+            visibility_memory,
+            coupling_memory,
+            relief,
+        } = self;
+        let emitter_shadows = self.emitter_shadows();
+        let (transport, directions) = (relief.transport, relief.directions);
+        format!(
+            "{estimator:?} {hemicube} {emitter_shadows:?} {emitter_places} {places} {residual:?} \
+             {shots:?} {seed} {grouping:?} {nearness:?} {silhouettes} {normalise} {carries} \
+             {culling:?} {merging} {batch} {visibility_memory:?} {coupling_memory} \
+             {transport:?} {directions:?}"
+        )
     }
 
     /// Refuses numbers that make no sense.

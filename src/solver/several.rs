@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::passes::fresh_rows::FreshRows;
 use crate::passes::keep::Keep;
 use crate::passes::kept_rows::{KeptRows, SCRATCH};
-use crate::passes::types::{KeptRow, Slot};
+use crate::passes::types::{KeptRow, KeptState, Slot};
 use crate::vk::{Buffer, BufferUse, Commands, Device, Stage};
 
 /// Devices that make rows, each on a thread of its own, and the first one, which keeps them.
@@ -66,11 +66,6 @@ impl Several {
         self.keeper.slots
     }
 
-    /// The kind of each batch under way.
-    pub fn under_way(&self) -> impl Iterator<Item = RowKind> {
-        self.under_way.iter().map(|batch| batch.kind)
-    }
-
     pub fn submit(&mut self, batch: Batch) {
         let jobs = batch.sources.iter().map(|&source| (source, batch.kind));
         self.board.notes().wanted.extend(jobs);
@@ -87,9 +82,13 @@ impl Several {
             .map(|&source| self.board.take(source))
             .collect::<Result<Vec<Row>>>()?;
         let stages = std::mem::take(&mut self.board.notes().stages);
-        self.keeper.keep(kept, &mut rows, self.turn % SCRATCH)?;
+        let state = self.keeper.keep(kept, &mut rows, self.turn % SCRATCH)?;
         self.turn += 1;
-        Ok(Some(Made { rows, stages }))
+        Ok(Some(Made {
+            rows,
+            stages,
+            state: Some(state),
+        }))
     }
 }
 
@@ -110,12 +109,12 @@ impl Keeper {
         let slot_bytes = u64::from(slots) * size_of::<Slot>() as u64;
         let slots_buffer = Buffer::new(device, "slots", slot_bytes, BufferUse::Storage)?;
         let keep = Keep::new(device, &slots_buffer, slots, &fresh, kept)?;
-        let row_bytes = u64::from(slots) * size_of::<KeptRow>() as u64;
         let parts = [&fresh.plain, &fresh.meso, &fresh.occupied];
         let bytes = slot_bytes + parts.iter().map(|part| part.bytes()).sum::<u64>();
+        let read = keep.rows.bytes() + size_of::<KeptState>() as u64;
         Ok(Self {
             upload: Buffer::new(device, "rows of others", bytes, BufferUse::Upload)?,
-            readback: Buffer::new(device, "rows of a batch", row_bytes, BufferUse::Readback)?,
+            readback: Buffer::new(device, "rows of a batch", read, BufferUse::Readback)?,
             device: Arc::clone(device),
             keep,
             fresh,
@@ -124,8 +123,8 @@ impl Keeper {
         })
     }
 
-    /// Brings rows to the device and keeps them, in their order.
-    fn keep(&mut self, kept: &KeptRows, rows: &mut [Row], scratch: u32) -> Result<()> {
+    /// Brings rows to the device and keeps them, in their order. How far the chunks are filled then.
+    fn keep(&mut self, kept: &KeptRows, rows: &mut [Row], scratch: u32) -> Result<KeptState> {
         let shape = kept.shape;
         let mut slots = vec![Slot::EMPTY; self.slots];
         for (slot, row) in slots.iter_mut().zip(rows.iter()) {
@@ -151,6 +150,7 @@ impl Keeper {
             self.upload.write(occupied_at + 4 * i * sizes[2], occupied);
         }
         let count = rows.len() as u64;
+        let state_bytes = size_of::<KeptState>() as u64;
         Commands::run(&self.device, "keep rows", |cmd| {
             cmd.barrier(&[Stage::Compute, Stage::Transfer], &[Stage::Transfer]);
             cmd.copy(&self.upload, 0, &self.slots_buffer, 0, plain_at);
@@ -164,8 +164,9 @@ impl Keeper {
             cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
             self.keep.record(cmd, scratch);
             cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
-            let bytes = self.readback.bytes().min(self.keep.rows.bytes());
+            let bytes = self.keep.rows.bytes();
             cmd.copy(&self.keep.rows, 0, &self.readback, 0, bytes);
+            cmd.copy(&kept.state, 0, &self.readback, bytes, state_bytes);
             cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
             Ok(())
         })?;
@@ -173,7 +174,7 @@ impl Keeper {
         for (row, place) in rows.iter_mut().zip(places) {
             row.factors = Factors::Kept(place);
         }
-        Ok(())
+        Ok(self.readback.read(self.keep.rows.bytes(), 1)[0])
     }
 }
 

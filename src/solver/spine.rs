@@ -12,14 +12,14 @@ use std::time::Instant;
 use glam::DVec3;
 use settling::MOST_TURNS;
 
-use super::coupling::CouplingRow;
 use super::gather::{Gathering, LitRow};
+use super::journal::{Checkpoints, Journal};
 use super::ledger::{Candidates, Drawn, Ledger, strongest_first};
 use super::makers::{Batch, RowKind, TeamParts};
 use super::near::NearLight;
 use super::progress::{Bound, Watch};
 use super::rows::{Factors, Made};
-use super::team::Team;
+use super::team::{Taken, Team};
 use super::turns::Turns;
 use super::visibility::Visibility;
 use super::{DrawnBatch, Problem, Report, StopReason, VISIBILITY_MEMORY};
@@ -37,6 +37,7 @@ pub(super) struct Spine {
     team: Option<Team>,
     pub ledger: Ledger,
     pub kept: KeptRows,
+    journal: Option<Journal>,
     gathering: Gathering,
     pub near: NearLight,
     /// Of what sources reflect of near light.
@@ -107,14 +108,41 @@ impl Spine {
             brought: true,
             devices: devices.to_vec(),
             team: None,
+            journal: None,
             ledger: Ledger::new(device, on, bound, rows, coupling),
             kept,
         })
     }
 
+    /// Goes on from what is `at` a folder, and keeps there what is drawn. Where no rows are kept on
+    /// the device there is nothing to go on from.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn keep_checkpoints(
+        &mut self,
+        at: &Checkpoints,
+        key: String,
+        report: &mut Report,
+    ) -> Result<()> {
+        if !self.kept.keeps() {
+            return Ok(());
+        }
+        let sizes = [
+            self.ledger.sources.len(),
+            self.ledger.system.targets.words(),
+        ];
+        let journal = Journal::open(&self.devices[0], at, key, &self.kept, sizes)?;
+        report.resumed = journal.rows() as u64;
+        self.journal = Some(journal);
+        Ok(())
+    }
+
     /// Begins again with the rows that there are, but for those of lights that have `moved`,
     /// `[source]`.
     pub fn relight(&mut self, on: &Problem, bound: Bound, moved: &[bool]) -> Result<()> {
+        // It is of the light before.
+        self.journal = None;
         let before = &mut self.ledger;
         let rows: Vec<_> = (before.sources.iter().zip(moved))
             .map(|(drawn, moved)| drawn.row.filter(|_| !moved))
@@ -183,7 +211,12 @@ impl Spine {
                 break;
             }
             self.measure(on)?;
-            let left = self.ledger.missing();
+            // Sources that may not be drawn any more lack what they lack.
+            let lost = match report.shots < limit {
+                true => 0.0,
+                false => self.ledger.undrawn_missing(),
+            };
+            let left = self.ledger.missing() - lost;
             if corrections > 0 && left <= self.ledger.bound.most_missing() {
                 break;
             }
@@ -233,18 +266,32 @@ impl Spine {
                 for &source in &batch.sources {
                     self.ledger.sources[source as usize].under_way = true;
                 }
+                let recorded = match &mut self.journal {
+                    Some(journal) => journal.next(&batch)?,
+                    None => None,
+                };
                 if let Some(team) = &mut self.team {
-                    team.submit(batch)?;
+                    team.submit(batch, recorded, &self.kept)?;
                 }
             }
             if !self.take(on, phase, report)? {
                 return Ok(watch.stop.is_none());
             }
+            self.write_checkpoint(false)?;
             let (unshot, missing) = (self.ledger.unshot(), self.ledger.missing());
             if !watch.look(report.shots, unshot, missing) {
                 while self.take(on, phase, report)? {}
+                self.write_checkpoint(watch.stop == Some(StopReason::Interrupted))?;
                 return Ok(false);
             }
+        }
+    }
+
+    /// If it is time for one, or `now`, if the bake is long.
+    fn write_checkpoint(&mut self, now: bool) -> Result<()> {
+        match &mut self.journal {
+            Some(journal) => journal.write(&self.devices[0], &self.kept, now),
+            None => Ok(()),
         }
     }
 
@@ -253,9 +300,17 @@ impl Spine {
         let Some(team) = &mut self.team else {
             return Ok(false);
         };
-        let Some(made) = team.take(&self.kept)? else {
+        let Some(Taken {
+            kind,
+            made,
+            recorded,
+        }) = team.take(&self.kept)?
+        else {
             return Ok(false);
         };
+        if let Some(journal) = self.journal.as_mut().filter(|_| !recorded) {
+            journal.add(kind, &made, &self.kept);
+        }
         self.take_in(on, made, report)?;
         if phase == Phase::First {
             let undrawn = self.ledger.system.unshot().undrawn;
@@ -313,8 +368,7 @@ impl Spine {
             drawn.under_way = false;
             drawn.times += 1;
             if !self.ledger.system.is_drawn(s) {
-                let coupling = CouplingRow::new(&row.coupling, row.scale);
-                self.ledger.system.draw(s, Some(coupling));
+                self.ledger.system.draw(s, Some(row.coupling));
             }
             match place.chunk < self.kept.chunk_count() {
                 true => self.ledger.sources[s].row = Some(place),
@@ -380,20 +434,23 @@ impl Spine {
 
     /// See [`super::Solver::draw`].
     pub fn draw_alone(&mut self, on: &Problem, sources: &[u32]) -> Result<DrawnBatch> {
-        self.team(on)?.submit(Batch {
-            sources: sources.to_vec(),
-            kind: RowKind::Common,
-        })?;
+        self.team(on)?;
         let Some(team) = &mut self.team else {
             unreachable!("it was made above")
         };
-        let made = team.take(&self.kept)?.expect("a batch was submitted");
+        let batch = Batch {
+            sources: sources.to_vec(),
+            kind: RowKind::Common,
+        };
+        team.submit(batch, None, &self.kept)?;
+        let taken = team.take(&self.kept)?.expect("a batch was submitted");
+        let (made, words) = (taken.made, self.ledger.system.targets.words());
         Ok(DrawnBatch {
             stages: made.stages,
             facing_away: made.rows.iter().map(|row| row.facing_away).collect(),
             counts: made.rows.iter().map(|row| row.counts.clone()).collect(),
             coupling: (made.rows.into_iter())
-                .map(|row| row.coupling.iter().map(|word| word * row.scale).collect())
+                .map(|row| row.coupling.words(words))
                 .collect(),
             items: team.items()?,
             slots: team.slots(RowKind::Common) as u32,

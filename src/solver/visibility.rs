@@ -1,6 +1,5 @@
 //! Kept rows and their coupling outside the device: what lights a scene again without drawing it.
 
-use std::io::Read;
 use std::path::Path;
 
 use glam::{DVec3, Vec3};
@@ -9,11 +8,10 @@ use sha2::{Digest, Sha256};
 
 use super::coupling::CouplingRow;
 use super::problem::GroupedBy;
+use super::word_file::{Kind, hexadecimal};
 use super::{Problem, Settings};
-use crate::atomic_file::write_atomically;
 use crate::constants::NONE;
 use crate::error::{Error, Result};
-use crate::input_file;
 use crate::mesh::elements::Elements;
 use crate::mesh::near::NearPairs;
 use crate::mesh::sources::Source;
@@ -55,23 +53,14 @@ struct Header {
     surfaces: usize,
     chunk_words: u32,
     state: [u32; 3],
-    rows: usize,
-    runs: usize,
-    values: usize,
-    words: Vec<usize>,
-    /// Lengths of [`NearPairs::lists`].
-    near: Vec<usize>,
-    /// Of this header without it, and of the lists.
-    sha256: String,
+    /// Chunks of them; the lists behind are those of [`NearPairs::lists`].
+    chunks: usize,
 }
 
-const MAGIC: &[u8; 16] = b"mesolux factors\n";
-/// Most bytes of a header.
-const LONGEST: u64 = 64 << 20;
-
-fn hexadecimal(hash: Sha256) -> String {
-    hash.finalize().iter().map(|b| format!("{b:02x}")).collect()
-}
+const FILE: Kind = Kind {
+    magic: b"mesolux rows   1",
+    name: "kept form factors",
+};
 
 fn key(scene: &Scene, settings: &Settings) -> String {
     let mut unlit = scene.clone();
@@ -111,60 +100,30 @@ struct Lists {
 }
 
 impl Lists {
-    /// Of the lengths that a header says, to be read.
-    fn of(header: &Header) -> Self {
-        let zeros = |lengths: &[usize]| lengths.iter().map(|&count| vec![0; count]).collect();
-        Self {
-            rows: vec![KeptRow::default(); header.rows],
-            counts: vec![[0; 2]; header.rows],
-            runs: vec![[0; 2]; header.runs],
-            values: vec![0.0; header.values],
-            chunks: zeros(&header.words),
-            near: zeros(&header.near),
-        }
-    }
-
-    fn bytes(&self) -> impl Iterator<Item = &[u8]> {
-        let lists: [&[u8]; 4] = [
+    fn words(&self) -> Vec<&[u32]> {
+        let lists: [&[u32]; 4] = [
             bytemuck::cast_slice(&self.rows),
-            bytemuck::cast_slice(&self.counts),
-            bytemuck::cast_slice(&self.runs),
+            self.counts.as_flattened(),
+            self.runs.as_flattened(),
             bytemuck::cast_slice(&self.values),
         ];
-        let words = self.chunks.iter().chain(&self.near);
-        lists
-            .into_iter()
-            .chain(words.map(|words| bytemuck::cast_slice(words)))
+        let words = self.chunks.iter().chain(&self.near).map(Vec::as_slice);
+        lists.into_iter().chain(words).collect()
     }
 
-    fn bytes_mut(&mut self) -> impl Iterator<Item = &mut [u8]> {
-        let lists: [&mut [u8]; 4] = [
-            bytemuck::cast_slice_mut(&mut self.rows),
-            bytemuck::cast_slice_mut(&mut self.counts),
-            bytemuck::cast_slice_mut(&mut self.runs),
-            bytemuck::cast_slice_mut(&mut self.values),
-        ];
-        let words = self.chunks.iter_mut().chain(&mut self.near);
-        lists
-            .into_iter()
-            .chain(words.map(|words| bytemuck::cast_slice_mut(words)))
-    }
-
-    fn digest(&self, header: &Header) -> String {
-        let mut hash = Sha256::new();
-        let Header {
-            key,
-            emitted,
-            lights,
-            chunk_words,
-            state,
-            ..
-        } = header;
-        let lengths = (header.surfaces, header.rows, header.runs, header.values);
-        let numbers = (chunk_words, state, lengths, &header.words, &header.near);
-        hash.update(format!("{key} {emitted:?} {lights:?} {numbers:?}"));
-        self.bytes().for_each(|bytes| hash.update(bytes));
-        hexadecimal(hash)
+    /// The inverse of [`Self::words`], with so many chunks.
+    fn from_words(words: Vec<Vec<u32>>, chunks: usize) -> Option<Self> {
+        let mut words = words.into_iter();
+        let mut next = || words.next();
+        let lists = Self {
+            rows: bytemuck::try_cast_slice(&next()?).ok()?.to_vec(),
+            counts: bytemuck::try_cast_slice(&next()?).ok()?.to_vec(),
+            runs: bytemuck::try_cast_slice(&next()?).ok()?.to_vec(),
+            values: bytemuck::cast_slice(&next()?).to_vec(),
+            chunks: words.by_ref().take(chunks).collect(),
+            near: words.collect(),
+        };
+        (lists.chunks.len() == chunks && lists.counts.len() == lists.rows.len()).then_some(lists)
     }
 
     /// Where the runs and the values of each source begin.
@@ -176,28 +135,17 @@ impl Lists {
         };
         self.counts.iter().scan([0, 0], next).collect()
     }
-}
 
-impl Header {
-    /// Whether all chunks but the last are full, so that there are no more of them than fit a file.
-    fn is_full(&self) -> bool {
-        let most = self.chunk_words as usize;
-        let full = |(i, &words): (usize, &usize)| match i + 1 < self.words.len() {
-            true => words == most && words > 0,
-            false => words <= most,
+    /// Whether rows lie in chunks, and all of these but the last are full, so that there are no
+    /// more of them than fit a file.
+    fn fit(&self, chunk_words: u32) -> bool {
+        let most = chunk_words as usize;
+        let full = |(i, chunk): (usize, &Vec<u32>)| match i + 1 < self.chunks.len() {
+            true => chunk.len() == most && most > 0,
+            false => chunk.len() <= most,
         };
-        self.words.iter().enumerate().all(full)
-    }
-
-    /// Bytes of the lists; no more than `u64::MAX` of a damaged one.
-    fn list_bytes(&self) -> u64 {
-        let row_bytes = size_of::<KeptRow>() + size_of::<[u32; 2]>();
-        let words = self.words.iter().chain(&self.near);
-        let words = words.map(|&words| (words, 4));
-        let lists = [(self.rows, row_bytes), (self.runs, 8), (self.values, 4)];
-        (words.chain(lists))
-            .map(|(count, bytes)| (count as u64).saturating_mul(bytes as u64))
-            .fold(0, u64::saturating_add)
+        let is_kept = |row: &KeptRow| row.chunk == NONE || (row.chunk as usize) < self.chunks.len();
+        self.chunks.iter().enumerate().all(full) && self.rows.iter().all(is_kept)
     }
 }
 
@@ -229,7 +177,7 @@ impl Visibility {
             points,
             far,
         } = &problem.grouped_by;
-        let mut header = Header {
+        let header = Header {
             key: key(scene, &problem.settings),
             emitted: emitted.iter().map(Vec3::to_array).collect(),
             lights: (points.iter())
@@ -241,14 +189,8 @@ impl Visibility {
             surfaces,
             chunk_words: kept.chunk_words,
             state: [kept.state.chunk, kept.state.used, kept.state.rows],
-            rows: lists.rows.len(),
-            runs: lists.runs.len(),
-            values: lists.values.len(),
-            words: lists.chunks.iter().map(Vec::len).collect(),
-            near: lists.near.iter().map(Vec::len).collect(),
-            sha256: String::new(),
+            chunks: lists.chunks.len(),
         };
-        header.sha256 = lists.digest(&header);
         Self {
             header,
             starts: lists.starts(),
@@ -315,6 +257,11 @@ impl Visibility {
         })
     }
 
+    /// What it is of, as text: equal texts, equal form factors.
+    pub(crate) fn described(&self) -> String {
+        serde_json::to_string(&self.header).unwrap_or_default()
+    }
+
     pub(super) fn grouped_by(&self) -> GroupedBy {
         let light = |&(position, intensity): &([f64; 3], [f32; 3])| PointLight {
             name: String::new(),
@@ -344,55 +291,16 @@ impl Visibility {
     }
 
     pub fn save(&self, path: &Path) -> Result<()> {
-        let header = serde_json::to_vec(&self.header)
-            .map_err(|e| Error::write(path, std::io::Error::other(e)))?;
-        write_atomically(path, |out| {
-            out.write_all(MAGIC)?;
-            out.write_all(&(header.len() as u64).to_le_bytes())?;
-            out.write_all(&header)?;
-            self.lists
-                .bytes()
-                .try_for_each(|bytes| out.write_all(bytes))
-        })
+        FILE.write(path, &self.header, &self.lists.words())
     }
 
     /// Reads what [`Self::save`] wrote; refuses damaged files.
     pub fn load(path: &Path) -> Result<Self> {
-        let bad = |what: &str| Error::file(path, what);
-        let (file, length) = input_file::open(path)?;
-        let mut input = std::io::BufReader::new(file);
-        let mut read = |bytes: &mut [u8]| {
-            input
-                .read_exact(bytes)
-                .map_err(|_| bad("ends before its form factors do"))
-        };
-        let mut magic = [0; 16];
-        read(&mut magic)?;
-        if magic != *MAGIC {
-            return Err(bad("not a file of kept form factors"));
-        }
-        let mut header_length = [0; 8];
-        read(&mut header_length)?;
-        let header_length = u64::from_le_bytes(header_length);
-        if header_length > LONGEST.min(length) {
-            return Err(bad("its header is damaged"));
-        }
-        let mut header = vec![0; header_length as usize];
-        read(&mut header)?;
-        let header: Header =
-            serde_json::from_slice(&header).map_err(|_| bad("its header is damaged"))?;
-        if header.list_bytes() != length - header_length - 24 || !header.is_full() {
-            return Err(bad("its length is not what its header says"));
-        }
-        let mut lists = Lists::of(&header);
-        lists.bytes_mut().try_for_each(&mut read)?;
-        let is_kept =
-            |row: &KeptRow| row.chunk == NONE || (row.chunk as usize) < lists.chunks.len();
-        if lists.digest(&header) != header.sha256 || !lists.rows.iter().all(is_kept) {
-            return Err(bad(
-                "damaged: its form factors are not those that were written",
-            ));
-        }
+        let (header, words): (Header, _) = FILE.read(path)?;
+        let lists = Lists::from_words(words, header.chunks);
+        let lists = lists.filter(|lists| lists.fit(header.chunk_words));
+        let damaged = || Error::file(path, "its header is damaged: bake again");
+        let lists = lists.ok_or_else(damaged)?;
         Ok(Self {
             header,
             starts: lists.starts(),
