@@ -216,7 +216,7 @@ void main() {
         }
     }
     if (lane == 0) {
-        draws[region] = Draw(3 * written, written > 0 ? 1 : 0, 3 * first_out, 0, 0);
+        draws[region] = Draw(3 * written, written > 0 ? 1 : 0, 3 * first_out, 0);
         uvec3 count = uvec3(meshlets_kept, triangles_tested, written);
         counts[region] = part == 0 ? count : counts[region] + count;
         resume[region] = next;

@@ -4,13 +4,17 @@
 #extension GL_GOOGLE_include_directive : require
 #include "shared/types.glsl"
 
-layout(location = 0) in vec3 position;
+layout(location = 0) flat out uint drawn_item;
 
 layout(scalar, binding = 0) readonly buffer Views { View views[]; };
+// [triangle]
+layout(scalar, binding = 1) readonly buffer Items { uint drawn_items[]; };
+// [triangle][corner]
+layout(scalar, binding = 2) readonly buffer Corners { uint drawn_corners[]; };
+layout(scalar, binding = 3) readonly buffer Vertices { vec3 vertices[]; };
 
 layout(push_constant, scalar) uniform Parameters {
     uint region;         // slot · FACES + face
-    uint first_item;
     float near;
     vec2 half_size;      // of the face, pixels
 };
@@ -20,8 +24,9 @@ layout(push_constant, scalar) uniform Parameters {
 const float STEPS = 256.0;
 
 void main() {
+    drawn_item = drawn_items[gl_VertexIndex / 3];
     View v = views[region];
-    vec3 d = position - v.eye;
+    vec3 d = vertices[drawn_corners[gl_VertexIndex]] - v.eye;
     vec2 xy = vec2(dot(d, v.x), dot(d, v.y));
     float w = dot(d, v.w);
     vec2 grid = STEPS * half_size;

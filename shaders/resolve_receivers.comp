@@ -15,7 +15,7 @@ layout(constant_id = 1) const uint EYES = SOURCE_EYES;
 const uint STRIDE = SOURCE_EYES / EYES;
 
 // SOURCE_EYES a source on a surface; a point light has none, and nothing crosses it.
-layout(binding = 8) uniform usamplerBuffer eyes;
+layout(scalar, binding = 8) readonly buffer Eyes { vec4 eyes[]; };
 
 // Less than the weight of any place, which is finite in a scene of size 1.
 const float LEAST_WEIGHT = 1e-30;
@@ -45,7 +45,7 @@ void main() {
     for (uint k = 0; k < from; k++) {
         float weight = 1.0;
         if (LIST == RECEIVE_CROSSED) {
-            Eye place = load_eye(eyes, SOURCE_EYES * source + k * STRIDE + STRIDE / 2);
+            Eye place = load_eye(eyes[SOURCE_EYES * source + k * STRIDE + STRIDE / 2]);
             eye.eye = place.at;
             weight = weight_of(place, s, ball[0].xyz, n[0]);
         }

@@ -24,7 +24,7 @@ layout(binding = 1) uniform usamplerBuffer sources;
 // TRIANGLE_TEXELS an element.
 layout(binding = 2) uniform usamplerBuffer triangles;
 // SOURCE_EYES a far light: its directions, unit, by even shares of its light.
-layout(binding = 3) uniform usamplerBuffer eyes;
+layout(scalar, binding = 3) readonly buffer Eyes { vec4 eyes[]; };
 layout(binding = 4) uniform usamplerBuffer shadow_nodes;
 // OCCLUDER_TEXELS an occluder.
 layout(binding = 5) uniform usamplerBuffer shadow_occluders;
@@ -128,7 +128,7 @@ float share_of(Light light, vec3 way) {
 
 // Way from a place to the light's place i: of a far light a unit vector.
 vec3 way_to(Light light, uint i, vec3 p) {
-    return BEAMS == 1 ? light.middle - p : fetch(eyes, light.first_eye + i).xyz;
+    return BEAMS == 1 ? light.middle - p : eyes[light.first_eye + i].xyz;
 }
 
 // What a place receives along a way that nothing blocks: its dot product with the normal is the form

@@ -67,9 +67,8 @@ struct Eye {
     vec3 normal;    // about; 0 on plane sources
 };
 
-Eye load_eye(usamplerBuffer eyes, uint index) {
-    uvec4 words = fetch_words(eyes, index);
-    return Eye(uintBitsToFloat(words.xyz), unpackSnorm4x8(words.w).xyz);
+Eye load_eye(vec4 eye) {
+    return Eye(eye.xyz, unpackSnorm4x8(floatBitsToUint(eye.w)).xyz);
 }
 
 #ifdef SHADOW_OCCLUDERS

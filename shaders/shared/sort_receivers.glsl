@@ -31,7 +31,7 @@ layout(scalar, binding = 7) buffer FacingAway { uint away_count[]; };
 layout(scalar, binding = 8) readonly buffer Blocks { ReceiverBlock blocks[]; };
 #ifdef SHADOW_RAYS
 // SOURCE_EYES a source on a surface; a point light has none.
-layout(binding = 10) uniform usamplerBuffer eyes;
+layout(scalar, binding = 10) readonly buffer Eyes { vec4 eyes[]; };
 #define NEAR_MARKS 11
 #else
 #define NEAR_MARKS 9
@@ -121,7 +121,7 @@ void cross_unlike(
 ) {
     Source end = s;
     for (uint k = 0; k < SOURCE_ENDS; k++) {
-        end.eye = fetch(eyes, SOURCE_EYES * source + k).xyz;
+        end.eye = eyes[SOURCE_EYES * source + k].xyz;
         bool above[SORT_ELEMENTS];
         for (uint j = 0; j < SORT_ELEMENTS; j++) {
             above[j] = asked[j] && !crossed[j] && dot(end.eye - ball[j].xyz, n[j]) > 0.0;

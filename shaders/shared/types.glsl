@@ -126,10 +126,9 @@ struct View {
 
 // VkDrawIndexedIndirectCommand.
 struct Draw {
-    uint index_count;
+    uint vertex_count;
     uint instance_count;
-    uint first_index;
-    int vertex_offset;
+    uint first_vertex;
     uint first_instance;
 };
 

@@ -164,7 +164,7 @@ impl Hemicubes {
             draws: buffer("draws", draws, BufferUse::Geometry)?,
             counts: buffer("cull counts", regions * 12, BufferUse::Storage)?,
             resume: buffer("cull resume", regions * 4, BufferUse::Storage)?,
-            drawn_corners: buffer("drawn corners", CORNER_BYTES * drawn, BufferUse::Geometry)?,
+            drawn_corners: buffer("drawn corners", CORNER_BYTES * drawn, BufferUse::Storage)?,
             drawn_items: buffer("drawn items", 4 * drawn, BufferUse::Storage)?,
             framebuffer: Framebuffer::new(device, "item buffer", pass, &items, &depth)?,
             sampler: Sampler::new(device, "item buffer", false)?,

@@ -130,7 +130,7 @@ impl SceneBuffers {
             weights: upload(device, "weights", &weights, storage)?,
             reflectance: upload(device, "reflectance", &reflectance, storage)?,
             sources: upload(device, "sources", &list, texels)?,
-            eyes: upload(device, "eyes", &eyes(&sources.list), texels)?,
+            eyes: upload(device, "eyes", &eyes(&sources.list), storage)?,
             contours: upload(device, "contours", &contours, texels)?,
             webs: upload(device, "webs", &webs, texels)?,
             meshlets: upload(device, "meshlets", &meshlets, storage)?,

@@ -15,7 +15,7 @@ use crate::error::Result;
 use crate::math::hemicube::face_rectangle;
 use crate::vk::{
     Attachment, Blending, Commands, DescriptorSet, Device, Format, GraphicsPipeline, GraphicsState,
-    RenderPass, Stage, VertexAttribute,
+    RenderPass, Stage,
 };
 
 pub struct ItemBuffer {
@@ -39,11 +39,8 @@ impl ItemBuffer {
                 name: "item buffer",
                 shaders: &SHADER,
                 constants: &[],
-                vertex_stride: 12,
-                attributes: &[VertexAttribute {
-                    format: Format::R32G32B32_SFLOAT,
-                    offset: 0,
-                }],
+                vertex_stride: 0,
+                attributes: &[],
                 blending: Blending::Nearest,
                 backs_alone: false,
             },
@@ -55,13 +52,15 @@ impl ItemBuffer {
         })
     }
 
-    pub fn bind(&self, batch: &Batch) -> Result<DescriptorSet> {
+    pub fn bind(&self, scene: &SceneBuffers, batch: &Batch) -> Result<DescriptorSet> {
         let hemicubes = batch.hemicubes();
         self.pipeline.bind(
             "item buffer",
             &Bindings {
                 views: &hemicubes.views,
                 drawn_items: &hemicubes.drawn_items,
+                drawn_corners: &hemicubes.drawn_corners,
+                vertices: &scene.vertices,
             },
         )
     }
@@ -80,27 +79,19 @@ impl ItemBuffer {
         cull.record(cmd, 0);
         cmd.barrier(&[Stage::Compute], &[Stage::Draw]);
         listed();
-        self.draw(cmd, set, scene, batch, &self.pass);
+        self.draw(cmd, set, batch, &self.pass);
         for part in 1..batch.hemicubes().parts(scene) {
             cmd.barrier(&[Stage::Draw], &[Stage::Compute]);
             cull.record(cmd, part);
             cmd.barrier(&[Stage::Compute], &[Stage::Draw]);
-            self.draw(cmd, set, scene, batch, &self.further);
+            self.draw(cmd, set, batch, &self.further);
         }
     }
 
-    fn draw(
-        &self,
-        cmd: &Commands,
-        set: &DescriptorSet,
-        scene: &SceneBuffers,
-        batch: &Batch,
-        pass: &RenderPass,
-    ) {
+    fn draw(&self, cmd: &Commands, set: &DescriptorSet, batch: &Batch, pass: &RenderPass) {
         let hemicubes = batch.hemicubes();
         cmd.begin_render_pass(pass, &hemicubes.framebuffer, [NONE; 4]);
-        cmd.bind_graphics(&self.pipeline, set, Some(&scene.vertices));
-        cmd.bind_indices(&hemicubes.drawn_corners);
+        cmd.bind_graphics(&self.pipeline, set, None);
         for slot in 0..batch.slot_count {
             for face in 0..FACES {
                 let [x, y, width, height] = face_rectangle(face, hemicubes.face_size);
@@ -110,12 +101,11 @@ impl ItemBuffer {
                     &self.pipeline,
                     &Parameters {
                         region,
-                        first_item: region * hemicubes.room,
                         near: NEAR,
                         half_size: Vec2::new(width as f32, height as f32) / 2.0,
                     },
                 );
-                cmd.draw_indexed_indirect(
+                cmd.draw_indirect(
                     &hemicubes.draws,
                     u64::from(region) * size_of::<Draw>() as u64,
                 );

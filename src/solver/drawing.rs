@@ -30,7 +30,7 @@ impl Drawing {
         let batch = Batch::drawing(device, &item_buffer.pass, scene, size)?;
         let drawing = Self {
             cull: Cull::new(device, culling, scene, &batch)?,
-            item_set: item_buffer.bind(&batch)?,
+            item_set: item_buffer.bind(scene, &batch)?,
             item_buffer,
         };
         Ok((drawing, batch))

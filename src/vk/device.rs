@@ -212,7 +212,6 @@ fn create(instance: &Instance, candidate: &Candidate, family: u32) -> Result<ash
         .subgroup_size_control(true)
         .compute_full_subgroups(true);
     let features = vk::PhysicalDeviceFeatures::default()
-        .geometry_shader(true)
         .full_draw_index_uint32(true)
         .shader_int64(candidate.int64_atomics);
     let extensions = match instance.presents {

@@ -274,10 +274,6 @@ impl Instance {
         }
         let base = features.features;
         let needed = [
-            (
-                base.geometry_shader != 0,
-                "geometryShader (gl_PrimitiveID in fragment shaders)",
-            ),
             (base.full_draw_index_uint32 != 0, "fullDrawIndexUint32"),
             (f12.scalar_block_layout != 0, "scalarBlockLayout"),
             (f12.buffer_device_address != 0, "bufferDeviceAddress"),

@@ -124,14 +124,14 @@ impl Commands {
         }
     }
 
-    /// Draws one `VkDrawIndexedIndirectCommand` read at byte `offset`.
-    pub fn draw_indexed_indirect(&self, draws: &Buffer, offset: u64) {
+    /// Draws one `VkDrawIndirectCommand` read at byte `offset`.
+    pub fn draw_indirect(&self, draws: &Buffer, offset: u64) {
         self.hold(&draws.owner);
         // SAFETY: the command lies within the buffer and was written by a pass.
         unsafe {
             self.device
                 .raw
-                .cmd_draw_indexed_indirect(self.raw, draws.owner.raw, offset, 1, 20);
+                .cmd_draw_indirect(self.raw, draws.owner.raw, offset, 1, 16);
         }
     }
 
