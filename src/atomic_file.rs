@@ -3,6 +3,7 @@
 
 use std::collections::BTreeSet;
 use std::collections::hash_map::RandomState;
+use std::ffi::OsStr;
 use std::fs::{self, File, OpenOptions};
 use std::hash::BuildHasher;
 use std::io::{self, BufWriter, Write};
@@ -116,6 +117,15 @@ fn write_beside(
 
 /// Of files that programs left which were killed while they wrote.
 const PREFIX: &str = ".mesolux-";
+
+/// Whether a name is of a file that a program was writing when it was killed, or is writing.
+pub(crate) fn is_temporary(name: &OsStr) -> bool {
+    let random = name.to_str().and_then(|name| name.strip_prefix(PREFIX));
+    random.is_some_and(|random| {
+        [6, 16].contains(&random.len()) && random.bytes().all(|b| b.is_ascii_alphanumeric())
+    })
+}
+
 /// No program writes to one file for so long without changing its time.
 const LEFT: Duration = Duration::from_secs(3600);
 
@@ -127,11 +137,7 @@ fn clear_away(dir: &Path) {
         return;
     }
     for entry in fs::read_dir(dir).into_iter().flatten().flatten() {
-        let name = entry.file_name();
-        let random = name.to_str().and_then(|name| name.strip_prefix(PREFIX));
-        let is_ours = random.is_some_and(|random| {
-            [6, 16].contains(&random.len()) && random.bytes().all(|b| b.is_ascii_alphanumeric())
-        });
+        let is_ours = is_temporary(&entry.file_name());
         let changed = || entry.metadata().and_then(|found| found.modified()).ok();
         let is_left = |at: SystemTime| at.elapsed().is_ok_and(|since| since > LEFT);
         if is_ours && changed().is_some_and(is_left) {

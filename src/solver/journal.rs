@@ -20,6 +20,7 @@ use super::coupling::CouplingRow;
 use super::makers::{Batch, RowKind};
 use super::rows::{Factors, Made, Row};
 use super::word_file::Kind;
+use crate::atomic_file::is_temporary;
 use crate::constants::{FACES, NONE, RECEIVE_LISTS};
 use crate::error::{Error, Result};
 use crate::passes::buffers::download;
@@ -129,6 +130,12 @@ fn remove_from(folder: &Path, first: usize) {
         let _ = fs::remove_file(part(folder, number));
     }
     if first == 0 {
+        // A bake may have been killed while it wrote a part.
+        for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+            if is_temporary(&entry.file_name()) {
+                let _ = fs::remove_file(entry.path());
+            }
+        }
         let _ = fs::remove_dir(folder);
     }
 }

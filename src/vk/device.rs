@@ -12,8 +12,8 @@ use gpu_allocator::vulkan::{
 };
 
 use super::instance::{Candidate, Instance, graphics_family};
-use super::lock;
 use super::uploads::Uploads;
+use super::{change_lists, lock, walk_lists};
 use crate::error::{Error, Result};
 
 /// A device with one queue for graphics and compute.
@@ -83,6 +83,7 @@ impl Device {
                 candidate.name
             )));
         };
+        let _lists = change_lists();
         let raw = create(instance, candidate, family)?;
         let allocator = match allocator(instance, candidate, &raw) {
             Ok(allocator) => allocator,
@@ -183,6 +184,7 @@ impl Device {
         let info = vk::DebugUtilsObjectNameInfoEXT::default()
             .object_handle(handle)
             .object_name(&name);
+        let _lists = walk_lists();
         // SAFETY: the handle belongs to this device. A name that cannot be set is no loss.
         let _ = unsafe { names.set_debug_utils_object_name(&info) };
     }
@@ -288,6 +290,7 @@ impl Drop for Device {
     fn drop(&mut self) {
         LEFT_BYTES.fetch_add(self.allocated_bytes(), Ordering::Relaxed);
         DEVICES.fetch_sub(1, Ordering::Relaxed);
+        let _lists = change_lists();
         // SAFETY: every object of the device holds it by `Arc`, so none is left; the allocator is
         // dropped before the device.
         unsafe {

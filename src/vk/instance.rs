@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 
 use ash::{ext, vk};
 
+use super::change_lists;
 use crate::error::{Error, Result};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
@@ -21,6 +22,7 @@ fn anchor() -> Option<(ash::Instance, ash::Entry)> {
     let entry = unsafe { ash::Entry::load() }.ok()?;
     let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
     let info = vk::InstanceCreateInfo::default().application_info(&application);
+    let _lists = change_lists();
     // SAFETY: every pointer in `info` outlives the call.
     let raw = unsafe { entry.create_instance(&info, None) }.ok()?;
     Some((raw, entry))
@@ -160,9 +162,11 @@ impl Instance {
                 .push_next(&mut features)
                 .push_next(&mut messenger_info);
         }
+        let lists = change_lists();
         // SAFETY: every pointer in `info` outlives the call.
         let raw = unsafe { entry.create_instance(&info, None) }
             .map_err(|e| Error::Device(format!("Vulkan instance: {e}")))?;
+        drop(lists);
         let mut instance = Self {
             raw,
             debug_utils,
@@ -178,6 +182,7 @@ impl Instance {
 
     /// Receives the messages of the validation layer.
     fn listen(&mut self) -> Result<()> {
+        let _lists = change_lists();
         let loader = ext::debug_utils::Instance::new(&self.entry, &self.raw);
         // SAFETY: the extension is enabled, and the callback is a plain function.
         let messenger = unsafe { loader.create_debug_utils_messenger(&messenger_info(), None) }
@@ -384,6 +389,7 @@ unsafe extern "system" fn on_message(
 
 impl Drop for Instance {
     fn drop(&mut self) {
+        let _lists = change_lists();
         // SAFETY: everything made from the instance holds it by `Arc`, so nothing is left. The
         // library is unloaded with the fields, after this.
         unsafe {

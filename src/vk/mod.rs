@@ -28,7 +28,7 @@ mod swapchain;
 mod timestamps;
 mod uploads;
 
-use std::sync::{Mutex, MutexGuard};
+use std::sync::{Mutex, MutexGuard, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 pub use barrier::Stage;
 pub use buffer::{Buffer, BufferUse, TEXEL_BYTES};
@@ -52,6 +52,20 @@ pub use swapchain::{Shown, Swapchain};
 pub use timestamps::Timestamps;
 
 pub use ash::vk::Format;
+
+/// The loader looks for the device of an object that is named in lists of all instances and devices,
+/// without a lock of its own: nobody may make or destroy one meanwhile.
+static LISTS: RwLock<()> = RwLock::new(());
+
+/// While instances or devices are made or destroyed.
+fn change_lists() -> RwLockWriteGuard<'static, ()> {
+    LISTS.write().unwrap_or_else(|e| e.into_inner())
+}
+
+/// While the loader walks its lists.
+fn walk_lists() -> RwLockReadGuard<'static, ()> {
+    LISTS.read().unwrap_or_else(|e| e.into_inner())
+}
 
 /// Locks a mutex whose content is valid even after a panic of another thread.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
