@@ -7,30 +7,11 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use common::{Build, assert_silent, device};
-use glam::DVec3;
 use mesolux::bake::{self, solution::Solution};
 use mesolux::math::directions::Directions;
 use mesolux::meso::{Options, Transport};
 use mesolux::scene::Scene;
 use mesolux::solver::{Checkpoints, Settings, Visibility};
-
-/// A closed room with a lamp, a point light and a ball, of which floor and ball have a relief.
-fn room() -> Scene {
-    let mut build = Build::new();
-    let material = build.material(0.7, 0.0);
-    let lamp = build.material(0.2, 3.0);
-    let wave = |a: f64| (std::f64::consts::TAU * a).sin();
-    build.relief(material, 8, |x, y| 0.03 * wave(x) * wave(y));
-    let sides = build.room(DVec3::ZERO, DVec3::ONE, 3, 0);
-    build.paint(sides[0].clone(), material);
-    build.uv(sides[0].clone(), 0.25 * DVec3::X, 0.25 * DVec3::Z);
-    let ball = build.sphere(DVec3::new(0.5, 0.4, 0.5), 0.2, 1, true, material);
-    build.uv(ball, DVec3::new(0.2, 0.05, 0.0), DVec3::new(0.0, 0.1, 0.2));
-    let [x, z] = [0.4 * DVec3::X, 0.4 * DVec3::Z];
-    build.quad(DVec3::new(0.3, 0.95, 0.3), x, z, (2, 2), lamp);
-    build.point_light(DVec3::new(0.2, 0.7, 0.8), 0.3);
-    build.0.scene
-}
 
 fn settings(transport: Transport, folder: &Path) -> Settings {
     Settings {
@@ -87,7 +68,7 @@ const WHOLE: u32 = u32::MAX;
 /// memory for all rows, for some and for none.
 #[test]
 fn a_stopped_bake_goes_on_to_the_same_bytes() {
-    let scene = room();
+    let scene = Build::room_with_ball(true).0.scene;
     for (transport, memory) in [
         (Transport::Physical, None),
         (Transport::Physical, Some(12 << 10)),
@@ -126,12 +107,12 @@ fn a_stopped_bake_goes_on_to_the_same_bytes() {
     assert_silent();
 }
 
-/// As of a bake anew, by rows that an earlier bake has kept.
+/// Also with form factors that an earlier bake has kept.
 #[test]
 fn relighting_goes_on_too() {
     let folder = tempfile::tempdir().expect("a folder");
     let settings = settings(Transport::Physical, folder.path());
-    let mut scene = room();
+    let mut scene = Build::room_with_ball(true).0.scene;
     let device = device();
     let few = Settings {
         shots: Some(20),
@@ -166,7 +147,7 @@ fn what_is_no_checkpoint_is_not_used() {
     let settings = settings(Transport::Lambert, folder.path());
     let checkpoints = settings.checkpoints.as_ref().expect("they are set");
     let part = |i: u32| checkpoints.folder.join(format!("{i:04}.rows"));
-    let scene = room();
+    let scene = Build::room_with_ball(true).0.scene;
     let expected = result(&solve(&scene, &settings, None, WHOLE));
     let begin = || {
         checkpoints.remove();

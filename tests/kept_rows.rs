@@ -9,7 +9,7 @@ use mesolux::math::directions::Directions;
 use mesolux::mesh::near::Nearness;
 use mesolux::mesh::sources::Grouping;
 use mesolux::meso::{Options, Transport};
-use mesolux::solver::{Light, Report, Settings, Solver, Visibility};
+use mesolux::solver::{Light, Report, Settings, Solver, StopReason, Visibility};
 
 /// Unshot light that each solution leaves, as a share of all. It lands on elements as large as any
 /// other, and half of it and the rounding of sums in another order are what two solutions differ
@@ -17,26 +17,6 @@ use mesolux::solver::{Light, Report, Settings, Solver, Visibility};
 const RESIDUAL: f64 = 5e-7;
 /// Largest difference of two solutions, of the mean.
 const TOLERANCE: f32 = 1e-6;
-
-/// A closed room with a lamp and a ball, of which floor and ball have a relief or not.
-fn scene(relief: bool) -> Build {
-    let mut build = Build::new();
-    let material = build.material(0.7, 0.0);
-    let lamp = build.material(0.2, 3.0);
-    if relief {
-        let wave = |a: f64| (std::f64::consts::TAU * a).sin();
-        build.relief(material, 8, |x, y| 0.03 * wave(x) * wave(y));
-    }
-    let sides = build.room(DVec3::ZERO, DVec3::ONE, 3, 0);
-    build.paint(sides[0].clone(), material);
-    build.uv(sides[0].clone(), 0.25 * DVec3::X, 0.25 * DVec3::Z);
-    let ball = build.sphere(DVec3::new(0.5, 0.4, 0.5), 0.2, 1, true, material);
-    build.uv(ball, DVec3::new(0.2, 0.05, 0.0), DVec3::new(0.0, 0.1, 0.2));
-    let [x, z] = [0.4 * DVec3::X, 0.4 * DVec3::Z];
-    build.quad(DVec3::new(0.3, 0.95, 0.3), x, z, (2, 2), lamp);
-    build.point_light(DVec3::new(0.2, 0.7, 0.8), 0.3);
-    build
-}
 
 /// Without near light, for which rows without memory are drawn more than twice.
 fn settings() -> Settings {
@@ -67,7 +47,7 @@ fn solve(relief: bool, visibility_memory: Option<u64>) -> (Light, Report) {
         emitter_hemicube: Some(settings().hemicube),
         ..settings()
     };
-    let scene = scene(relief).0.scene;
+    let scene = Build::room_with_ball(relief).0.scene;
     let solver =
         bake::solve(&device(), &scene, &settings, None, |_| true).expect("the scene is solved");
     let light = solver.light().expect("the light comes back");
@@ -123,7 +103,7 @@ fn light_does_not_depend_on_memory() {
 #[test]
 fn near_light_does_not_depend_on_memory() {
     for relief in [false, true] {
-        let scene = scene(relief).0.scene;
+        let scene = Build::room_with_ball(relief).0.scene;
         let solve = |visibility_memory| {
             let settings = Settings {
                 visibility_memory,
@@ -154,7 +134,7 @@ const UNSETTLED: f32 = 2e-6;
 #[test]
 fn light_does_not_depend_on_memory_for_the_coupling() {
     for relief in [false, true] {
-        let scene = scene(relief).0.scene;
+        let scene = Build::room_with_ball(relief).0.scene;
         let solve = |coupling_memory| {
             let settings = Settings {
                 coupling_memory,
@@ -195,7 +175,7 @@ fn a_run_with_kept_rows_repeats_to_the_bit() {
 
 /// The scene with another lamp, another point light, and a wall that glows.
 fn relit_scene() -> Build {
-    let mut build = scene(true);
+    let mut build = Build::room_with_ball(true);
     let lamp = build.scene.materials.len() - 1;
     build.scene.materials[lamp].ke = [0.5, 4.0, 1.0];
     // So weakly that the same emitters are strong, which see from places of their own.
@@ -234,7 +214,7 @@ fn relights(emitter_hemicube: Option<u32>) {
     let finer = emitter_hemicube != Some(settings.hemicube);
     let count = |report: &Report| (report.emitter_hemicubes, report.emitters_by_rays);
     let device = device();
-    let first = scene(true).0.scene;
+    let first = Build::room_with_ball(true).0.scene;
     let relit = relit_scene().0.scene;
     let folder = tempfile::tempdir().expect("a folder for the test");
     let path = folder.path().join("room.visibility");
@@ -277,7 +257,7 @@ fn relights(emitter_hemicube: Option<u32>) {
     }
 
     // Without a point light nothing is left to draw.
-    let mut lamps = scene(true).0.scene;
+    let mut lamps = Build::room_with_ball(true).0.scene;
     lamps.lights.points.clear();
     let solved = solve(&lamps, Some(&kept));
     let report = solved.report();
@@ -301,7 +281,7 @@ fn relights(emitter_hemicube: Option<u32>) {
 /// refused, and nothing of it stays.
 #[test]
 fn a_solver_is_relit_where_it_is() {
-    let (first, relit) = (scene(true).0.scene, relit_scene().0.scene);
+    let (first, relit) = (Build::room_with_ball(true).0.scene, relit_scene().0.scene);
     let device = device();
     let mut more = relit_scene();
     more.point_light(DVec3::splat(0.5), 1.0);
@@ -359,7 +339,7 @@ fn kept_rows_of_a_relit_solver_belong_to_the_first_groups() {
         let kept = solver.visibility(scene).expect("it comes back");
         kept.expect("it is kept")
     };
-    let first = scene(true).0.scene;
+    let first = Build::room_with_ball(true).0.scene;
     // So bright that its walls would be cut otherwise.
     let mut bright = first.clone();
     bright.materials[0].ke = [5.0; 3];
@@ -383,7 +363,7 @@ fn kept_rows_of_a_relit_solver_belong_to_the_first_groups() {
 #[test]
 fn kept_form_factors_of_something_else_are_refused() {
     let device = device();
-    let scene = scene(false).0.scene;
+    let scene = Build::room_with_ball(false).0.scene;
     let solve = |scene: &mesolux::scene::Scene, settings: &Settings, kept: Option<&Visibility>| {
         bake::solve(&device, scene, settings, kept, |_| true)
     };
@@ -456,7 +436,7 @@ fn sources_with_relief_send_by_direction_in_the_end() {
         residual: RESIDUAL,
         ..settings()
     };
-    let scene = scene(true).0.scene;
+    let scene = Build::room_with_ball(true).0.scene;
     let solver =
         bake::solve(&device(), &scene, &settings, None, |_| true).expect("the scene is solved");
     let exits = solver.relief_exits(0).expect("they come back");
@@ -484,5 +464,27 @@ fn sources_with_relief_send_by_direction_in_the_end() {
     );
     assert!(all > 0.1 * emitted, "relief sends a good part of the light");
     assert!(UNEVEN * even <= RESIDUAL * emitted);
+    assert_silent();
+}
+
+/// Where `shots` ends a bake with relief, the light of what was drawn is corrected until it is
+/// right, not as often as may be for what undrawn sources lack.
+#[test]
+fn a_limit_of_shots_needs_few_corrections() {
+    let scene = Build::room_with_ball(true).0.scene;
+    let settings = Settings {
+        shots: Some(40),
+        residual: 1e-3,
+        ..settings()
+    };
+    let solver = bake::solve(&device(), &scene, &settings, None, |_| true).expect("it is solved");
+    let report = solver.report();
+    let each = report.gathered_rows as f64 / f64::from(report.shots);
+    println!(
+        "{:?} after {} shots, {each:.1} gathers a row",
+        report.stop, report.shots
+    );
+    assert_eq!((report.stop, report.shots), (StopReason::Shots, 40));
+    assert!(each < 8.0);
     assert_silent();
 }

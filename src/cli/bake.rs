@@ -47,9 +47,9 @@ pub struct Options {
     /// were kept with this bake
     #[arg(long, value_name = "BAKE.safetensors", conflicts_with_all = ["estimator", "preset"])]
     relight: Option<PathBuf>,
-    /// While a bake runs, keep what is done every so many seconds in the folder OUT.checkpoint, from
-    /// which the same command goes on after a crash, a kill or Ctrl-C; it is removed once the bake
-    /// is done. 0 keeps nothing and begins anew. --preset paper keeps nothing
+    /// Save progress every so many seconds in the folder OUT.checkpoint. After a crash, a kill or
+    /// Ctrl-C the same command resumes from it; it is removed when the bake is done. 0 turns
+    /// checkpoints off and starts from the beginning, as --preset paper always does
     #[arg(long, value_name = "SECONDS", default_value_t = 60.0)]
     checkpoint: f64,
     #[command(flatten)]

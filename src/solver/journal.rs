@@ -122,22 +122,26 @@ fn part(folder: &Path, number: usize) -> PathBuf {
     folder.join(format!("{number:04}.rows"))
 }
 
+/// Removes the parts from `first` on, the last one first, what a killed writer has left, and the
+/// folder if it is empty then. What cannot be removed is of another bake or of one that is done.
 fn remove_from(folder: &Path, first: usize) {
-    let there = (first..).take_while(|&number| part(folder, number).is_file());
-    let numbers: Vec<usize> = there.collect();
-    for &number in numbers.iter().rev() {
-        // What cannot be removed is not used either: it is of another bake, or its bake is done.
-        let _ = fs::remove_file(part(folder, number));
-    }
-    if first == 0 {
-        // A bake may have been killed while it wrote a part.
-        for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-            if is_temporary(&entry.file_name()) {
-                let _ = fs::remove_file(entry.path());
-            }
+    let mut parts = Vec::new();
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let number = (name.to_str())
+            .and_then(|name| name.strip_suffix(".rows"))
+            .and_then(|number| number.parse::<usize>().ok());
+        match number {
+            Some(number) if number >= first => parts.push((number, entry.path())),
+            _ if is_temporary(&name) => drop(fs::remove_file(entry.path())),
+            _ => {}
         }
-        let _ = fs::remove_dir(folder);
     }
+    parts.sort();
+    for (_, path) in parts.iter().rev() {
+        let _ = fs::remove_file(path);
+    }
+    let _ = fs::remove_dir(folder);
 }
 
 impl Journal {
@@ -167,6 +171,8 @@ impl Journal {
         loop {
             let path = part(&journal.folder, journal.parts);
             if !path.exists() {
+                // Parts behind one that is lacking follow nothing.
+                remove_from(&journal.folder, journal.parts);
                 let (rows, folder) = (journal.rows(), at.folder.display());
                 if rows > 0 {
                     tracing::info!("goes on from {folder}: {rows} sources were drawn");
@@ -237,7 +243,7 @@ impl Journal {
         Ok((to, batches, chunk_words))
     }
 
-    /// What the journal has of the next batch; none once it has told all.
+    /// The recorded rows of the next batch; none after the last recorded batch.
     ///
     /// # Errors
     /// Another batch than was asked for when it was written.

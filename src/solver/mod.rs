@@ -188,7 +188,11 @@ impl Solver {
         let Some(checkpoints) = &settings.checkpoints else {
             return Ok(());
         };
-        let devices: Vec<&str> = spine.devices.iter().map(|device| device.name()).collect();
+        let device = |device: &Arc<Device>| {
+            let candidate = device.candidate();
+            format!("{} {}", candidate.name, candidate.driver)
+        };
+        let devices: Vec<String> = spine.devices.iter().map(device).collect();
         let maker = &checkpoints.maker;
         let key = format!("{maker}\n{devices:?}\n{scene}\n{}", settings.key());
         let key = word_file::hexadecimal(Sha256::new_with_prefix(key));

@@ -123,7 +123,8 @@ impl Keeper {
         })
     }
 
-    /// Brings rows to the device and keeps them, in their order. How far the chunks are filled then.
+    /// Brings rows to the device and keeps them, in their order. Returns how far the chunks are
+    /// filled then.
     fn keep(&mut self, kept: &KeptRows, rows: &mut [Row], scratch: u32) -> Result<KeptState> {
         let shape = kept.shape;
         let mut slots = vec![Slot::EMPTY; self.slots];

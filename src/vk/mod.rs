@@ -53,8 +53,8 @@ pub use timestamps::Timestamps;
 
 pub use ash::vk::Format;
 
-/// The loader looks for the device of an object that is named in lists of all instances and devices,
-/// without a lock of its own: nobody may make or destroy one meanwhile.
+/// To name an object, the loader walks lists of all instances and devices without a lock of its
+/// own: no other thread may create or destroy one meanwhile.
 static LISTS: RwLock<()> = RwLock::new(());
 
 /// While instances or devices are made or destroyed.

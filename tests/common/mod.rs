@@ -74,6 +74,27 @@ impl Build {
         Self::default()
     }
 
+    /// A closed room with a lamp, a point light and a ball, of which floor and ball may have a
+    /// relief.
+    pub fn room_with_ball(relief: bool) -> Self {
+        let mut build = Self::new();
+        let material = build.material(0.7, 0.0);
+        let lamp = build.material(0.2, 3.0);
+        if relief {
+            let wave = |a: f64| (2.0 * PI * a).sin();
+            build.relief(material, 8, |x, y| 0.03 * wave(x) * wave(y));
+        }
+        let sides = build.room(DVec3::ZERO, DVec3::ONE, 3, 0);
+        build.paint(sides[0].clone(), material);
+        build.uv(sides[0].clone(), 0.25 * DVec3::X, 0.25 * DVec3::Z);
+        let ball = build.sphere(DVec3::new(0.5, 0.4, 0.5), 0.2, 1, true, material);
+        build.uv(ball, DVec3::new(0.2, 0.05, 0.0), DVec3::new(0.0, 0.1, 0.2));
+        let [x, z] = [0.4 * DVec3::X, 0.4 * DVec3::Z];
+        build.quad(DVec3::new(0.3, 0.95, 0.3), x, z, (2, 2), lamp);
+        build.point_light(DVec3::new(0.2, 0.7, 0.8), 0.3);
+        build
+    }
+
     pub fn of(scene: Scene) -> Self {
         Self(Shapes { scene })
     }
