@@ -473,18 +473,16 @@ fn sources_with_relief_send_by_direction_in_the_end() {
 fn a_limit_of_shots_needs_few_corrections() {
     let scene = Build::room_with_ball(true).0.scene;
     let settings = Settings {
-        shots: Some(40),
+        shots: Some(80),
         residual: 1e-3,
         ..settings()
     };
     let solver = bake::solve(&device(), &scene, &settings, None, |_| true).expect("it is solved");
     let report = solver.report();
-    let each = report.gathered_rows as f64 / f64::from(report.shots);
-    println!(
-        "{:?} after {} shots, {each:.1} gathers a row",
-        report.stop, report.shots
-    );
-    assert_eq!((report.stop, report.shots), (StopReason::Shots, 40));
-    assert!(each < 8.0);
+    let (gathered, sweeps) = (report.gathered_rows, report.sweeps);
+    println!("{gathered} rows gathered, {sweeps} sweeps");
+    assert_eq!((report.stop, report.shots), (StopReason::Shots, 80));
+    // As often as may be: 437 and 561.
+    assert!(gathered < 320 && sweeps < 44);
     assert_silent();
 }
