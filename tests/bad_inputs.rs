@@ -296,10 +296,22 @@ fn of_gltf() -> Vec<Case> {
             "gone.png",
         ),
         gltf(
+            "a name that is not UTF-8",
+            "/buffers/0/uri",
+            json!("a%FF.bin"),
+            "not UTF-8",
+        ),
+        gltf(
             "an image of no kind",
             "/images/0",
             json!({"bufferView": 0}),
             "image 0",
+        ),
+        (
+            "an image of more texels than its bytes can hold",
+            "a.gltf",
+            poke("a.png", 16, &[0, 0, 32, 0, 0, 0, 32, 0]),
+            ["a.gltf", "a.png"],
         ),
         (
             "a damaged image",
@@ -376,6 +388,11 @@ fn of_glb() -> Vec<Case> {
         glb("another magic", poke("a.glb", 0, b"glTX"), ""),
         glb("version 1", poke("a.glb", 4, &[1]), ""),
         glb("a length of 4 GiB", poke("a.glb", 8, &[255; 4]), ""),
+        glb(
+            "a length within its header",
+            poke("a.glb", 8, &[2, 0, 0, 0]),
+            "2 bytes",
+        ),
         glb("a chunk of 4 GiB", poke("a.glb", 12, &[255; 4]), ""),
         glb(
             "a first chunk that is no JSON",

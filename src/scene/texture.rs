@@ -155,20 +155,34 @@ impl Texture {
 /// Most texels of an image: 8192 × 16384. As colours they take 1.6 GB.
 const MOST_TEXELS: u64 = 1 << 27;
 
+/// A byte of a deflated stream stands for 1032 bytes at most, and one of these for 8 texels of one
+/// bit. Files that claim more are damaged; they are refused before memory is asked for.
+const MOST_TEXELS_PER_BYTE: u64 = 1032 * 8;
+
 /// An image as its file stores it; the first bytes give the format.
 pub(super) fn decode(path: &Path) -> Result<DynamicImage> {
-    let bytes = input_file::read(path)?;
-    let refuse = |error| Error::file(path, format!("cannot be decoded: {error}"));
+    decode_bytes(&input_file::read(path)?).map_err(|what| Error::file(path, what))
+}
+
+/// As [`decode`], of the bytes of a file. An error is what is to be said of it.
+pub(super) fn decode_bytes(bytes: &[u8]) -> std::result::Result<DynamicImage, String> {
+    let refuse = |error| format!("cannot be decoded: {error}");
     let reader = || {
-        image::ImageReader::new(std::io::Cursor::new(&bytes))
+        image::ImageReader::new(std::io::Cursor::new(bytes))
             .with_guessed_format()
-            .map_err(|source| Error::read(path, source))
+            .map_err(|error| format!("cannot be read: {error}"))
     };
     let (width, height) = reader()?.into_dimensions().map_err(refuse)?;
-    if u64::from(width) * u64::from(height) > MOST_TEXELS {
-        return Err(Error::file(
-            path,
-            format!("{width} × {height} texels are more than {MOST_TEXELS}"),
+    let texels = u64::from(width) * u64::from(height);
+    if texels > MOST_TEXELS {
+        return Err(format!(
+            "{width} × {height} texels are more than {MOST_TEXELS}"
+        ));
+    }
+    if texels > MOST_TEXELS_PER_BYTE * bytes.len() as u64 {
+        let length = bytes.len();
+        return Err(format!(
+            "{width} × {height} texels are more than its {length} bytes can hold"
         ));
     }
     let mut whole = reader()?;

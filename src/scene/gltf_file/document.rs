@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use gltf::accessor::{DataType, Dimensions};
-use gltf::buffer::Data;
+use gltf::buffer::{Data, Source};
 use gltf::{Accessor, Document, Semantic};
 
+use super::uri;
 use crate::error::{Error, Result};
 use crate::input_file;
 
@@ -27,6 +28,25 @@ fn is(accessor: &Accessor, dimensions: Dimensions, types: &[DataType]) -> bool {
     accessor.dimensions() == dimensions && types.contains(&accessor.data_type())
 }
 
+/// Whether the length in the header of a binary file can be right: the `gltf` crate subtracts from
+/// it.
+fn check_binary(bytes: &[u8]) -> std::result::Result<(), String> {
+    if !bytes.starts_with(b"glTF") {
+        return Ok(());
+    }
+    let length = bytes
+        .get(8..)
+        .and_then(|rest| rest.first_chunk())
+        .map_or(0, |&word| u32::from_le_bytes(word) as usize);
+    match (12..=bytes.len()).contains(&length) {
+        true => Ok(()),
+        false => Err(format!(
+            "its header says that it has {length} bytes; it has {}",
+            bytes.len()
+        )),
+    }
+}
+
 pub(super) struct File {
     pub path: PathBuf,
     pub document: Document,
@@ -45,6 +65,7 @@ impl File {
                 format!("is no valid glTF 2.0: {}", text.trim().replace('\n', "; ")),
             )
         };
+        check_binary(&bytes).map_err(|what| Error::file(path, what))?;
         let gltf = gltf::Gltf::from_slice_without_validation(&bytes).map_err(refuse)?;
         let asset = &gltf.document.as_json().asset;
         let version = asset.min_version.as_ref().unwrap_or(&asset.version);
@@ -68,22 +89,28 @@ impl File {
             return Err(Error::file(path, what));
         }
         let gltf = gltf::Gltf::from_slice(&bytes).map_err(refuse)?;
-        let base = path.parent();
-        // The crate would wait at a pipe, and read a device without end.
-        for buffer in gltf.document.buffers() {
-            if let (gltf::buffer::Source::Uri(uri), Some(base)) = (buffer.source(), base)
-                && base.join(uri).exists()
-            {
-                input_file::open(&base.join(uri))?;
-            }
-        }
-        let buffers =
-            gltf::import_buffers(&gltf.document, base, gltf.blob).map_err(|error| match error {
-                gltf::Error::Io(error) => {
-                    Error::file(path, format!("a buffer cannot be read: {error}"))
+        let mut blob = gltf.blob;
+        let buffers = (gltf.document.buffers())
+            .map(|buffer| {
+                let refuse = |what: String| {
+                    let what = format!("buffer {} cannot be read: {what}", buffer.index());
+                    Error::file(path, what)
+                };
+                let bytes = match buffer.source() {
+                    Source::Uri(uri) => uri::read(path.parent(), uri),
+                    Source::Bin => (blob.take()).ok_or_else(|| "the file has no data".into()),
+                };
+                let bytes = bytes.map_err(refuse)?;
+                match bytes.len() < buffer.length() {
+                    true => Err(refuse(format!(
+                        "it has {} of {} bytes",
+                        bytes.len(),
+                        buffer.length()
+                    ))),
+                    false => Ok(Data(bytes)),
                 }
-                error => Error::file(path, format!("a buffer cannot be read: {error}")),
-            })?;
+            })
+            .collect::<Result<Vec<_>>>()?;
         let file = Self {
             path: path.to_owned(),
             document: gltf.document,

@@ -4,6 +4,7 @@ mod document;
 mod images;
 mod materials;
 mod primitives;
+mod uri;
 
 use std::path::Path;
 use std::sync::Arc;
