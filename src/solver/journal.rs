@@ -46,6 +46,13 @@ impl Checkpoints {
         remove_from(&self.folder, 0);
     }
 
+    /// The rows in one part of a bake of so many sources and words of a coupling row. For fuzzing.
+    #[doc(hidden)]
+    pub fn read_part(path: &Path, size: [usize; 2]) -> Result<usize> {
+        let part = Part::read(path, size)?;
+        Ok(part.batches.iter().map(|batch| batch.rows.len()).sum())
+    }
+
     /// Whether there is something to go on from.
     pub fn exist(&self) -> bool {
         part(&self.folder, 0).is_file()
@@ -65,6 +72,60 @@ struct Header {
     chunks: u32,
     /// How far the chunks were filled before and after; see [`KeptState`].
     filled: [[u32; 3]; 2],
+}
+
+/// A part whose lists fit together.
+struct Part {
+    header: Header,
+    batches: Vec<Recorded>,
+    /// What the chunks hold between its two states.
+    chunk_words: Vec<u32>,
+}
+
+const FOREIGN_ROWS: &str = "its rows are not rows of this scene";
+
+impl Part {
+    /// Reads a part of a bake of so many sources and words of a coupling row.
+    fn read(path: &Path, [sources, words]: [usize; 2]) -> Result<Self> {
+        let bad = |what: &str| Error::file(path, what);
+        let (header, lists): (Header, _) = FILE.read(path)?;
+        let lists: std::result::Result<[Vec<u32>; 5], _> = lists.try_into();
+        let [batches, rows, runs, values, chunk_words] =
+            lists.map_err(|_| bad("its lists are not those of a part"))?;
+        let lists = Lists {
+            batches,
+            rows,
+            runs,
+            values,
+        };
+        let batches = (lists.batches(sources, words)).ok_or_else(|| bad(FOREIGN_ROWS))?;
+        let part = Self {
+            header,
+            batches,
+            chunk_words,
+        };
+        match part.is_in_chunks() {
+            true => Ok(part),
+            false => Err(bad(FOREIGN_ROWS)),
+        }
+    }
+
+    /// How far the chunks are filled before and after it.
+    fn filled(&self) -> [KeptState; 2] {
+        (self.header.filled).map(|[chunk, used, rows]| KeptState { chunk, used, rows })
+    }
+
+    fn is_in_chunks(&self) -> bool {
+        let [from, to] = self.filled();
+        let is_kept = |record: &Record| {
+            record.chunk == NONE || (record.chunk, record.first) < (to.chunk, to.used)
+        };
+        let mut records = self.batches.iter().flat_map(|batch| &batch.rows);
+        (from.chunk, from.used) <= (to.chunk, to.used)
+            && to.chunk <= self.header.chunks
+            && to.used <= self.header.chunk_words
+            && records.all(|(record, _)| is_kept(record))
+    }
 }
 
 /// One row as it lies in a file. Of one without room only the source is meant.
@@ -180,11 +241,10 @@ impl Journal {
                 return Ok(journal);
             }
             match journal.read(&path, kept, [sources, words]) {
-                Ok((to, batches, chunk_words)) => {
-                    let filled = [journal.filled[1], to];
-                    kept.restore_between(device, filled, &chunk_words)?;
-                    journal.filled = [to; 2];
-                    journal.recorded.extend(batches);
+                Ok(part) => {
+                    kept.restore_between(device, part.filled(), &part.chunk_words)?;
+                    journal.filled = [part.filled()[1]; 2];
+                    journal.recorded.extend(part.batches);
                     journal.parts += 1;
                 }
                 Err(error) => {
@@ -196,51 +256,23 @@ impl Journal {
         }
     }
 
-    /// Batches of a part, how far the chunks are filled after it, and with what.
-    #[allow(clippy::type_complexity)] // of one caller
-    fn read(
-        &self,
-        path: &Path,
-        kept: &KeptRows,
-        [sources, words]: [usize; 2],
-    ) -> Result<(KeptState, Vec<Recorded>, Vec<u32>)> {
+    /// Reads the part that comes next.
+    fn read(&self, path: &Path, kept: &KeptRows, size: [usize; 2]) -> Result<Part> {
         let bad = |what: &str| Error::file(path, what);
-        let (header, lists): (Header, _) = FILE.read(path)?;
+        let part = Part::read(path, size)?;
+        let header = &part.header;
         if header.key != self.key {
             let what = "of another scene, other settings or another program";
             return Err(bad(what));
         }
-        let [from, to] = header
-            .filled
-            .map(|[chunk, used, rows]| KeptState { chunk, used, rows });
-        let is_next = header.filled[0] == array(self.filled[1])
-            && (to.chunk, to.used) >= (from.chunk, from.used);
         let fits = header.chunk_words == kept.chunk_words && header.chunks == kept.chunk_count();
-        let in_chunks = to.chunk <= header.chunks && to.used <= header.chunk_words;
-        if !(is_next && fits && in_chunks) {
+        if header.filled[0] != array(self.filled[1]) || !fits {
             return Err(bad("not what follows, or made with other memory"));
         }
-        let lists: std::result::Result<[Vec<u32>; 5], _> = lists.try_into();
-        let [batches, rows, runs, values, chunk_words] =
-            lists.map_err(|_| bad("its lists are not those of a part"))?;
-        let damaged = || bad("its rows are not rows of this scene");
-        let batches = Lists {
-            batches,
-            rows,
-            runs,
-            values,
-        };
-        let batches = batches.batches(sources, words).ok_or_else(damaged)?;
-        let is_kept = |record: &Record| {
-            record.chunk == NONE || (record.chunk, record.first) < (to.chunk, to.used)
-        };
-        let mut records = batches.iter().flat_map(|batch| &batch.rows);
-        if !records.all(|(record, _)| is_kept(record))
-            || chunk_words.len() != kept.words_between([from, to])
-        {
-            return Err(damaged());
+        match part.chunk_words.len() == kept.words_between(part.filled()) {
+            true => Ok(part),
+            false => Err(bad(FOREIGN_ROWS)),
         }
-        Ok((to, batches, chunk_words))
     }
 
     /// The recorded rows of the next batch; none after the last recorded batch.

@@ -98,7 +98,9 @@ impl Kind {
         for list in &mut lists {
             read(bytemuck::cast_slice_mut(list))?;
         }
-        if digest(&envelope.header, lists.iter().map(Vec::as_slice)) != envelope.sha256 {
+        let found = digest(&envelope.header, lists.iter().map(Vec::as_slice));
+        // A fuzzer would find no way past it.
+        if found != envelope.sha256 && !cfg!(fuzzing) {
             return Err(bad(format!(
                 "damaged: its {name} are not those that were written"
             )));
