@@ -21,6 +21,7 @@ use mesolux::math::directions::Directions;
 use mesolux::path_tracer::PathTracer;
 use mesolux::render::Light;
 use mesolux::solver::{Arriving, Place};
+use rayon::prelude::*;
 
 /// A room whose floor and back wall are black, so that a tilted facet there receives nothing from
 /// the surface that it lies on, in the path tracer as little as in a light map. A sheet stands in
@@ -249,7 +250,7 @@ fn tilted_normals_are_lit_as_the_path_tracer_has_them() {
     ];
     for (l, (part, light)) in lights.into_iter().enumerate() {
         // Two independent halves, so that noise falls out.
-        let truth: Vec<Vec<[Vec3; 2]>> = (chosen.iter().enumerate())
+        let truth: Vec<Vec<[Vec3; 2]>> = (chosen.par_iter().enumerate())
             .map(|(i, &t)| {
                 let each = facets(&frame(t)).into_iter().enumerate();
                 each.map(|(k, n)| {

@@ -15,6 +15,7 @@ use mesolux::export::texels::{Texel, borders, quarters};
 use mesolux::path_tracer::PathTracer;
 use mesolux::render::Light;
 use mesolux::scene::{LoadOptions, Refinement, Scene, displace, load};
+use rayon::prelude::*;
 
 fn scene(name: &str, patches: Option<usize>) -> Scene {
     let options = LoadOptions {
@@ -69,8 +70,8 @@ fn errors(surface: &Surface, map: &LightMap, traced: &Scene, count: usize, paths
         / all.len() as f64;
     let of = |texels: &[usize]| -> [f64; 2] {
         let step = 0.618_033_988_749_895;
-        let (mut square, mut bias, mut seen) = (0.0, 0.0, 0);
-        for i in 0..count {
+        // Its square and its bias, of a texel that a place is open of.
+        let error = |i: usize| -> Option<[f64; 2]> {
             let t = texels[((i as f64 * step).fract() * texels.len() as f64) as usize];
             let texel = &map.map.texels[t];
             let found = Part::Global.of(&map.light[t]).element_sum() / 3.0;
@@ -91,16 +92,14 @@ fn errors(surface: &Surface, map: &LightMap, traced: &Scene, count: usize, paths
                     open += 1.0;
                 }
             }
-            if open == 0.0 {
-                continue;
-            }
             let halves = halves.map(|half| half / open);
             let [a, b] = halves.map(|half| f64::from(found) - half);
-            square += a * b;
-            bias += 0.5 * (a + b);
-            seen += 1;
-        }
-        let seen = f64::from(seen);
+            (open > 0.0).then_some([a * b, 0.5 * (a + b)])
+        };
+        let errors: Vec<_> = (0..count).into_par_iter().filter_map(error).collect();
+        let [square, bias] = [0, 1].map(|k| errors.iter().map(|of| of[k]).sum::<f64>());
+        let seen = errors.len();
+        let seen = seen as f64;
         [(square / seen).max(0.0).sqrt() / mean, bias / seen / mean]
     };
     Errors {
