@@ -98,8 +98,7 @@ fn errors(surface: &Surface, map: &LightMap, traced: &Scene, count: usize, paths
         };
         let errors: Vec<_> = (0..count).into_par_iter().filter_map(error).collect();
         let [square, bias] = [0, 1].map(|k| errors.iter().map(|of| of[k]).sum::<f64>());
-        let seen = errors.len();
-        let seen = seen as f64;
+        let seen = errors.len() as f64;
         [(square / seen).max(0.0).sqrt() / mean, bias / seen / mean]
     };
     Errors {

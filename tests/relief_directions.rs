@@ -85,7 +85,7 @@ fn scene(case: &Case) -> Build {
 }
 
 /// What is asked: directions, the size of the sources over the default, and the most bias and rms
-/// over the mean. Measured with 16,000 paths, in the order of the cases: K = 16 bias +2.9, +0.9, +1.1, rms 5.1, 2.8,
+/// over the mean. Measured, in the order of the cases: K = 16 bias +2.9, +0.9, +1.1, rms 5.1, 2.8,
 /// 2.2 %; K = 64 +0.7, −0.4, +0.3; 2.7, 2.1, 2.0 %; K = 256 +0.2, −0.4, +0.4; 1.4, 1.2, 1.1 %.
 const ASKED: [(u32, f64, f64, f64); 3] = [
     (16, 1.0, 0.06, 0.1),
@@ -99,15 +99,6 @@ const LEAST_GAIN: [(Transport, f64); 2] = [(Transport::Lambert, 10.0), (Transpor
 /// the sun: there indirect light is the difference of two noisy numbers.
 const PENUMBRA: f32 = 0.01;
 
-/// Paths from each place. With 6,000 the noise of the truth is greater than what K = 256 is off,
-/// which then comes out as 0.0 to 1.3 % rms.
-fn paths() -> u32 {
-    match std::env::var_os("MESOLUX_TEST_FIGURES") {
-        Some(_) => 16_000,
-        None => 6_000,
-    }
-}
-
 /// Indirect light on the walls.
 struct Walls {
     places: Vec<Place>,
@@ -119,7 +110,7 @@ impl Walls {
         let fine = displace(scene).expect("it is small");
         let wanted = Wanted {
             sample: Sample::Some(300),
-            paths: paths(),
+            paths: 16_000,
             seed: 7,
             direct: true,
         };

@@ -22,13 +22,21 @@ const MTL: &[u8] = b"newmtl lamp\nKd 0.1 0.2 0.3\nKe 1 2 3\nnewmtl wall\nKd 0.5 
 const MAP: &[u8] = include_bytes!("../corpus/image/ramp.png");
 const LAMP: &[u8] = include_bytes!("../corpus/ies/ring.ies");
 
-/// A folder with these files, kept for the process: a run writes one of them again.
+/// What lies beside the file that is read, by name.
+const FILES: [(&str, &[u8]); 4] = [
+    ("a.obj", OBJ),
+    ("a.mtl", MTL),
+    ("a.png", MAP),
+    ("a.ies", LAMP),
+];
+
+/// A folder with [`FILES`], kept for the process: a run writes one of them again.
 struct Folder(TempDir);
 
 impl Folder {
-    fn new(files: &[(&str, &[u8])]) -> Self {
+    fn new() -> Self {
         let folder = Self(tempfile::tempdir().expect("a folder"));
-        files
+        FILES
             .iter()
             .for_each(|(name, bytes)| folder.write(name, bytes));
         folder
@@ -40,25 +48,18 @@ impl Folder {
 }
 
 thread_local! {
-    static FOLDER: Folder = Folder::new(&[
-        ("a.obj", OBJ), ("a.mtl", MTL), ("a.png", MAP), ("a.ies", LAMP),
-    ]);
+    static FOLDER: Folder = Folder::new();
 }
 
 /// Writes the bytes under a name, gives the path to `read`, and puts back what was there.
-fn with<T>(name: &str, bytes: &[u8], read: impl Fn(&Path) -> T) -> T {
+fn with(name: &str, bytes: &[u8], read: impl Fn(&Path)) {
     FOLDER.with(|folder| {
         folder.write(name, bytes);
-        let result = read(&folder.0.path().join(name));
-        match name {
-            "a.obj" => folder.write(name, OBJ),
-            "a.mtl" => folder.write(name, MTL),
-            "a.png" => folder.write(name, MAP),
-            "a.ies" => folder.write(name, LAMP),
-            _ => {}
+        read(&folder.0.path().join(name));
+        if let Some((_, before)) = FILES.iter().find(|(of, _)| *of == name) {
+            folder.write(name, before);
         }
-        result
-    })
+    });
 }
 
 /// Reads a scene and makes its elements.
