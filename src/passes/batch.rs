@@ -198,6 +198,7 @@ mod tests {
         let limits = Limits {
             max_storage_buffer_range: 128 << 20,
             max_texels: 128 << 20,
+            stored_texels: false,
             heap_bytes: 16 << 30,
             max_image_side: 16384,
             subgroup_size: 8,

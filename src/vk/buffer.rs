@@ -46,7 +46,7 @@ pub struct Buffer {
 
 pub(super) struct BufferOwner {
     pub(super) raw: vk::Buffer,
-    /// As texels of four words; null for other uses.
+    /// As texels of four words; null for other uses, and where texels are read from storage.
     view: vk::BufferView,
     bytes: u64,
     usage: BufferUse,
@@ -70,15 +70,16 @@ impl Buffer {
     /// A buffer that exceeds the device's memory, or its largest storage buffer.
     pub fn new(device: &Arc<Device>, name: &str, bytes: u64, usage: BufferUse) -> Result<Self> {
         let bytes = bytes.max(LEAST_BYTES);
-        if bytes > device.limits().max_storage_buffer_range && usage.is_bound_by_sets() {
+        let limits = device.limits();
+        let texels = usage.is_read_as_texels();
+        if bytes > limits.max_storage_buffer_range && usage.is_bound_by_sets() {
             return Err(Error::DeviceMemory {
                 device: device.name().to_owned(),
                 what: format!("{name}, above the device's largest storage buffer"),
                 bytes,
             });
         }
-        let texels = usage.is_read_as_texels();
-        if texels && bytes / TEXEL_BYTES > device.limits().max_texels {
+        if texels && bytes / TEXEL_BYTES > limits.max_texels {
             return Err(Error::DeviceMemory {
                 device: device.name().to_owned(),
                 what: format!("{name}, above the device's largest texel buffer"),
@@ -122,7 +123,7 @@ impl Buffer {
         // Stored before the check, so that a failure frees it.
         owner.allocation = RwLock::new(Some(allocation));
         bound.map_err(device.error("binding a buffer's memory"))?;
-        if texels {
+        if texels && !limits.stored_texels {
             let info = vk::BufferViewCreateInfo::default()
                 .buffer(raw)
                 .format(vk::Format::R32G32B32A32_UINT)

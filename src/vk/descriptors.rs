@@ -70,7 +70,7 @@ impl DescriptorLayout {
             .map(|(number, binding)| {
                 vk::DescriptorSetLayoutBinding::default()
                     .binding(number)
-                    .descriptor_type(binding.kind.raw())
+                    .descriptor_type(binding.kind.raw(device))
                     .descriptor_count(1)
                     .stage_flags(
                         vk::ShaderStageFlags::COMPUTE
@@ -123,7 +123,7 @@ impl DescriptorLayout {
                 let count = self.bindings.iter().filter(|b| b.kind == kind).count() as u32;
                 (count > 0).then(|| {
                     vk::DescriptorPoolSize::default()
-                        .ty(kind.raw())
+                        .ty(kind.raw(device))
                         .descriptor_count(count)
                 })
             })
@@ -158,9 +158,14 @@ impl DescriptorSetOwner {
         let write = vk::WriteDescriptorSet::default()
             .dst_set(self.raw)
             .dst_binding(binding)
-            .descriptor_type(bind.kind().raw());
+            .descriptor_type(bind.kind().raw(&self.device));
         match bind {
-            Bind::Storage(buffer) => {
+            Bind::Texels(buffer) if !self.device.limits().stored_texels => {
+                self.bound.hold(&buffer.owner);
+                let views = [buffer.view()];
+                self.update(write.texel_buffer_view(&views));
+            }
+            Bind::Storage(buffer) | Bind::Texels(buffer) => {
                 self.bound.hold(&buffer.owner);
                 let infos = [vk::DescriptorBufferInfo::default()
                     .buffer(buffer.owner.raw)
@@ -175,11 +180,6 @@ impl DescriptorSetOwner {
                     .image_layout(vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL)
                     .sampler(sampler.owner.raw)];
                 self.update(write.image_info(&infos));
-            }
-            Bind::Texels(buffer) => {
-                self.bound.hold(&buffer.owner);
-                let views = [buffer.view()];
-                self.update(write.texel_buffer_view(&views));
             }
         }
     }
@@ -201,9 +201,10 @@ impl Bind<'_> {
 }
 
 impl Binding {
-    fn raw(self) -> vk::DescriptorType {
+    fn raw(self, device: &Device) -> vk::DescriptorType {
         match self {
             Self::Storage => vk::DescriptorType::STORAGE_BUFFER,
+            Self::Texels if device.limits().stored_texels => vk::DescriptorType::STORAGE_BUFFER,
             Self::Sampled => vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
             Self::Texels => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
         }

@@ -13,7 +13,7 @@ use gpu_allocator::vulkan::{
 
 use super::instance::{Candidate, Instance, graphics_family};
 use super::uploads::Uploads;
-use super::{change_lists, lock, walk_lists};
+use super::{TEXEL_BYTES, change_lists, lock, walk_lists};
 use crate::error::{Error, Result};
 
 /// A device with one queue for graphics and compute.
@@ -41,12 +41,17 @@ pub(super) struct MemoryRequest<'a> {
     pub(super) linear: bool,
 }
 
+/// A device whose texel buffers hold less, 256 MiB, reads texels from storage.
+const FEW_TEXELS: u32 = 1 << 24;
+
 /// What the passes size themselves by.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
     pub max_storage_buffer_range: u64,
     /// Texels of a buffer that is read as such.
     pub max_texels: u64,
+    /// Whether shaders read texels from storage, since texel buffers hold too few.
+    pub stored_texels: bool,
     pub max_image_side: u32,
     pub subgroup_size: u32,
     /// Fractional bits of a rasterised vertex's position, in pixels.
@@ -250,9 +255,14 @@ fn allocator(instance: &Instance, candidate: &Candidate, raw: &ash::Device) -> R
 
 impl Limits {
     fn new(candidate: &Candidate, limits: &vk::PhysicalDeviceLimits) -> Self {
+        let stored_texels = limits.max_texel_buffer_elements < FEW_TEXELS;
         Self {
             max_storage_buffer_range: candidate.max_storage_buffer_range,
-            max_texels: limits.max_texel_buffer_elements.into(),
+            max_texels: match stored_texels {
+                true => candidate.max_storage_buffer_range / TEXEL_BYTES,
+                false => limits.max_texel_buffer_elements.into(),
+            },
+            stored_texels,
             max_image_side: candidate.max_image_side,
             subgroup_size: candidate.subgroup_size,
             subpixel_bits: limits.sub_pixel_precision_bits.clamp(4, 16),

@@ -21,6 +21,7 @@ mod pipeline;
 mod render_pass;
 mod sampler;
 mod shader;
+mod stored_texels;
 #[cfg(feature = "window")]
 mod surface;
 #[cfg(feature = "window")]

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::descriptors::{DescriptorLayout, DescriptorSetOwner};
+use super::stored_texels::stored_texels;
 use super::{Device, Interface, ShaderParameters};
 use crate::error::Result;
 
@@ -89,7 +90,9 @@ pub(super) struct Module<'a> {
 
 impl<'a> Module<'a> {
     pub(super) fn new(device: &'a Device, spirv: &[u32]) -> Result<Self> {
-        let info = vk::ShaderModuleCreateInfo::default().code(spirv);
+        let stored = device.limits().stored_texels.then(|| stored_texels(spirv));
+        let code = stored.as_deref().unwrap_or(spirv);
+        let info = vk::ShaderModuleCreateInfo::default().code(code);
         // SAFETY: the words are a module that the build checked.
         let raw = unsafe { device.raw.create_shader_module(&info, None) }
             .map_err(device.error("loading a shader"))?;
