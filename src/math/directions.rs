@@ -19,6 +19,18 @@ pub struct Directions {
     pub rows: u32,
 }
 
+/// The direction that is nearest to another; the first of several.
+pub fn nearest_of(directions: &[DVec3], to: DVec3) -> usize {
+    let mut best = (0, f64::NEG_INFINITY);
+    for (k, direction) in directions.iter().enumerate() {
+        let cosine = direction.dot(to);
+        if cosine > best.1 {
+            best = (k, cosine);
+        }
+    }
+    best.0
+}
+
 /// Cells along a side of the square for integrals over slots: the cells of every K are unions of
 /// whole ones.
 pub const FINE: u32 = FINE_DIRECTIONS;
@@ -67,11 +79,12 @@ impl Directions {
 
     /// The slot whose middle is nearest to a direction (unit, z up); the first of several.
     pub fn nearest(&self, direction: DVec3) -> usize {
-        let cosine = |slot: &usize| self.centre(*slot).dot(direction);
-        (0..self.count()).fold(0, |best, slot| match cosine(&slot) > cosine(&best) {
-            true => slot,
-            false => best,
-        })
+        nearest_of(&self.centres(), direction)
+    }
+
+    /// [`Self::centre`] of each slot.
+    pub fn centres(&self) -> Vec<DVec3> {
+        (0..self.count()).map(|slot| self.centre(slot)).collect()
     }
 
     /// The direction at the centre of a slot's cell.

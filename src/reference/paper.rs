@@ -4,7 +4,7 @@
 use glam::DVec3;
 
 use crate::constants::{KIND_POINT, NONE};
-use crate::math::directions::Directions;
+use crate::math::directions::{Directions, nearest_of};
 use crate::math::hemicube::{Pixel, delta_form_factor, direction_of, solid_angle_share};
 use crate::mesh::elements::Elements;
 use crate::mesh::sources::Source;
@@ -16,6 +16,8 @@ pub struct Program<'a> {
     relief: Option<&'a Relief>,
     sources: &'a [Source],
     directions: Directions,
+    /// Of the directions, `[direction]`.
+    centres: Vec<DVec3>,
     first_relief: usize,
     /// W·m⁻², RGB, `[element]`; a patch with relief has the sum of its directions.
     pub direct: Vec<DVec3>,
@@ -45,6 +47,7 @@ impl<'a> Program<'a> {
             elements,
             relief,
             sources,
+            centres: directions.centres(),
             directions,
             first_relief,
             direct: vec![DVec3::ZERO; elements.len()],
@@ -174,10 +177,10 @@ impl<'a> Program<'a> {
         let k = self.directions.count();
         let m = j - self.first_relief;
         let from = -DVec3::from_array(frame(self.elements, relief, j).map(|axis| axis.dot(ray)));
-        self.incoming[m * k + self.directions.nearest(from)] += brought;
+        self.incoming[m * k + nearest_of(&self.centres, from)] += brought;
         let facet = self.texel(relief, j, eye, ray);
         for out in 0..k {
-            if facet.normal.dot(self.directions.centre(out)) > 0.0 {
+            if facet.normal.dot(self.centres[out]) > 0.0 {
                 self.outgoing[m * k + out] += facet.reflectance.as_dvec3() * brought;
             }
         }

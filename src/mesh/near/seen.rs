@@ -75,6 +75,8 @@ struct Far {
     /// Sine of the largest angle between the axis and a member's normal; 0 of a part in one plane,
     /// and more than 1 of one that turns further than a right angle.
     turned: f64,
+    /// [`front`] as four points, times the area.
+    front: f64,
 }
 
 impl Seen {
@@ -275,6 +277,7 @@ impl Far {
             vector_area: area * normal,
             spread: spread(normal, triangle.map(|v| (v - centre) / 12_f64.sqrt())),
             turned: 0.0,
+            front: front(0.0, 1.0 / AS_POINTS) * area,
         }
     }
 
@@ -294,6 +297,12 @@ impl Far {
         let cosines = members.iter().map(|m| m.vector_area.dot(axis) / m.area);
         let cosine = cosines.fold(1.0, f64::min);
         let sine = (1.0 - cosine * cosine).sqrt();
+        let turned = match plane {
+            true => 0.0,
+            false if cosine <= 0.0 => 2.0,
+            // Members at several heights may face one way.
+            false => sine.max(1e-9),
+        };
         Self {
             centre,
             radius: radii.fold(0.0, f64::max),
@@ -302,12 +311,8 @@ impl Far {
             area,
             vector_area,
             spread,
-            turned: match plane {
-                true => 0.0,
-                false if cosine <= 0.0 => 2.0,
-                // Members at several heights may face one way.
-                false => sine.max(1e-9),
-            },
+            turned,
+            front: front(turned, 1.0 / AS_POINTS) * area,
         }
     }
 
@@ -325,8 +330,7 @@ impl Far {
         if square <= least * least || self.turned > NARROW {
             return None;
         }
-        let front = front(self.turned, 1.0 / AS_POINTS) * self.area;
-        if !is_plane && facing * facing <= front * front * square {
+        if !is_plane && facing * facing <= self.front * self.front * square {
             return None;
         }
         if facing <= 0.0 {
@@ -334,9 +338,13 @@ impl Far {
         }
         let [a, b] = self.spread;
         let points = [a + b, a - b, b - a, -a - b].map(|off| way + off);
-        let of = |way: &DVec3| *way / way.length_squared().powi(2);
+        if !self.is_above(p, n) {
+            return None;
+        }
+        let over = points.map(|way| way.length_squared().powi(2).recip());
         let share = facing / (4.0 * std::f64::consts::PI);
-        (self.is_above(p, n)).then(|| share * points.iter().map(of).sum::<DVec3>())
+        let sum = |[a, b, c, d]: [DVec3; 4]| (a + b) + (c + d);
+        Some(share * sum(std::array::from_fn(|k| points[k] * over[k])))
     }
 
     /// About the form factor from a place, rather too large than too small; none where the part
