@@ -1,6 +1,7 @@
 //! Images and swapchain of the window's frames.
 
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use winit::window::Window;
 
@@ -19,10 +20,15 @@ pub struct Screen {
     surface: Option<Arc<Surface>>,
     pass: RenderPass,
     format: Format,
+    /// Since when the window has refused every frame.
+    refused: Option<Instant>,
     device: Arc<Device>,
     instance: Arc<Instance>,
     window: Arc<Window>,
 }
+
+/// A window that refuses every frame for so long is not going to show one.
+const PATIENCE: Duration = Duration::from_secs(10);
 
 /// A frame before it is copied to the window.
 struct Target {
@@ -73,6 +79,7 @@ impl Screen {
             surface: Some(surface),
             pass,
             format,
+            refused: None,
             device,
             instance,
             window: Arc::clone(window),
@@ -132,7 +139,7 @@ impl Screen {
     /// `capture`, reads it back. Call it after [`Self::fit`] has returned a size.
     ///
     /// # Errors
-    /// A device that fails.
+    /// A device that fails; a window that refuses every frame for ten seconds.
     pub fn show(
         &mut self,
         capture: bool,
@@ -161,11 +168,13 @@ impl Screen {
             }
             Ok(())
         })?;
-        if shown == Shown::Lost {
-            self.lose();
+        match shown {
+            Shown::Yes | Shown::Misfit => self.refused = None,
+            Shown::Late => {}
+            Shown::Stale | Shown::Lost => self.refuse(shown)?,
         }
         // An abandoned frame has drawn nothing.
-        let readback = readback.filter(|_| shown == Shown::Yes);
+        let readback = readback.filter(|_| shown.is_seen());
         let captured = readback.map(|readback| {
             let blue_first = self.format == Format::B8G8R8A8_UNORM;
             let texels: Vec<[u8; 4]> = readback.read(0, (bytes / 4) as usize);
@@ -179,6 +188,20 @@ impl Screen {
             }
         });
         Ok((shown, captured))
+    }
+
+    fn refuse(&mut self, shown: Shown) -> Result<()> {
+        if shown == Shown::Lost {
+            self.lose();
+        }
+        let since = *self.refused.get_or_insert_with(Instant::now);
+        match since.elapsed() > PATIENCE {
+            true => Err(Error::Display(format!(
+                "the window has refused every frame for {} s",
+                PATIENCE.as_secs()
+            ))),
+            false => Ok(()),
+        }
     }
 }
 

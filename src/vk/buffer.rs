@@ -7,7 +7,7 @@ use bytemuck::Pod;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::Allocation;
 
-use super::device::MemoryRequest;
+use super::device::{MemoryRequest, Resource};
 use super::held::Held;
 use super::uploads::Content;
 use super::{Device, lock};
@@ -112,7 +112,7 @@ impl Buffer {
             // SAFETY: the buffer is of this device.
             requirements: unsafe { device.raw.get_buffer_memory_requirements(raw) },
             location: usage.location(),
-            linear: true,
+            of: Resource::Buffer(raw),
         })?;
         // SAFETY: the allocation meets this buffer's requirements and is bound once.
         let bound = unsafe {

@@ -6,10 +6,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use ash::{ext, khr, vk};
-use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{
     Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc,
 };
+use gpu_allocator::{AllocationSizes, MemoryLocation};
 
 use super::instance::{Candidate, Instance, graphics_family};
 use super::uploads::Uploads;
@@ -37,8 +37,14 @@ pub(super) struct MemoryRequest<'a> {
     pub(super) name: &'a str,
     pub(super) requirements: vk::MemoryRequirements,
     pub(super) location: MemoryLocation,
-    /// Of a buffer, as opposed to an image.
-    pub(super) linear: bool,
+    pub(super) of: Resource,
+}
+
+/// What memory is for.
+#[derive(Clone, Copy)]
+pub(super) enum Resource {
+    Buffer(vk::Buffer),
+    Image(vk::Image),
 }
 
 /// A device whose texel buffers hold less, 256 MiB, reads texels from storage.
@@ -147,19 +153,27 @@ impl Device {
 
     pub(super) fn allocate(&self, request: &MemoryRequest<'_>) -> Result<Allocation> {
         let requirements = request.requirements;
-        self.allocator()
-            .allocate(&AllocationCreateDesc {
-                name: request.name,
-                requirements,
-                location: request.location,
-                linear: request.linear,
-                allocation_scheme: AllocationScheme::GpuAllocatorManaged,
-            })
-            .map_err(|_| Error::DeviceMemory {
-                device: self.name().to_owned(),
-                what: request.name.to_owned(),
-                bytes: requirements.size,
-            })
+        let mut desc = AllocationCreateDesc {
+            name: request.name,
+            requirements,
+            location: request.location,
+            linear: matches!(request.of, Resource::Buffer(_)),
+            allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+        };
+        let mut allocator = self.allocator();
+        let found = allocator.allocate(&desc).or_else(|_| {
+            // Where there is no room for a block of many, there may be for it alone.
+            desc.allocation_scheme = match request.of {
+                Resource::Buffer(buffer) => AllocationScheme::DedicatedBuffer(buffer),
+                Resource::Image(image) => AllocationScheme::DedicatedImage(image),
+            };
+            allocator.allocate(&desc)
+        });
+        found.map_err(|_| Error::DeviceMemory {
+            device: self.name().to_owned(),
+            what: request.name.to_owned(),
+            bytes: requirements.size,
+        })
     }
 
     pub(super) fn free(&self, allocation: Allocation) {
@@ -248,7 +262,10 @@ fn allocator(instance: &Instance, candidate: &Candidate, raw: &ash::Device) -> R
         physical_device: candidate.raw,
         debug_settings: Default::default(),
         buffer_device_address: true,
-        allocation_sizes: Default::default(),
+        // Blocks grow as more are needed, so that a small scene takes little.
+        allocation_sizes: AllocationSizes::new(4 << 20, 4 << 20)
+            .with_max_device_memblock_size(256 << 20)
+            .with_max_host_memblock_size(64 << 20),
     })
     .map_err(|e| Error::Device(format!("{}: allocator: {e}", candidate.name)))
 }

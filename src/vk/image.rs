@@ -7,7 +7,7 @@ use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::Allocation;
 
 use super::Device;
-use super::device::MemoryRequest;
+use super::device::{MemoryRequest, Resource};
 use crate::error::{Error, Result};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -138,7 +138,7 @@ impl ImageOwner {
             // SAFETY: the image is of this device.
             requirements: unsafe { device.raw.get_image_memory_requirements(self.raw) },
             location: MemoryLocation::GpuOnly,
-            linear: false,
+            of: Resource::Image(self.raw),
         })?;
         // SAFETY: the allocation meets this image's requirements and is bound once.
         let bound = unsafe {

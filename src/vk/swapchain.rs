@@ -11,10 +11,21 @@ use crate::error::{Error, Result};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shown {
     Yes,
-    /// The window has another size, or none of its images was free in time: make a new swapchain.
+    /// It was shown, and the images no longer fit the window well: make a new swapchain.
+    Misfit,
+    /// None of the images was free in time: make a new swapchain.
+    Late,
+    /// The window has another size: make a new swapchain.
     Stale,
     /// The surface is lost: make a new surface and a new swapchain.
     Lost,
+}
+
+impl Shown {
+    /// Whether the frame can be seen.
+    pub fn is_seen(self) -> bool {
+        matches!(self, Self::Yes | Self::Misfit)
+    }
 }
 
 /// The images of a window, into which frames are copied.
@@ -179,7 +190,7 @@ impl Swapchain {
         };
         commands.wait()?;
         match presented {
-            Ok(also) if also || suboptimal => Ok(Shown::Stale),
+            Ok(also) if also || suboptimal => Ok(Shown::Misfit),
             Ok(_) => Ok(Shown::Yes),
             Err(e) => shown(device, e),
         }
@@ -289,9 +300,8 @@ fn extent(capabilities: &vk::SurfaceCapabilitiesKHR, (width, height): (u32, u32)
 /// What became of a frame, by an answer other than success.
 fn shown(device: &Device, answer: vk::Result) -> Result<Shown> {
     match answer {
-        vk::Result::ERROR_OUT_OF_DATE_KHR | vk::Result::TIMEOUT | vk::Result::NOT_READY => {
-            Ok(Shown::Stale)
-        }
+        vk::Result::ERROR_OUT_OF_DATE_KHR => Ok(Shown::Stale),
+        vk::Result::TIMEOUT | vk::Result::NOT_READY => Ok(Shown::Late),
         vk::Result::ERROR_SURFACE_LOST_KHR => Ok(Shown::Lost),
         e => Err(device.error("showing a frame")(e)),
     }

@@ -2,8 +2,8 @@
 //! program and its driver.
 //!
 //! `MESOLUX_FAULT="vkCreateBuffer 3 -2"`: the third call of vkCreateBuffer gives
-//! `VK_ERROR_OUT_OF_DEVICE_MEMORY` and is not passed on. After `VK_ERROR_DEVICE_LOST` (−4) the
-//! device stays lost. `MESOLUX_FAULT_CALLS=FILE` writes the name of each call to a file.
+//! `VK_ERROR_OUT_OF_DEVICE_MEMORY` and is not passed on; `3+`: and so do all after it. After
+//! `VK_ERROR_DEVICE_LOST` (−4) the device stays lost. `MESOLUX_FAULT_CALLS=FILE` writes the name of each call to a file.
 //!
 //! Arguments are integers and pointers, which registers and the stack hold alike; all are passed on
 //! as words.
@@ -27,6 +27,8 @@ struct Fault {
     name: String,
     /// From 1.
     call: usize,
+    /// Whether all calls from there on fail.
+    on: bool,
     result: i32,
 }
 
@@ -35,9 +37,11 @@ fn fault() -> Option<&'static Fault> {
     let read = || {
         let text = std::env::var("MESOLUX_FAULT").ok()?;
         let mut words = text.split(' ');
+        let (name, call) = (words.next()?, words.next()?);
         Some(Fault {
-            name: words.next()?.into(),
-            call: words.next()?.parse().ok()?,
+            name: name.into(),
+            call: call.trim_end_matches('+').parse().ok()?,
+            on: call.ends_with('+'),
             result: words.next()?.parse().ok()?,
         })
     };
@@ -64,7 +68,10 @@ fn fails(name: &str, count: &AtomicUsize) -> Option<i32> {
     if LOST.load(SeqCst) && name.starts_with("vkQueue") {
         return Some(DEVICE_LOST);
     }
-    let fault = fault().filter(|fault| fault.name == name && fault.call == call)?;
+    let fault = fault().filter(|fault| fault.name == name)?;
+    if call != fault.call && !(fault.on && call > fault.call) {
+        return None;
+    }
     LOST.fetch_or(fault.result == DEVICE_LOST, SeqCst);
     Some(fault.result)
 }

@@ -5,6 +5,11 @@
 //! every call does, which takes an hour.
 #![cfg(target_os = "linux")]
 
+#[cfg(feature = "window")]
+#[allow(dead_code)] // it is of the tests of the window
+#[path = "../view/display.rs"]
+mod display;
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -70,8 +75,8 @@ fn room(relief: bool) -> TempDir {
 /// How a run ended: its exit code (none: by a signal), and what it wrote to stderr.
 type End = (Option<i32>, String);
 
-/// Runs the program below the layer.
-fn run(folder: &Path, arguments: &str, (variable, value): (&str, &str)) -> End {
+/// Runs the program below the layer, on a display if it opens a window.
+fn run(folder: &Path, arguments: &str, display: &str, (variable, value): (&str, &str)) -> End {
     let device = std::env::var("MESOLUX_TEST_DEVICE").unwrap_or("0".into());
     let log = folder.join("stderr");
     let mut child = Command::new(env!("CARGO_BIN_EXE_mesolux"))
@@ -83,6 +88,8 @@ fn run(folder: &Path, arguments: &str, (variable, value): (&str, &str)) -> End {
         .env("NODEVICE_SELECT", "1")
         // Its layer is not in that folder.
         .env_remove("MESOLUX_VALIDATE")
+        .env("DISPLAY", display)
+        .env_remove("WAYLAND_DISPLAY")
         .env(variable, value)
         .stdout(Stdio::null())
         .stderr(fs::File::create(&log).expect("a file"))
@@ -107,10 +114,10 @@ fn run(folder: &Path, arguments: &str, (variable, value): (&str, &str)) -> End {
 }
 
 /// The calls of a run that goes well, by function.
-fn calls(folder: &Path, arguments: &str) -> BTreeMap<String, usize> {
+fn calls(folder: &Path, arguments: &str, display: &str) -> BTreeMap<String, usize> {
     let file = folder.join("calls");
     let name = file.to_str().expect("UTF-8");
-    let (code, told) = run(folder, arguments, ("MESOLUX_FAULT_CALLS", name));
+    let (code, told) = run(folder, arguments, display, ("MESOLUX_FAULT_CALLS", name));
     assert_eq!(code, Some(0), "{told}");
     let text = fs::read_to_string(&file).expect("the layer is called");
     fs::remove_file(&file).expect("it is there");
@@ -168,8 +175,13 @@ fn names(folder: &Path) -> Vec<PathBuf> {
 
 /// Lets calls of a command fail that writes `output`.
 fn sweep(made: &(dyn Fn() -> TempDir + Sync), arguments: &str, output: &str) {
+    sweep_on("", made, arguments, output);
+}
+
+/// The same of a command that opens a window.
+fn sweep_on(display: &str, made: &(dyn Fn() -> TempDir + Sync), arguments: &str, output: &str) {
     let good = made();
-    let calls = calls(good.path(), arguments);
+    let calls = calls(good.path(), arguments, display);
     let right = content(&good.path().join(output));
     let files = names(good.path());
     let all = std::env::var_os("MESOLUX_TEST_FIGURES").is_some();
@@ -192,7 +204,7 @@ fn sweep(made: &(dyn Fn() -> TempDir + Sync), arguments: &str, output: &str) {
             let path = folder.path().join(output);
             fs::write(&path, OLD).expect("written");
             let fault = format!("{function} {call} {result}");
-            let (code, told) = run(folder.path(), arguments, ("MESOLUX_FAULT", &fault));
+            let (code, told) = run(folder.path(), arguments, display, ("MESOLUX_FAULT", &fault));
             let lines = (told.lines().filter(|line| line.starts_with("mesolux: "))).count();
             let went_on = code == Some(0);
             let right = match code {
@@ -238,19 +250,65 @@ fn a_bake_on_two_devices() {
     sweep(&|| room(false), &arguments, "out.safetensors");
 }
 
+/// Folders with the scene and its bake.
+fn baked(relief: bool, arguments: &str) -> impl Fn() -> TempDir + Sync {
+    let baked = room(relief);
+    let (code, told) = run(baked.path(), arguments, "", ("NO_COLOR", "1"));
+    assert_eq!(code, Some(0), "{told}");
+    move || {
+        let folder = room(relief);
+        let copy = |name| fs::copy(baked.path().join(name), folder.path().join(name));
+        copy("out.safetensors").expect("copied");
+        fs::write(folder.path().join("script"), SCRIPT).expect("written");
+        folder
+    }
+}
+
 #[test]
 #[ignore = "long: runs by scripts/test --all"]
 fn a_picture() {
-    let baked = room(true);
     let arguments = format!("{BAKE} --directions 16");
-    let (code, told) = run(baked.path(), &arguments, ("NO_COLOR", "1"));
-    assert_eq!(code, Some(0), "{told}");
-    let made = || {
-        let folder = room(true);
-        let copy = |name| fs::copy(baked.path().join(name), folder.path().join(name));
-        copy("out.safetensors").expect("copied");
-        folder
-    };
+    let made = baked(true, &arguments);
     let arguments = "render out.safetensors --size 32x24 -o out.png --device DEVICE";
     sweep(&made, arguments, "out.png");
+}
+
+/// Frame times differ from run to run.
+const SCRIPT: &str = "set panel off\nset detail off\nframes 2\nscreenshot out.png\n";
+const VIEW: &str = "view out.safetensors --script script --size 64x48 --device DEVICE";
+
+#[cfg(feature = "window")]
+#[test]
+#[ignore = "long: runs by scripts/test --all"]
+fn a_window() {
+    let display = display::Display::new();
+    sweep_on(&display.name, &baked(false, BAKE), VIEW, "out.png");
+}
+
+/// A window that takes no frame, for ever.
+#[cfg(feature = "window")]
+#[test]
+#[ignore = "long: runs by scripts/test --all"]
+fn a_window_that_refuses_every_frame() {
+    const OUT_OF_DATE: i32 = -1_000_001_004;
+    const SURFACE_LOST: i32 = -1_000_000_000;
+    let display = display::Display::new();
+    let made = baked(false, BAKE);
+    for function in ["vkAcquireNextImageKHR", "vkQueuePresentKHR"] {
+        for result in [OUT_OF_DATE, SURFACE_LOST] {
+            let fault = format!("{function} 1+ {result}");
+            let folder = made();
+            let (code, told) = run(
+                folder.path(),
+                VIEW,
+                &display.name,
+                ("MESOLUX_FAULT", &fault),
+            );
+            assert_eq!(code, Some(2), "{fault}: {told}");
+            assert!(
+                told.contains("has refused every frame for 10 s"),
+                "{fault}: {told}"
+            );
+        }
+    }
 }

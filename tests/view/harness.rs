@@ -1,62 +1,18 @@
-//! A display in memory, a room to show on it, and the program that shows it, driven by a script.
+//! A room to show on a display, and the program that shows it, driven by a script.
 
-use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use image::RgbImage;
 
+use crate::display::Display;
+
 /// Pixels of the tests' windows.
 pub const SIZE: &str = "320x240";
 
 /// How the room is lit: with the elements of its squares, so that outlines are seen.
 const DRAFT: [&str; 5] = ["--quality", "draft", "--directions", "16", "--no-refine"];
-
-/// A display in memory, gone with the test.
-pub struct Display {
-    server: Child,
-    pub name: String,
-}
-
-impl Display {
-    pub fn new() -> Self {
-        let mut server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", "1024x768x24"])
-            .args(["-nolisten", "tcp"])
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .expect("the tests need Xvfb (Debian: xvfb)");
-        let mut number = String::new();
-        let out = server.stdout.take().expect("piped");
-        BufReader::new(out)
-            .read_line(&mut number)
-            .expect("the display tells its number");
-        Self {
-            server,
-            name: format!(":{}", number.trim()),
-        }
-    }
-
-    /// What a person does on it, by xdotool; returns what that prints.
-    pub fn xdotool(&self, args: &[&str]) -> String {
-        let done = Command::new("xdotool")
-            .args(args)
-            .env("DISPLAY", &self.name)
-            .output()
-            .expect("the tests need xdotool");
-        assert!(done.status.success(), "xdotool {args:?}: {}", told(&done));
-        String::from_utf8_lossy(&done.stdout).trim().to_owned()
-    }
-}
-
-impl Drop for Display {
-    fn drop(&mut self) {
-        let _ = self.server.kill();
-        let _ = self.server.wait();
-    }
-}
 
 pub fn mesolux(folder: &Path, args: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_mesolux"));

@@ -2,6 +2,7 @@
 //! screen, nothing is left behind, and the validation layer stays silent.
 #![cfg(all(target_os = "linux", feature = "window"))]
 
+mod display;
 mod harness;
 mod screens;
 
@@ -11,6 +12,7 @@ use std::time::{Duration, Instant};
 
 use image::RgbImage;
 
+use display::Display;
 use harness::*;
 
 /// Frame times would tell two pictures of one view apart; detailed pictures come when they come.

@@ -1,6 +1,7 @@
 //! Without a screen, and on one that others use.
 
 use super::QUIET;
+use super::display::Display;
 use super::harness::*;
 
 #[test]

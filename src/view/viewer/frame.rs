@@ -41,7 +41,6 @@ impl Viewer {
         let Some(size) = self.screen.fit(self.size, self.stale)? else {
             return Ok(false);
         };
-        self.stale = false;
         let primitives = self.panel(size)?;
         self.want_detail(size);
         let panel = self.panel_pass.prepare(&primitives, size, self.scale)?;
@@ -53,8 +52,8 @@ impl Viewer {
             prepared: Instant::now(),
         };
         let (answer, captured) = self.draw(size, &panel, &shown)?;
-        if answer != Shown::Yes {
-            self.stale = true;
+        self.stale = answer != Shown::Yes;
+        if !answer.is_seen() {
             self.unanswered = unanswered;
             return Ok(false);
         }
