@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use mesolux::passes::shaders;
 use mesolux::structs::{self, Struct};
-use mesolux::vk::Binding;
+use mesolux::vk::{Binding, stored_texels};
 
 // Of the SPIR-V specification.
 const OP_TYPE_INT: u32 = 21;
@@ -23,6 +23,7 @@ const ARRAY_STRIDE: u32 = 6;
 const BINDING: u32 = 33;
 const OFFSET: u32 = 35;
 const PUSH_CONSTANT: u32 = 9;
+const STORAGE_BUFFER: u32 = 12;
 const DIM_BUFFER: u32 = 5;
 
 /// Operations and their operands.
@@ -208,4 +209,45 @@ fn bindings_and_push_constants_are_those_of_the_spirv() {
             "push constants of {name}"
         );
     }
+}
+
+/// What devices with small texel buffers load has a storage buffer in the place of each.
+#[test]
+fn no_texel_buffer_is_left_where_texels_are_stored() {
+    let declared = |words: &[u32], class: u32| {
+        let of = |&(operation, operands): &(u32, &[u32])| {
+            operation == OP_VARIABLE && operands[2] == class
+        };
+        instructions(words).filter(of).count()
+    };
+    // A variable of a texel buffer; those of images stay.
+    let texel_buffers = |words: &[u32]| {
+        let mut types = BTreeSet::new();
+        let mut count = 0;
+        for (operation, operands) in instructions(words) {
+            match (operation, operands) {
+                (OP_TYPE_IMAGE, &[id, _, DIM_BUFFER, ..]) => {
+                    types.insert(id);
+                }
+                (OP_TYPE_SAMPLED_IMAGE, &[id, of]) | (OP_TYPE_POINTER, &[id, _, of])
+                    if types.contains(&of) =>
+                {
+                    types.insert(id);
+                }
+                (OP_VARIABLE, &[of, ..]) if types.contains(&of) => count += 1,
+                _ => {}
+            }
+        }
+        count
+    };
+    let mut all = 0;
+    for words in shaders::ALL.iter().flat_map(|compiled| compiled.stages) {
+        let (before, stored) = (texel_buffers(words), stored_texels(words));
+        assert_eq!(texel_buffers(&stored), 0);
+        let [now, then] = [&stored, *words].map(|words| declared(words, STORAGE_BUFFER));
+        assert_eq!(now, then + before);
+        assert_eq!(before == 0, stored == *words);
+        all += before;
+    }
+    assert!(all > 50, "{all} texel buffers");
 }

@@ -7,6 +7,7 @@ pub mod quality;
 pub mod solution;
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use crate::bake::solution::Solution;
 use crate::error::Result;
@@ -55,6 +56,7 @@ pub fn solve_on(
     kept: Option<&Visibility>,
     go_on: impl FnMut(&Update) -> bool,
 ) -> Result<Solver> {
+    let start = Instant::now();
     let first = solver::check_devices(devices, settings)?;
     let elements = elements(first, scene, settings)?;
     if let Some(kept) = kept {
@@ -66,6 +68,7 @@ pub fn solve_on(
         let rows = kept.map(Visibility::described).unwrap_or_default();
         solver.keep_checkpoints(&format!("{} {rows}", scene.hash()))?;
     }
+    solver.spend(start.elapsed());
     solver.run(go_on)?;
     Ok(solver)
 }

@@ -336,7 +336,7 @@ struct Printed<'a> {
 pub fn run(options: &Options) -> Result<()> {
     let start = Instant::now();
     set_threads(options.threads)?;
-    let settings = Settings {
+    let mut settings = Settings {
         checkpoints: options.checkpoints()?,
         ..options.solve.settings()?
     };
@@ -357,6 +357,8 @@ pub fn run(options: &Options) -> Result<()> {
         .map(|bake| kept_with(bake))
         .transpose()?;
     let devices = options.device.open()?;
+    let budget = settings.budget;
+    settings.budget = budget.map(|budget| budget.saturating_sub(start.elapsed()));
     let solver = solve_visibly(&devices, &scene, &settings, kept.as_ref())?;
     let solution = mesolux::bake::solution(&scene, &solver)?;
     refuse_darkness(&scene, &solution)?;

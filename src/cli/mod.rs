@@ -13,6 +13,8 @@ mod devices;
 mod export;
 mod info;
 mod inside;
+#[cfg(unix)]
+mod out_of_memory;
 mod pareto;
 mod progress;
 mod reference;

@@ -35,7 +35,7 @@ mod visibility;
 mod word_file;
 
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use glam::{DVec3, Vec3, Vec4};
 use sha2::{Digest, Sha256};
@@ -197,6 +197,12 @@ impl Solver {
         let key = format!("{maker}\n{devices:?}\n{scene}\n{}", settings.key());
         let key = word_file::hexadecimal(Sha256::new_with_prefix(key));
         spine.keep_checkpoints(checkpoints, key, &mut self.report)
+    }
+
+    /// Takes time that has gone by from the budget.
+    pub fn spend(&mut self, time: Duration) {
+        let budget = &mut self.problem.settings.budget;
+        *budget = budget.map(|budget| budget.saturating_sub(time));
     }
 
     /// Solves until a stop rule holds, or `go_on` says no. What has been solved so far is always

@@ -59,7 +59,7 @@ pub struct Settings {
     pub places: u32,
     /// Stops when the error bound is no more than this.
     pub residual: f64,
-    /// Stops after this time.
+    /// Stops after this time; that of [`crate::bake::solve_on`] begins with the set-up.
     pub budget: Option<Duration>,
     /// Stops after this many shots.
     pub shots: Option<u32>,

@@ -46,6 +46,7 @@ pub use shader::{
     ComputeShader, GraphicsShaders, Interface, ShaderBinding, ShaderBindings, ShaderParameter,
     ShaderParameters,
 };
+pub use stored_texels::stored_texels;
 #[cfg(feature = "window")]
 pub use surface::Surface;
 #[cfg(feature = "window")]

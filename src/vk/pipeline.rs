@@ -5,8 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::descriptors::{DescriptorLayout, DescriptorSetOwner};
-use super::stored_texels::stored_texels;
-use super::{Device, Interface, ShaderParameters};
+use super::{Device, Interface, ShaderParameters, stored_texels};
 use crate::error::Result;
 
 /// A pipeline with its layouts.

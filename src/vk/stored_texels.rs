@@ -32,7 +32,7 @@ const BOUND: usize = 3;
 
 /// A module with storage buffers of texels, four words each, in the place of its texel buffers, at
 /// the same bindings. One without texel buffers stays as it is.
-pub(super) fn stored_texels(words: &[u32]) -> Vec<u32> {
+pub fn stored_texels(words: &[u32]) -> Vec<u32> {
     let texels = Texels::of(words);
     let (Some(uint), Some(texel)) = (texels.uint, texels.texel) else {
         return words.to_vec();
@@ -150,39 +150,4 @@ fn instructions(words: &[u32]) -> impl Iterator<Item = (u16, &[u32])> {
         rest = after;
         Some((first as u16, &instruction[1..]))
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::passes::shaders;
-
-    /// What is left of texel buffers in a module.
-    fn left(words: &[u32]) -> (usize, usize) {
-        let texels = Texels::of(words);
-        (texels.variables.len(), texels.images.len())
-    }
-
-    #[test]
-    fn no_texel_buffer_is_left() {
-        let mut changed = 0;
-        for words in shaders::ALL.iter().flat_map(|compiled| compiled.stages) {
-            let stored = stored_texels(words);
-            assert_eq!(left(&stored), (0, 0));
-            let declared = |words: &[u32], class: u32| {
-                let of = |(operation, operands): (u16, &[u32])| {
-                    operation == OP_VARIABLE && operands[2] == class
-                };
-                instructions(words).filter(|&i| of(i)).count()
-            };
-            let before = left(words).0;
-            changed += before;
-            let buffers = declared(&stored, STORAGE_BUFFER);
-            assert_eq!(buffers, declared(words, STORAGE_BUFFER) + before);
-            if before == 0 {
-                assert_eq!(stored, *words);
-            }
-        }
-        assert!(changed > 50, "{changed} texel buffers");
-    }
 }
