@@ -16,7 +16,7 @@ pub struct ShowOptions {
     /// --preset paper]
     #[arg(long, value_enum, conflicts_with = "reference")]
     direct: Option<DirectName>,
-    /// What is drawn of surfaces with relief
+    /// What is drawn
     #[arg(
         long,
         value_enum,
@@ -69,16 +69,15 @@ enum ViewName {
     Albedo,
     /// Normals in the world, -1..1 as 0..1
     Normal,
-    /// From the lowest, black, to the highest, white
+    /// Of relief, from the lowest, black, to the highest, white; other surfaces grey
     Height,
     /// Irradiance over pi, as on a white surface
     Irradiance,
-    /// Each triangle's strongest slot: hue, its direction about the normal (red along u,
+    /// Each triangle's strongest slot, where it has relief: hue, its direction about the normal (red along u,
     /// yellow-green along v); bright, near the normal; coloured, most of the light, and grey, light
     /// from everywhere
     Slots,
-    /// Fragments of prisms that a sample shades, hidden ones too; dark: none, the bar below: from 0
-    /// to the printed number
+    /// Fragments of prisms that a sample shades, hidden ones too, in the colours of the bar below
     Overdraw,
 }
 

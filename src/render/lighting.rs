@@ -58,7 +58,7 @@ pub enum Direct {
     Slots,
 }
 
-/// What a picture shows of triangles with a relief; of plain ones it shows the shaded surface.
+/// What a picture shows.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Show {
     #[default]
@@ -67,11 +67,12 @@ pub enum Show {
     Albedo,
     /// Normals in the world, −1..1 as 0..1.
     Normal,
-    /// Height from the lowest, black, to the highest, white.
+    /// Height of a relief from the lowest, black, to the highest, white; plain triangles are grey.
     Height,
     /// E/π, as on a white surface.
     Irradiance,
-    /// The strongest slot of each triangle, see [`super::slot_colour`].
+    /// The strongest slot of each triangle with a relief, see [`super::slot_colour`]; plain ones
+    /// are shaded.
     Slots,
     /// How many fragments of prisms rays are followed for, see [`super::Overdraw`]; plain triangles
     /// are left out.
@@ -79,6 +80,16 @@ pub enum Show {
 }
 
 impl Show {
+    /// Whether light is shown, not what it falls on.
+    pub(super) fn is_light(self) -> bool {
+        !matches!(self, Self::Albedo | Self::Normal | Self::Height)
+    }
+
+    /// Whether surfaces are shown in their colours; white, if not.
+    pub(super) fn is_coloured(self) -> bool {
+        !matches!(self, Self::Normal | Self::Height | Self::Irradiance)
+    }
+
     pub(super) fn code(self) -> u32 {
         match self {
             // Fragments are counted by a shader of their own.
@@ -147,6 +158,7 @@ impl<'a> Lighting<'a> {
     /// the direct and the indirect light are known separately.
     pub(super) fn sharp(&self) -> bool {
         self.direct == Direct::Sharp
+            && self.show.is_light()
             && self.part != Light::Indirect
             && self.irradiance_direct.is_some()
     }

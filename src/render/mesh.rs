@@ -11,7 +11,7 @@ use super::flat_relief::FlatRelief;
 use super::seen_scene::SeenScene;
 use super::shafts::Shafts;
 use super::textures::Bound;
-use super::{Joined, Light, corner_irradiance, parts};
+use super::{Joined, Light, Lighting, Show, corner_irradiance, parts};
 use crate::constants::{LIT_IN_PARTS, LIT_NOT, LIT_OPEN, PART_HIDDEN, PART_OPEN, PART_UNSURE};
 use crate::error::Result;
 use crate::mesh::corners::Corners;
@@ -91,7 +91,18 @@ impl Mesh {
             ..
         } = *seen;
         let far = |e: usize| rest.and_then(|rest| rest.far.get(&e));
-        let smooth = corner_irradiance(scene, &lighting.baked(), Joined::Smooth);
+        let smooth = match lighting.show {
+            // L = ρ · E / π is to be what is shown.
+            Show::Albedo => vec![[Vec3::splat(PI); 3]; scene.triangles.len()],
+            Show::Height => vec![[Vec3::splat(0.5 * PI); 3]; scene.triangles.len()],
+            Show::Normal => {
+                let neighbours = Corners::new(scene);
+                let coded = |n: DVec3| (PI * 0.5) * (n.as_vec3() + 1.0);
+                let of = |e| smooth_normals(scene, &neighbours, e).map(coded);
+                (0..scene.triangles.len()).into_par_iter().map(of).collect()
+            }
+            _ => corner_irradiance(scene, &lighting.baked(), Joined::Smooth),
+        };
         // The visible side is decided here in f64: a rasteriser decides it from rounded corners,
         // wrongly for slivers.
         let mut order: Vec<_> = scene
@@ -111,7 +122,7 @@ impl Mesh {
             })
             .collect();
         // Nothing is added where no texture emits.
-        if lighting.part != Light::Indirect {
+        if shows_emission(lighting) {
             let glows = order.iter().filter_map(|drawn| match drawn.kind {
                 Kind::Front(m) => scene.materials[m as usize].map_ke.as_ref().map(|_| Drawn {
                     kind: Kind::Glow(m),
@@ -193,35 +204,39 @@ impl Mesh {
     ) -> impl Iterator<Item = Draw<'a>> {
         let rows = seen.projection.rows(tile);
         let corner = tile.corner(seen.samples);
-        let (scene, part) = (seen.scene, seen.lighting.part);
+        let (scene, lighting) = (seen.scene, seen.lighting);
+        let parameters = move |material| parameters(rows, material, lighting);
         self.ranges.iter().map(move |range| Draw {
             first_vertex: range.first,
             vertex_count: range.count,
             lit: range.lit,
             texture: match range.kind {
-                Kind::Front(m) => textures.of_material(m),
+                Kind::Front(m) if lighting.show.is_coloured() => textures.of_material(m),
                 Kind::Glow(m) => textures.of_emission(m),
-                Kind::Far(_) | Kind::Back => textures.white(),
+                Kind::Front(_) | Kind::Far(_) | Kind::Back => textures.white(),
             },
             adds: matches!(range.kind, Kind::Glow(_)),
             parameters: match range.kind {
                 Kind::Front(m) => {
                     let material = &scene.materials[m as usize];
-                    let mut own = parameters(rows, Some(material), part).lit_by(lights, corner);
+                    let mut own = parameters(Some(material)).lit_by(lights, corner);
                     if material.map_ke.is_some() {
                         own.emitted = Vec3::ZERO;
+                    }
+                    if !lighting.show.is_coloured() {
+                        own.reflectance = Vec3::ONE;
                     }
                     own
                 }
                 Kind::Glow(m) => Parameters {
                     reflectance: scene.materials[m as usize].ke.into(),
-                    ..parameters(rows, None, part)
+                    ..parameters(None)
                 },
                 Kind::Far(m) => Parameters {
                     reflectance: Vec3::ONE,
-                    ..parameters(rows, Some(&scene.materials[m as usize]), part)
+                    ..parameters(Some(&scene.materials[m as usize]))
                 },
-                Kind::Back => parameters(rows, None, part),
+                Kind::Back => parameters(None),
             },
         })
     }
@@ -312,13 +327,9 @@ fn lit_triangles(scene: &Scene, order: &[Drawn], vertices: &[Vertex]) -> Vec<Lit
         .par_iter()
         .zip(vertices.par_chunks(3))
         .map(|(&Drawn { triangle: e, .. }, drawn)| {
-            let triangle = &scene.triangles[e];
             let plane = neighbours.normals[e];
-            let [normal_a, normal_b, normal_c] = triangle.vertices.map(|vertex| {
-                let about = neighbours.smooth(e, vertex);
-                let sum: DVec3 = about.map(|(t, angle)| neighbours.normals[t] * angle).sum();
-                sum.try_normalize().unwrap_or(plane).as_vec3()
-            });
+            let normals = smooth_normals(scene, &neighbours, e);
+            let [normal_a, normal_b, normal_c] = normals.map(|normal| normal.as_vec3());
             let [a, b, c] = [0, 1, 2].map(|k| drawn[k].position);
             let furthest = a.abs().max(b.abs()).max(c.abs()).max_element();
             LitTriangle {
@@ -336,13 +347,30 @@ fn lit_triangles(scene: &Scene, order: &[Drawn], vertices: &[Vertex]) -> Vec<Lit
         .collect()
 }
 
+/// Of a triangle's corners, unit.
+fn smooth_normals(scene: &Scene, neighbours: &Corners, e: usize) -> [DVec3; 3] {
+    scene.triangles[e].vertices.map(|vertex| {
+        let about = neighbours.smooth(e, vertex);
+        let sum: DVec3 = about.map(|(t, angle)| neighbours.normals[t] * angle).sum();
+        sum.try_normalize().unwrap_or(neighbours.normals[e])
+    })
+}
+
+fn shows_emission(lighting: &Lighting<'_>) -> bool {
+    lighting.part != Light::Indirect && lighting.show.is_light() && lighting.show.is_coloured()
+}
+
 /// Push constants of a material's fronts, or of backs (None).
-pub fn parameters([x, y, w]: [Vec3; 3], material: Option<&Material>, part: Light) -> Parameters {
+pub fn parameters(
+    [x, y, w]: [Vec3; 3],
+    material: Option<&Material>,
+    lighting: &Lighting<'_>,
+) -> Parameters {
     let (reflectance, emitted, metered) = match material {
         Some(m) => (m.kd, m.mean_emission(), if m.emits() { 0.0 } else { 1.0 }),
         None => ([0.0; 3], [0.0; 3], 0.0),
     };
-    let shines = if part == Light::Indirect { 0.0 } else { 1.0 };
+    let shines = if shows_emission(lighting) { 1.0 } else { 0.0 };
     Parameters {
         x,
         y,

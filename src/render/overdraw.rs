@@ -1,5 +1,7 @@
 //! Overdraw, as numbers and as a picture.
 
+use font8x8::{BASIC_FONTS, UnicodeFonts};
+
 use crate::picture::Picture;
 
 /// Fragments of prisms whose rays are followed and steps of their marches, `[row][column]`, means
@@ -36,7 +38,8 @@ impl Overdraw {
     }
 
     /// The fragments in the colours of viridis, from 0, dark, to [`Self::top`], bright, with a bar
-    /// of the same range at the bottom, marked at each quarter. The range and the steps are logged.
+    /// of the same range at the bottom, marked at each quarter with its number, where the bar is high
+    /// enough for one. The range and the steps are logged.
     pub fn picture(&self) -> Picture {
         let top = self.top();
         let statistics = |values: &[f32]| {
@@ -61,12 +64,52 @@ impl Overdraw {
             }
             viridis((column as f32 + 0.5) / self.width as f32)
         };
-        let colours = self.fragments.iter().enumerate().map(colour).collect();
+        let mut colours: Vec<_> = self.fragments.iter().enumerate().map(colour).collect();
+        self.number(&mut colours, first + 1);
         // Nothing is metered, so that the map's colours are not exposed.
         let metered = vec![false; self.fragments.len()];
         Picture::new((self.width, self.height), colours, &metered)
     }
 }
+
+impl Overdraw {
+    /// Writes numbers at the marks of a bar that begins at that row.
+    fn number(&self, colours: &mut [[f32; 3]], row: u32) {
+        let height = self.height.saturating_sub(row);
+        let scale = height.saturating_sub(2) / LETTER;
+        if scale == 0 {
+            return;
+        }
+        let top = row + (height - LETTER * scale).div_ceil(2);
+        for quarter in 0..=4 {
+            let share = quarter as f32 / 4.0;
+            let text = (share * self.top()).to_string();
+            let mark = (quarter * self.width).div_ceil(4);
+            let length = text.len() as u32 * LETTER * scale;
+            let left = match quarter {
+                4 => self.width.saturating_sub(length + scale),
+                _ => mark + 2 * scale,
+            };
+            // Dark on what is bright.
+            let colour = if share < 0.6 { [1.0; 3] } else { [0.0; 3] };
+            let letters = text.chars().filter_map(|letter| BASIC_FONTS.get(letter));
+            for (i, rows) in (0..).zip(letters) {
+                for (x, y) in (0..(LETTER * scale).pow(2))
+                    .map(|p| (p % (LETTER * scale), p / (LETTER * scale)))
+                {
+                    let column = left + i * LETTER * scale + x;
+                    let is_set = rows[(y / scale) as usize] >> (x / scale) & 1 == 1;
+                    if is_set && column < self.width {
+                        colours[((top + y) * self.width + column) as usize] = colour;
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Pixels of a letter's side.
+const LETTER: u32 = 8;
 
 /// Linear RGB of a value in 0..=1.
 fn viridis(share: f32) -> [f32; 3] {

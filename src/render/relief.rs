@@ -132,7 +132,7 @@ impl Relief {
         let draws = self.mesh.ranges.iter().zip(&target.sets);
         let draws = draws.map(|(range, set)| {
             let material = &seen.scene.materials[range.material as usize];
-            let shade = parameters(rows, Some(material), seen.lighting.part).lit_by(counts, corner);
+            let shade = parameters(rows, Some(material), seen.lighting).lit_by(counts, corner);
             Draw {
                 set,
                 parameters: Parameters {
@@ -154,7 +154,7 @@ impl Relief {
     }
 
     fn rays(&self, seen: &SeenScene<'_>, tile: Tile) -> relief_hits::Parameters {
-        let shade = parameters(seen.projection.rows(tile), None, seen.lighting.part);
+        let shade = parameters(seen.projection.rows(tile), None, seen.lighting);
         relief_hits::Parameters {
             x: shade.x,
             y: shade.y,

@@ -159,8 +159,8 @@ impl<'a> Renderer<'a> {
     pub fn picture(&self) -> Result<Picture> {
         match self.fixed.lighting.show {
             Show::Overdraw => Ok(self.overdraw()?.picture()),
-            // Colours that are looked up in a legend are not exposed.
-            Show::Slots => Ok(Picture {
+            // What is no light is not exposed.
+            Show::Slots | Show::Albedo | Show::Normal | Show::Height => Ok(Picture {
                 automatic_exposure: 0.0,
                 ..self.gathered()?
             }),

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::harness::Display;
+use crate::display::Display;
 use crate::server::{Server, State};
 
 /// Pixels of the page: the whole display.

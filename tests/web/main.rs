@@ -3,6 +3,8 @@
 #![cfg(all(target_os = "linux", feature = "window"))]
 
 mod browser;
+#[path = "../view/display.rs"]
+mod display;
 #[allow(dead_code)] // used by the tests of the window as well
 #[path = "../view/harness.rs"]
 mod harness;
@@ -16,7 +18,8 @@ use mesolux::render::ldr;
 use tempfile::TempDir;
 
 use browser::{Browser, SIZE, wait};
-use harness::{Display, device, difference, mesolux, picture, told};
+use display::Display;
+use harness::{device, difference, mesolux, picture, told};
 use server::Server;
 
 /// Linear values of a picture's codes.

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::browser::{Browser, wait};
-use crate::harness::{Display, picture, told};
+use crate::display::Display;
+use crate::harness::{picture, told};
 use crate::server::{Server, State};
 use crate::{apart, baked_box, run};
 
