@@ -130,3 +130,48 @@ fn slots_have_one_colour_a_triangle() {
     assert!(unknown <= MIXED);
     assert_silent();
 }
+
+/// A plain quad shows its reflectance, its normal and grey, whatever light falls on it, and a lamp
+/// its reflectance too.
+#[test]
+fn plain_surfaces_show_what_they_are() {
+    let mut build = Build::new();
+    let lamp = build.material(0.2, 10.0);
+    let plain = build.material(0.5, 0.0);
+    build.scene.materials[plain as usize].kd = [0.1, 0.5, 0.8];
+    let (u, v) = (2.0 * DVec3::Z, DVec3::X);
+    build.quad(DVec3::new(-1.0, 0.0, -1.0), u, v, (2, 2), plain);
+    build.quad(DVec3::new(0.0, 0.0, -1.0), u, v, (2, 2), lamp);
+    build.quad(DVec3::new(-1.0, 0.5, -2.0), DVec3::Y, u, (1, 1), lamp);
+    let (scene, camera) = (build.0.scene, above());
+    let solution = baked(&scene);
+    let up = [0.5, 1.0, 0.5];
+    for (show, of_plain, of_lamp) in [
+        (Show::Albedo, [0.1, 0.5, 0.8], [0.2; 3]),
+        (Show::Normal, up, up),
+        (Show::Height, [0.5; 3], [0.5; 3]),
+    ] {
+        let lighting = Lighting {
+            show,
+            ..Lighting::from(&solution)
+        };
+        let picture = render(&device(), &scene, lighting, &view(&camera)).expect("a picture");
+        assert_eq!(picture.automatic_exposure, 0.0);
+        let near = |p: &[f32; 3], of: [f32; 3]| {
+            let apart = Vec3::from_array(*p) - Vec3::from_array(of);
+            apart.abs().max_element() < 1e-5
+        };
+        let [plain, lamp] =
+            [of_plain, of_lamp].map(|of| picture.radiance.iter().filter(|p| near(p, of)).count());
+        println!("{show:?}: {plain} pixels of the plain quad, {lamp} of the lamp");
+        // The camera is not quite above the edge between them, which is mixed.
+        let edge = 40;
+        match of_plain == of_lamp {
+            true => assert_eq!(plain, 1600),
+            false => {
+                assert!(plain > 600 && lamp > 600 && plain + lamp >= 1600 - edge);
+            }
+        }
+    }
+    assert_silent();
+}

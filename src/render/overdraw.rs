@@ -93,11 +93,10 @@ impl Overdraw {
             // Dark on what is bright.
             let colour = if share < 0.6 { [1.0; 3] } else { [0.0; 3] };
             let letters = text.chars().filter_map(|letter| BASIC_FONTS.get(letter));
+            let side = LETTER * scale;
             for (i, rows) in (0..).zip(letters) {
-                for (x, y) in (0..(LETTER * scale).pow(2))
-                    .map(|p| (p % (LETTER * scale), p / (LETTER * scale)))
-                {
-                    let column = left + i * LETTER * scale + x;
+                for (x, y) in (0..side * side).map(|place| (place % side, place / side)) {
+                    let column = left + i * side + x;
                     let is_set = rows[(y / scale) as usize] >> (x / scale) & 1 == 1;
                     if is_set && column < self.width {
                         colours[((top + y) * self.width + column) as usize] = colour;

@@ -4,6 +4,9 @@
 use std::collections::BTreeMap;
 
 // Of the SPIR-V specification.
+/// With the next, and those between them, all that declare a type.
+const OP_TYPE_VOID: u16 = 19;
+const OP_TYPE_FORWARD_POINTER: u16 = 39;
 const OP_TYPE_INT: u16 = 21;
 const OP_TYPE_IMAGE: u16 = 25;
 const OP_TYPE_SAMPLED_IMAGE: u16 = 27;
@@ -80,10 +83,6 @@ pub fn stored_texels(words: &[u32]) -> Vec<u32> {
     out.0[BOUND] = bound;
     out.0
 }
-
-/// Among them all that declare a type.
-const OP_TYPE_VOID: u16 = 19;
-const OP_TYPE_FORWARD_POINTER: u16 = 39;
 
 /// The texel buffers of a module.
 #[derive(Default)]
