@@ -6,10 +6,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use ash::{ext, khr, vk};
+use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{
     Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc,
 };
-use gpu_allocator::{AllocationSizes, MemoryLocation};
 
 use super::instance::{Candidate, Instance, graphics_family};
 use super::uploads::Uploads;
@@ -262,10 +262,7 @@ fn allocator(instance: &Instance, candidate: &Candidate, raw: &ash::Device) -> R
         physical_device: candidate.raw,
         debug_settings: Default::default(),
         buffer_device_address: true,
-        // Blocks grow as more are needed, so that a small scene takes little.
-        allocation_sizes: AllocationSizes::new(4 << 20, 4 << 20)
-            .with_max_device_memblock_size(256 << 20)
-            .with_max_host_memblock_size(64 << 20),
+        allocation_sizes: Default::default(),
     })
     .map_err(|e| Error::Device(format!("{}: allocator: {e}", candidate.name)))
 }
