@@ -3,12 +3,14 @@
 
 mod common;
 
+use std::time::Duration;
+
 use common::{Solved, solve};
 use glam::{DVec3, Vec3};
 use mesolux::mesh::elements::Elements;
 use mesolux::scene::shapes::Shapes;
 use mesolux::scene::{Lights, PointLight};
-use mesolux::solver::{Settings, StopReason};
+use mesolux::solver::{Settings, Solver, StopReason};
 
 /// A closed room with a ball and a lamp in the ceiling. Walls on one side reflect `rho`, all else
 /// less: half of it in some colours.
@@ -181,5 +183,26 @@ fn the_bound_is_met_with_carried_light() {
             report.shots, report.sources
         );
         assert!(bound <= residual && report.stop == StopReason::Residual);
+    }
+}
+
+/// What was spent on the set-up is of the budget.
+#[test]
+fn spent_time_is_of_the_budget() {
+    let budget = Duration::from_secs(1_000_000);
+    for (spent, stop) in [
+        (Duration::ZERO, StopReason::Residual),
+        (budget, StopReason::Budget),
+    ] {
+        let settings = Settings {
+            budget: Some(budget),
+            ..Settings::default()
+        };
+        let device = common::device();
+        let solver = Solver::new(&device, room(0.5), &Lights::NONE, &settings);
+        let mut solver = solver.expect("the scene fits the device");
+        solver.spend(spent);
+        solver.run(|_| true).expect("the device solves the scene");
+        assert_eq!(solver.report().stop, stop);
     }
 }

@@ -1,5 +1,5 @@
-//! Too little memory for the process: one line and exit code 2, and nothing is damaged. Where it is
-//! lavapipe that finds none, it may crash as it makes a device; so the bake here has enough for that.
+//! Too little memory for the process: one line and exit code 2, and nothing is damaged. Lavapipe
+//! itself may crash where it finds none as it makes a device; the bake here has enough for that.
 #![cfg(target_os = "linux")]
 
 use std::fs;
@@ -12,6 +12,9 @@ fn run(limit: u32, arguments: &[&str]) -> Output {
         .arg((1024 * limit).to_string())
         .arg(env!("CARGO_BIN_EXE_mesolux"))
         .args(arguments)
+        // Threads of the driver and pools of malloc take addresses by the number of cores.
+        .env("LP_NUM_THREADS", "2")
+        .env("MALLOC_ARENA_MAX", "2")
         // Its layer needs memory, too.
         .env_remove("MESOLUX_VALIDATE")
         .output()

@@ -73,9 +73,9 @@ enum ViewName {
     Height,
     /// Irradiance over pi, as on a white surface
     Irradiance,
-    /// Each triangle's strongest slot, where it has relief: hue, its direction about the normal (red along u,
-    /// yellow-green along v); bright, near the normal; coloured, most of the light, and grey, light
-    /// from everywhere
+    /// Strongest slot of each triangle with relief: hue, its direction about the normal (red along
+    /// u, yellow-green along v); bright, near the normal; coloured, most of the light, and grey,
+    /// light from everywhere
     Slots,
     /// Fragments of prisms that a sample shades, hidden ones too, in the colours of the bar below
     Overdraw,

@@ -38,8 +38,8 @@ impl Overdraw {
     }
 
     /// The fragments in the colours of viridis, from 0, dark, to [`Self::top`], bright, with a bar
-    /// of the same range at the bottom, marked at each quarter with its number, where the bar is high
-    /// enough for one. The range and the steps are logged.
+    /// of the same range at the bottom, marked at each quarter, with its number where the bar is high
+    /// enough. The range and the steps are logged.
     pub fn picture(&self) -> Picture {
         let top = self.top();
         let statistics = |values: &[f32]| {
@@ -65,16 +65,14 @@ impl Overdraw {
             viridis((column as f32 + 0.5) / self.width as f32)
         };
         let mut colours: Vec<_> = self.fragments.iter().enumerate().map(colour).collect();
-        self.number(&mut colours, first + 1);
+        self.number(&mut colours, first + 1, top);
         // Nothing is metered, so that the map's colours are not exposed.
         let metered = vec![false; self.fragments.len()];
         Picture::new((self.width, self.height), colours, &metered)
     }
-}
 
-impl Overdraw {
-    /// Writes numbers at the marks of a bar that begins at that row.
-    fn number(&self, colours: &mut [[f32; 3]], row: u32) {
+    /// Writes numbers from 0 to `most` at the marks of a bar that begins at that row.
+    fn number(&self, colours: &mut [[f32; 3]], row: u32, most: f32) {
         let height = self.height.saturating_sub(row);
         let scale = height.saturating_sub(2) / LETTER;
         if scale == 0 {
@@ -83,7 +81,7 @@ impl Overdraw {
         let top = row + (height - LETTER * scale).div_ceil(2);
         for quarter in 0..=4 {
             let share = quarter as f32 / 4.0;
-            let text = (share * self.top()).to_string();
+            let text = (share * most).to_string();
             let mark = (quarter * self.width).div_ceil(4);
             let length = text.len() as u32 * LETTER * scale;
             let left = match quarter {

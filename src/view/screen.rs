@@ -107,6 +107,8 @@ impl Screen {
     /// A device or a display that fails.
     pub fn fit(&mut self, size: (u32, u32), recreate: bool) -> Result<Option<(u32, u32)>> {
         if size.0 == 0 || size.1 == 0 {
+            // A minimised window refuses nothing.
+            self.refused = None;
             return Ok(None);
         }
         if self.surface.is_none() {
@@ -169,8 +171,7 @@ impl Screen {
             Ok(())
         })?;
         match shown {
-            Shown::Yes | Shown::Misfit => self.refused = None,
-            Shown::Late => {}
+            Shown::Yes | Shown::Misfit | Shown::Late => self.refused = None,
             Shown::Stale | Shown::Lost => self.refuse(shown)?,
         }
         // An abandoned frame has drawn nothing.

@@ -29,7 +29,7 @@ impl Display {
         }
     }
 
-    /// What a person does on it, by xdotool; returns what that prints.
+    /// Sends keys and mouse events with xdotool; returns its output.
     pub fn xdotool(&self, args: &[&str]) -> String {
         let done = Command::new("xdotool")
             .args(args)

@@ -75,8 +75,6 @@ struct Far {
     /// Sine of the largest angle between the axis and a member's normal; 0 of a part in one plane,
     /// and more than 1 of one that turns further than a right angle.
     turned: f64,
-    /// [`front`] as four points, times the area.
-    front: f64,
 }
 
 impl Seen {
@@ -277,7 +275,6 @@ impl Far {
             vector_area: area * normal,
             spread: spread(normal, triangle.map(|v| (v - centre) / 12_f64.sqrt())),
             turned: 0.0,
-            front: front(0.0, 1.0 / AS_POINTS) * area,
         }
     }
 
@@ -297,12 +294,6 @@ impl Far {
         let cosines = members.iter().map(|m| m.vector_area.dot(axis) / m.area);
         let cosine = cosines.fold(1.0, f64::min);
         let sine = (1.0 - cosine * cosine).sqrt();
-        let turned = match plane {
-            true => 0.0,
-            false if cosine <= 0.0 => 2.0,
-            // Members at several heights may face one way.
-            false => sine.max(1e-9),
-        };
         Self {
             centre,
             radius: radii.fold(0.0, f64::max),
@@ -311,8 +302,12 @@ impl Far {
             area,
             vector_area,
             spread,
-            turned,
-            front: front(turned, 1.0 / AS_POINTS) * area,
+            turned: match plane {
+                true => 0.0,
+                false if cosine <= 0.0 => 2.0,
+                // Members at several heights may face one way.
+                false => sine.max(1e-9),
+            },
         }
     }
 
@@ -330,7 +325,8 @@ impl Far {
         if square <= least * least || self.turned > NARROW {
             return None;
         }
-        if !is_plane && facing * facing <= self.front * self.front * square {
+        let front = front(self.turned, 1.0 / AS_POINTS) * self.area;
+        if !is_plane && facing * facing <= front * front * square {
             return None;
         }
         if facing <= 0.0 {
@@ -338,13 +334,9 @@ impl Far {
         }
         let [a, b] = self.spread;
         let points = [a + b, a - b, b - a, -a - b].map(|off| way + off);
-        if !self.is_above(p, n) {
-            return None;
-        }
-        let over = points.map(|way| way.length_squared().powi(2).recip());
+        let of = |way: &DVec3| *way / way.length_squared().powi(2);
         let share = facing / (4.0 * std::f64::consts::PI);
-        let sum = |[a, b, c, d]: [DVec3; 4]| (a + b) + (c + d);
-        Some(share * sum(std::array::from_fn(|k| points[k] * over[k])))
+        (self.is_above(p, n)).then(|| share * points.iter().map(of).sum::<DVec3>())
     }
 
     /// About the form factor from a place, rather too large than too small; none where the part
