@@ -163,6 +163,8 @@ fn silhouettes_and_heights_are_those_of_the_displaced_mesh() {
     for (painted, material) in painted.materials.iter_mut().zip(&scene.materials) {
         painted.ke = [0.0; 3];
         let Some(map) = &material.map_height else {
+            // As plain triangles are shown.
+            painted.kd = [0.5; 3];
             continue;
         };
         let bounds = map
