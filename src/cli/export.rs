@@ -124,6 +124,8 @@ enum Encoded {
     Bakery,
     /// Godot's: one image of four below each other
     Godot,
+    /// Frostbite's: OUT_L0.exr, OUT_R.png, OUT_G.png, OUT_B.png
+    Frostbite,
 }
 
 impl Encoded {
@@ -140,6 +142,7 @@ impl Encoded {
             Self::Unity => Ok(Some(Encoding::Unity)),
             Self::Bakery => Ok(Some(Encoding::Bakery)),
             Self::Godot => Ok(Some(Encoding::Godot)),
+            Self::Frostbite => Ok(Some(Encoding::Frostbite)),
         }
     }
 }

@@ -10,7 +10,8 @@ use glam::{DVec3, Vec3};
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 
-use super::{Basis, Directional, Frame, L1, Limits};
+use super::moments::ratios;
+use super::{Basis, Directional, Frame, L1, Limits, irradiance_of_moments};
 use crate::atomic_file::{with_ending, write_atomically};
 use crate::error::Result;
 use crate::export::light_map::LightMap;
@@ -19,8 +20,8 @@ use crate::export::surface::Surface;
 use crate::math::directions::Directions;
 
 /// How a light map says from where the light comes. Directions are in the axes of the scene, as in
-/// the glTF of `export`: right-handed, y up. Unity, Bakery and Godot multiply what they read by the
-/// albedo: their files hold E/π.
+/// the glTF of `export`: right-handed, y up. Engines multiply what they read by the albedo: their
+/// files hold E/π.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Encoding {
     /// One OpenEXR with the layers L0, L1x, L1y, L1z: E(n) = L0 + n · L1.
@@ -40,6 +41,9 @@ pub enum Encoding {
     /// Godot's LightmapGI: one OpenEXR of four images below each other: L0, and L1/(8 L0) + ½ along
     /// y, z and x. E(n) = L0 + n · (4 L0 (2 rgb − 1)).
     Godot,
+    /// Frostbite's: `_L0.exr`, and `_R.png`, `_G.png`, `_B.png`: the first moment of the light of
+    /// each colour over its mean, r/2 + ½. E(n) = L0 times [`irradiance_of_moments`].
+    Frostbite,
 }
 
 /// |L1| ≤ 2 L0 in Bakery's files; light that comes from all sides has no more.
@@ -56,6 +60,7 @@ impl Encoding {
     pub fn basis(self) -> Basis {
         match self {
             Self::Slots(directions) => Basis::Slots(directions),
+            Self::Frostbite => Basis::Moments,
             _ => Basis::L1,
         }
     }
@@ -66,6 +71,9 @@ impl Encoding {
         match self {
             Self::Unity => vec![page.to_owned(), beside("_dir.png")],
             Self::Bakery => ["_L0.exr", "_L1x.png", "_L1y.png", "_L1z.png"]
+                .map(beside)
+                .to_vec(),
+            Self::Frostbite => ["_L0.exr", "_R.png", "_G.png", "_B.png"]
                 .map(beside)
                 .to_vec(),
             _ => vec![page.to_owned()],
@@ -148,7 +156,7 @@ impl Pages<'_> {
                 });
                 let codes = towards.iter().zip(&heights).flat_map(|(d, height)| {
                     let [x, y, z] = d.to_array();
-                    [x, y, z, height.x].map(|value| code(0.5 + 0.5 * value))
+                    [x, y, z, height.x].map(signed)
                 });
                 let codes: Vec<u8> = codes.collect();
                 vec![
@@ -181,6 +189,17 @@ impl Pages<'_> {
                 };
                 vec![page.encoded(MapFile::Exr, 1.0)]
             }
+            Encoding::Frostbite => {
+                let l0 = self.page_of(page, |t| self.mean(t) / PI);
+                let mut all = vec![l0.encoded(MapFile::Exr, 1.0)];
+                for c in 0..3 {
+                    let ratios = self.page(page, |t| ratios(self.light.of(t))[c]);
+                    let codes = ratios.iter().flat_map(|ratio| ratio.to_array().map(signed));
+                    let codes: Vec<u8> = codes.collect();
+                    all.push(png(size, &codes, ExtendedColorType::Rgb8));
+                }
+                all
+            }
         }
     }
 
@@ -212,6 +231,20 @@ impl Pages<'_> {
         self.l1(t).dominant(self.normal(t))
     }
 
+    /// What of the codes of the first moments gives the irradiance of the surface.
+    fn mean(&self, t: usize) -> Vec3 {
+        let values = self.light.of(t);
+        let facing = values[values.len() - 1];
+        let normal = self.normal(t).as_vec3();
+        let over = ratios(values).map(|ratio| {
+            let read = ratio
+                .to_array()
+                .map(|value| f32::from(signed(value)) / 127.5 - 1.0);
+            irradiance_of_moments(Vec3::from_array(read), normal)
+        });
+        facing / Vec3::from_array(over).max(Vec3::splat(f32::MIN_POSITIVE))
+    }
+
     fn limited(&self, t: usize, limits: Limits) -> L1 {
         self.l1(t).limited(self.normal(t), limits)
     }
@@ -225,6 +258,11 @@ fn share(of: &L1, axis: usize, limits: Limits) -> Vec3 {
 
 fn code(value: f32) -> u8 {
     (255.0 * value.clamp(0.0, 1.0)).round() as u8
+}
+
+/// Of −1 to 1.
+fn signed(value: f32) -> u8 {
+    code(0.5 + 0.5 * value)
 }
 
 /// The channels R, G, B of a layer.

@@ -7,6 +7,7 @@
 mod facets;
 pub mod files;
 mod l1;
+mod moments;
 mod slots;
 
 use glam::{DVec3, Vec3};
@@ -21,6 +22,7 @@ use crate::math::directions::Directions;
 use crate::solver::{LightAt, Lit, Place};
 
 pub use l1::{L1, Limits};
+pub use moments::irradiance_of_moments;
 pub use slots::irradiance as irradiance_of_slots;
 
 /// What a texel holds of the directions from which its light comes.
@@ -28,6 +30,9 @@ pub use slots::irradiance as irradiance_of_slots;
 pub enum Basis {
     /// E(n) = L0 + n · L1, in the axes of the scene; see [`L1`].
     L1,
+    /// Mean and first moment of the light, and the irradiance of the surface; see
+    /// [`irradiance_of_moments`].
+    Moments,
     /// Light from each slot of the hemisphere about the surface; see [`irradiance_of_slots`].
     Slots(Directions),
 }
@@ -38,7 +43,8 @@ pub struct Directional {
     pub basis: Basis,
     /// Values of a texel.
     pub count: usize,
-    /// W·m⁻², RGB, `[texel][value]`: L0 and L1 along x, y and z; or the slots.
+    /// W·m⁻², RGB, `[texel][value]`: L0 and L1 along x, y and z; the mean, the first
+    /// moment and the irradiance of the surface; or the slots.
     pub values: Vec<Vec3>,
 }
 
@@ -88,6 +94,7 @@ impl Basis {
     fn count(self) -> usize {
         match self {
             Self::L1 => 4,
+            Self::Moments => moments::MOMENTS,
             Self::Slots(directions) => directions.count(),
         }
     }
@@ -113,6 +120,7 @@ impl Basis {
         let places: Vec<Place> = frames.iter().map(|frame| frame.place).collect();
         match self {
             Self::L1 => l1::look(lit, frames, &places, direct),
+            Self::Moments => moments::look(lit, frames, &places, direct),
             Self::Slots(directions) => {
                 slots::Fit::new(directions).look(lit, frames, &places, direct)
             }
@@ -123,6 +131,7 @@ impl Basis {
     fn facing(self, frame: &Frame, values: &[Vec3]) -> Vec3 {
         match self {
             Self::L1 => L1::from_values(values).at(frame.place.normal),
+            Self::Moments => values[moments::MOMENTS - 1],
             Self::Slots(directions) => slots::irradiance(directions, values, DVec3::Z),
         }
     }
@@ -131,6 +140,7 @@ impl Basis {
     fn straight(self, frame: &Frame, light: Vec3) -> Vec<Vec3> {
         match self {
             Self::L1 => L1::straight(frame.place.normal, light).values().to_vec(),
+            Self::Moments => moments::straight(frame.place.normal, light),
             Self::Slots(directions) => slots::straight(directions, light),
         }
     }
