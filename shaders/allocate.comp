@@ -1,7 +1,7 @@
 // Finds room for the rows of a batch and writes their tables: for each block of GROUP elements
 // where its factors start, 0 for a block that sees nothing of the source. Rows that find no room go
 // to a chunk that the batch after the next overwrites. One workgroup; slots in order, so that which
-// sources are kept is the same every run.
+// sources are kept is the same every run. Words that hold nothing are 0, since chunks go to files.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_buffer_reference : require
@@ -36,6 +36,9 @@ const uint MESO_WORDS = GROUP / 2 + GROUP;
 shared uint first_word[SELECT_GROUP];
 shared uint row_chunk;
 shared uint row_first;
+// A chunk that is left for the next, and its words from here on.
+shared uint left_chunk;
+shared uint left_first;
 
 uint words_of(uint slot, uint block) {
     uint words = block < block_count - meso_blocks ? PLAIN_WORDS : MESO_WORDS;
@@ -66,7 +69,10 @@ void main() {
                 first_word[l] = words;
                 words += of_lane;
             }
+            left_first = chunk_words;
             if (state.chunk < chunk_count && state.used + words > chunk_words) {
+                left_chunk = state.chunk;
+                left_first = state.used;
                 state.chunk++;
                 state.used = 0;
             }
@@ -82,7 +88,14 @@ void main() {
             }
         }
         barrier();
+        for (uint word = left_first + lane; word < chunk_words; word += SELECT_GROUP) {
+            Words(chunks[left_chunk]).word[word] = 0;
+        }
         Words words = Words(chunks[row_chunk]);
+        uint table_end = (block_count + 3) & ~3u;
+        for (uint word = block_count + lane; word < table_end; word += SELECT_GROUP) {
+            words.word[row_first + word] = 0;
+        }
         uint at = first_word[lane];
         for (uint block = begin; block < end; block++) {
             uint count = words_of(slot, block);

@@ -8,14 +8,16 @@
 #include "shared/receivers.glsl"
 #include "shared/receive_kinds.glsl"
 
-// RECEIVE_DOUBTFUL: from the eye of the source; RECEIVE_CROSSED: from EYES of the SOURCE_EYES
-// places on it, evenly chosen.
+// RECEIVE_DOUBTFUL: from the eye of the source; RECEIVE_CROSSED: from EYES of the places on it,
+// evenly chosen.
 layout(constant_id = 0) const uint LIST = RECEIVE_DOUBTFUL;
 layout(constant_id = 1) const uint EYES = SOURCE_EYES;
-const uint STRIDE = SOURCE_EYES / EYES;
 
-// SOURCE_EYES a source on a surface; a point light has none, and nothing crosses it.
+// Those of a source on a surface are EYES or a multiple; a point light has none, and nothing crosses
+// it.
 layout(scalar, binding = 8) readonly buffer Eyes { vec4 eyes[]; };
+// [source], one more than there are.
+layout(scalar, binding = 9) readonly buffer EyeStarts { uint eye_starts[]; };
 
 // Less than the weight of any place, which is finite in a scene of size 1.
 const float LEAST_WEIGHT = 1e-30;
@@ -39,13 +41,15 @@ void main() {
     vec4 ball[RAYS] = vec4[](fetch(balls, e));
     vec3 n[RAYS] = vec3[](fetch(planes, e).xyz);
     uint from = LIST == RECEIVE_CROSSED ? EYES : 1;
+    uint first_eye = eye_starts[source];
+    uint stride = (eye_starts[source + 1] - first_eye) / EYES;
     float open_sum = 0.0;
     float sum = 0.0;
     Source eye = s;
     for (uint k = 0; k < from; k++) {
         float weight = 1.0;
         if (LIST == RECEIVE_CROSSED) {
-            Eye place = load_eye(eyes[SOURCE_EYES * source + k * STRIDE + STRIDE / 2]);
+            Eye place = load_eye(eyes[first_eye + k * stride + stride / 2]);
             eye.eye = place.at;
             weight = weight_of(place, s, ball[0].xyz, n[0]);
         }

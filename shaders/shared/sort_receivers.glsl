@@ -30,9 +30,11 @@ layout(scalar, binding = 7) buffer FacingAway { uint away_count[]; };
 // Those without relief, then those with it.
 layout(scalar, binding = 8) readonly buffer Blocks { ReceiverBlock blocks[]; };
 #ifdef SHADOW_RAYS
-// SOURCE_EYES a source on a surface; a point light has none.
+// Those of a strong emitter begin with its ends; a point light has none.
 layout(scalar, binding = 10) readonly buffer Eyes { vec4 eyes[]; };
 #define NEAR_MARKS 11
+// [source], one more than there are.
+layout(scalar, binding = 12) readonly buffer EyeStarts { uint eye_starts[]; };
 #else
 #define NEAR_MARKS 9
 #endif
@@ -121,7 +123,7 @@ void cross_unlike(
 ) {
     Source end = s;
     for (uint k = 0; k < SOURCE_ENDS; k++) {
-        end.eye = eyes[SOURCE_EYES * source + k].xyz;
+        end.eye = eyes[eye_starts[source] + k].xyz;
         bool above[SORT_ELEMENTS];
         for (uint j = 0; j < SORT_ELEMENTS; j++) {
             above[j] = asked[j] && !crossed[j] && dot(end.eye - ball[j].xyz, n[j]) > 0.0;

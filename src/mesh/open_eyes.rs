@@ -25,56 +25,77 @@ const EVERY: usize = 4;
 /// Golden angle.
 const TURN: f64 = 2.399_963_23;
 
-/// Gives each surface source [`Source::places`], and moves an eye that is covered, both to places
-/// that are as open as others of the source. How many eyes were moved.
+/// Gives each surface source its [`Source::places`], as many as `wanted`, `[source]`, each of which
+/// divides [`SOURCE_EYES`] or is 0, and moves an eye that is covered, both to places that are as
+/// open as others of the source. Sources that have as many are left as they are. How many eyes were
+/// moved.
 pub fn open_eyes(
     elements: &Elements,
     sources: &mut [Source],
     occluders: &ShadowTree<ShadowOccluder>,
+    wanted: &[usize],
 ) -> usize {
-    let moved = sources.par_iter_mut().enumerate().map(|(turn, source)| {
-        if !source.is_surface() {
+    let each = sources.par_iter_mut().zip(wanted).enumerate();
+    let moved = each.map(|(turn, (source, &wanted))| {
+        if !source.is_surface() || source.places.len() >= wanted.max(1) {
             return 0;
         }
-        let tree = PartTree::of(elements, source);
-        let count = SOURCE_EYES as usize;
-        source.places = tree.places(elements, source, count, turn);
-        ends_first(source);
-        if source.element_count == 1 {
-            return 0;
-        }
-        let open = |place: DVec3| open_looks(source, place, occluders);
-        let most = LOOKS / 2;
-        let covered = |place: DVec3| open(place).take(most).count() < most;
-        let eye = covered(source.eye);
-        let looked_at = || source.places.iter().step_by(EVERY);
-        if !eye && !looked_at().any(|place| covered(place.at)) {
-            return 0;
-        }
-        let places = &source.places;
-        let openness: Vec<usize> = places.iter().map(|place| open(place.at).count()).collect();
-        let best = openness.iter().copied().max().unwrap_or(0);
-        let open: Vec<SourcePlace> = (places.iter().zip(&openness))
-            .filter(|(_, open)| 2 * **open >= best)
-            .map(|(place, _)| *place)
-            .collect();
-        let nearest = |to: DVec3| {
-            let distance = |place: &&SourcePlace| place.at.distance_squared(to);
-            open.iter()
-                .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-                .map(|place| place.at)
-        };
-        let middle = open.iter().map(|place| place.at).sum::<DVec3>() / open.len() as f64;
-        let moved = eye && best >= most;
-        if let Some(place) = nearest(middle).filter(|_| moved) {
-            source.eye = place;
-        }
-        let spread = |k: usize| open[(2 * k + 1) * open.len() / (2 * count)];
-        source.places = (0..count).map(spread).collect();
-        ends_first(source);
+        let moved = open_eye(elements, source, occluders, turn);
+        source.places = spread(&source.places, wanted);
         usize::from(moved)
     });
     moved.sum()
+}
+
+/// So many of places, evenly.
+fn spread(places: &[SourcePlace], count: usize) -> Vec<SourcePlace> {
+    let at = |k: usize| places[(2 * k + 1) * places.len() / (2 * count)];
+    (0..count).map(at).collect()
+}
+
+/// Gives a source all [`SOURCE_EYES`] places. Whether its eye was moved.
+fn open_eye(
+    elements: &Elements,
+    source: &mut Source,
+    occluders: &ShadowTree<ShadowOccluder>,
+    turn: usize,
+) -> bool {
+    let tree = PartTree::of(elements, source);
+    let count = SOURCE_EYES as usize;
+    source.places = tree.places(elements, source, count, turn);
+    ends_first(source);
+    if source.element_count == 1 {
+        return false;
+    }
+    let open = |place: DVec3| open_looks(source, place, occluders);
+    let most = LOOKS / 2;
+    let covered = |place: DVec3| open(place).take(most).count() < most;
+    let eye = covered(source.eye);
+    let looked_at = || source.places.iter().step_by(EVERY);
+    if !eye && !looked_at().any(|place| covered(place.at)) {
+        return false;
+    }
+    let places = &source.places;
+    let openness: Vec<usize> = places.iter().map(|place| open(place.at).count()).collect();
+    let best = openness.iter().copied().max().unwrap_or(0);
+    let open: Vec<SourcePlace> = (places.iter().zip(&openness))
+        .filter(|(_, open)| 2 * **open >= best)
+        .map(|(place, _)| *place)
+        .collect();
+    let nearest = |to: DVec3| {
+        let distance = |place: &&SourcePlace| place.at.distance_squared(to);
+        open.iter()
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .map(|place| place.at)
+    };
+    let middle = open.iter().map(|place| place.at).sum::<DVec3>() / open.len() as f64;
+    let moved = eye && best >= most;
+    if let Some(place) = nearest(middle).filter(|_| moved) {
+        source.eye = place;
+    }
+    source.places = spread(&open, count);
+    ends_first(source);
+    moved
 }
 
 /// Moves the places furthest out to four sides to the front, see `SOURCE_ENDS`.

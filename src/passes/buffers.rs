@@ -8,7 +8,6 @@ use glam::{DVec3, Vec3};
 
 use super::receiver_blocks::receiver_blocks;
 use super::types::{Component, Meshlet, Source, Triangle, contour_corners};
-use crate::constants::{KIND_POINT, SOURCE_EYES};
 use crate::error::Result;
 use crate::mesh::charts::Connections;
 use crate::mesh::elements::Elements;
@@ -49,8 +48,10 @@ pub struct SceneBuffers {
     /// Of an element with a relief: that of even light.
     pub reflectance: Buffer,
     pub sources: Buffer,
-    /// Places on each source but point lights, `[source][SOURCE_EYES]`.
+    /// Places on each source but point lights, one source after another.
     pub eyes: Buffer,
+    /// Where those of each source begin; one more than the sources.
+    pub eye_starts: Buffer,
     pub contours: Buffer,
     /// Shares of the intensity of beams by angle.
     pub webs: Buffer,
@@ -109,6 +110,7 @@ impl SceneBuffers {
         let blocks = receiver_blocks(elements);
         let components = components(elements, connections);
         let reflectance = elements.even_reflectance();
+        let starts = eye_starts(&sources.list);
         let (geometry, storage, texels) =
             (BufferUse::Geometry, BufferUse::Storage, BufferUse::Texels);
         Ok(Self {
@@ -131,6 +133,7 @@ impl SceneBuffers {
             reflectance: upload(device, "reflectance", &reflectance, storage)?,
             sources: upload(device, "sources", &list, texels)?,
             eyes: upload(device, "eyes", &eyes(&sources.list), storage)?,
+            eye_starts: upload(device, "eye starts", &starts, storage)?,
             contours: upload(device, "contours", &contours, texels)?,
             webs: upload(device, "webs", &webs, texels)?,
             meshlets: upload(device, "meshlets", &meshlets, storage)?,
@@ -142,10 +145,21 @@ impl SceneBuffers {
 }
 
 impl SceneBuffers {
-    /// Other light of the same sources, and other places of point lights.
-    pub fn write_sources(&self, sources: &[sources::Source]) -> Result<()> {
+    /// Other light of the same sources, and other places of point lights; sources that see from more
+    /// places than before have theirs in other buffers then.
+    pub fn write_sources(
+        &mut self,
+        device: &Arc<Device>,
+        sources: &[sources::Source],
+        more_eyes: bool,
+    ) -> Result<()> {
         let Outlined { list, webs, .. } = Outlined::new(sources);
         self.sources.set(&list)?;
+        if more_eyes {
+            let starts = eye_starts(sources);
+            self.eyes = upload(device, "eyes", &eyes(sources), BufferUse::Storage)?;
+            self.eye_starts = upload(device, "eye starts", &starts, BufferUse::Storage)?;
+        }
         if sources.iter().any(sources::Source::is_far) {
             self.eyes.set(&eyes(sources))?;
             self.webs.set(&webs)?;
@@ -154,27 +168,29 @@ impl SceneBuffers {
     }
 }
 
-/// Places on each source but point lights, which follow those on surfaces, with the packed normals
-/// of curved ones, `[source][SOURCE_EYES]`.
+/// Places on each source, with the packed normals of curved ones, one source after another. Only the
+/// `receiver` estimator gives sources places, and reads them.
 fn eyes(sources: &[sources::Source]) -> Vec<[f32; 4]> {
-    let of_source = |source: &sources::Source| {
-        let texel = |k| {
-            // A source whose light is not cut sees from one place.
-            let place: Option<&SourcePlace> = source.places.get(k);
-            let at = place.map_or(source.eye, |place| place.at).as_vec3();
-            let normal = place
-                .map(|place| place.normal)
-                .filter(|_| source.cone > 0.0);
-            at.extend(packed(normal.unwrap_or_default())).to_array()
+    let texels = |source: &sources::Source| {
+        let is_curved = source.cone > 0.0;
+        let texel = move |place: &SourcePlace| {
+            let normal = if is_curved { place.normal } else { DVec3::ZERO };
+            place.at.as_vec3().extend(packed(normal)).to_array()
         };
-        (0..SOURCE_EYES as usize).map(texel).collect::<Vec<_>>()
+        source.places.iter().map(texel).collect::<Vec<_>>()
     };
-    // Only the `receiver` estimator gives sources places, and reads them.
-    if sources.iter().all(|source| source.places.is_empty()) {
-        return Vec::new();
-    }
-    let seeing = sources.iter().filter(|source| source.kind != KIND_POINT);
-    seeing.flat_map(of_source).collect()
+    sources.iter().flat_map(texels).collect()
+}
+
+/// Where the places of each source begin among those of all; one more than the sources.
+fn eye_starts(sources: &[sources::Source]) -> Vec<u32> {
+    let mut starts = vec![0];
+    let mut end = 0;
+    starts.extend(sources.iter().map(|source| {
+        end += source.places.len() as u32;
+        end
+    }));
+    starts
 }
 
 /// The bits of a vector with components from -1 to 1, as `unpackSnorm4x8` reads them.
@@ -245,19 +261,17 @@ impl Outlined {
             webs: Vec::new(),
         };
         // Lights have no elements; of a far one the first eye stands there.
-        let mut sees = 0;
-        let mut with_eyes = |mut row: Source, source: &sources::Source| {
+        let with_eyes = |mut row: Source, source: &sources::Source, first_eye: u32| {
             if source.is_far() {
-                row.first_element = SOURCE_EYES * sees;
+                row.first_element = first_eye;
             }
-            sees += u32::from(source.kind != KIND_POINT);
             row
         };
-        for source in sources {
+        for (source, first_eye) in sources.iter().zip(eye_starts(sources)) {
             if let Some(web) = &source.web {
                 let (first, rows) = (outlined.webs.len() as u32, web.rows);
                 let beam = Source::beam(source, (first, web.columns), rows);
-                outlined.list.push(with_eyes(beam, source));
+                outlined.list.push(with_eyes(beam, source, first_eye));
                 outlined.webs.extend(&web.shares);
                 continue;
             }
@@ -265,7 +279,7 @@ impl Outlined {
             let outline = (outlined.contours.len() as u32, corners.len() as u32);
             let first_part = outlined.parts.len() as u32;
             let row = Source::new(source, outline, first_part);
-            outlined.list.push(with_eyes(row, source));
+            outlined.list.push(with_eyes(row, source, first_eye));
             outlined.contours.extend(corners);
             outlined.parts.extend(source.parts.iter().map(|part| {
                 let mut words = [0.0; PART_WORDS];

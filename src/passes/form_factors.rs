@@ -9,7 +9,6 @@ use std::sync::Arc;
 use super::batch::{Batch, Hemicubes, Sight};
 use super::buffers::SceneBuffers;
 use super::fresh_rows::{FreshRows, ReceiverLists};
-use super::groups;
 use super::near_marks::NearMarks;
 use super::occluder_tree::OccluderTree;
 use super::shaders::{
@@ -17,6 +16,7 @@ use super::shaders::{
     resolve_receivers, sort_receivers, sort_receivers_rays,
 };
 use super::types::ReceiverList;
+use super::{PART_PAIRS, Parts, groups};
 use crate::constants::{
     RECEIVE_CROSSED, RECEIVE_DOUBTFUL, RECEIVE_KINDS, RECEIVE_LISTS, SORT_ELEMENTS, SORT_SLOTS,
 };
@@ -178,9 +178,11 @@ impl FormFactors {
             first_block: range.first_block,
             block_count: rows.shape.blocks(),
         };
+        let mut parts = Parts::of(PART_PAIRS);
         for first in (0..self.slot_count).step_by(self.at_once as usize) {
             for range in &self.ranges {
                 let slots = first..(first + self.at_once).min(self.slot_count);
+                parts.step(cmd, u64::from(range.element_count) * slots.len() as u64);
                 let size = [groups(range.element_count.div_ceil(SORT_ELEMENTS)), 1, 1];
                 cmd.dispatch(&range.sort, &parameters(range, slots), size);
             }
@@ -193,6 +195,7 @@ impl FormFactors {
         for range in &self.ranges {
             for &(list, ref resolve) in &range.resolve {
                 for slot in 0..self.slot_count {
+                    parts.step(cmd, range.element_count.into());
                     let push = parameters(range, slot..slot + 1);
                     let at = list_at(slot, list);
                     cmd.dispatch_indirect(resolve, &push, &range.lists.counts, at);
@@ -204,6 +207,7 @@ impl FormFactors {
         // Every element is in one list of a slot at most.
         for range in &self.ranges {
             for slot in 0..self.slot_count {
+                parts.step(cmd, range.element_count.into());
                 for (kind, form_factors) in (0..).zip(&range.form_factors) {
                     let push = parameters(range, slot..slot + 1);
                     let at = list_at(slot, kind);
@@ -273,7 +277,8 @@ fn sort(
                 blocks,
                 shadow_occluders,
                 near_marks,
-                eyes: &on.scene.eyes
+                eyes: &on.scene.eyes,
+                eye_starts: &on.scene.eye_starts
             );
             pipeline(&sort_receivers_rays::SHADER)?.bind(&bindings)
         }
@@ -296,8 +301,14 @@ fn resolve(device: &Arc<Device>, on: &On<'_>, places: u32) -> Result<Vec<(u32, B
         Sight::Hemicubes(hemicubes) => rays(hemicubes),
     };
     let (shadow_nodes, shadow_occluders) = (&tree.nodes, &tree.occluders);
-    let eyes = &on.scene.eyes;
-    let bindings = receivers!(resolve_receivers, on, shadow_nodes, shadow_occluders, eyes);
+    let bindings = receivers!(
+        resolve_receivers,
+        on,
+        shadow_nodes,
+        shadow_occluders,
+        eyes: &on.scene.eyes,
+        eye_starts: &on.scene.eye_starts
+    );
     let bind = |list: u32| {
         let shader = &resolve_receivers::SHADER;
         let pipeline =

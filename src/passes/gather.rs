@@ -101,7 +101,21 @@ struct On<'a> {
 }
 
 /// Slots of a dispatch: a software device ends a shader's loops after 65,535 turns of all together.
-pub const MOST_SLOTS: u32 = 1024;
+const MOST_SLOTS: u32 = 1024;
+
+/// Elements times rows of a part of a submission, at most, and where some have a relief: some 0.1 s
+/// by lavapipe's two cores.
+const PART_PAIRS: u32 = 1 << 26;
+const RELIEF_PAIRS: u32 = 1 << 22;
+
+/// Rows that are gathered at once, at most.
+pub fn most_rows(elements: u32, relief: Option<&ReliefBuffers>) -> u32 {
+    let most = match relief {
+        None => PART_PAIRS / elements.max(1),
+        Some(relief) => relief.slots.min(RELIEF_PAIRS / elements.max(1)),
+    };
+    most.clamp(1, MOST_SLOTS)
+}
 
 impl Gather {
     pub fn new(
@@ -173,38 +187,32 @@ impl Gather {
         })
     }
 
-    /// One part of the light of these slots of the list, in steps that software devices finish.
-    /// With relief no more than [`ReliefBuffers::slots`], of which [`super::send_relief`] has found
-    /// what they send by direction.
+    /// One part of the light of these slots of the list, no more than [`most_rows`]. With relief
+    /// [`super::send_relief`] has found what they send by direction.
     pub fn record(&self, cmd: &Commands, of: &ChunkSlots, part: Part) {
         let shape = self.shape;
         let light = part as usize;
         let bound = &self.chunks[of.chunk as usize];
-        for first_slot in of.slots.clone().step_by(MOST_SLOTS as usize) {
-            let plain = gather::Parameters {
-                first_slot,
-                end_slot: of.slots.end.min(first_slot + MOST_SLOTS),
-                reflected: (part == Part::Reflected).into(),
-                ..self.parameters
+        let plain = gather::Parameters {
+            first_slot: of.slots.start,
+            end_slot: of.slots.end,
+            reflected: (part == Part::Reflected).into(),
+            ..self.parameters
+        };
+        let size = [groups(shape.plain_count), 1, 1];
+        cmd.dispatch(&bound.plain[light], &plain, size);
+        if let Some(bound) = &bound.meso {
+            let meso = gather::Parameters {
+                first_element: shape.plain_count,
+                element_count: shape.meso_count,
+                first_block: shape.plain_blocks(),
+                ..plain
             };
-            cmd.dispatch(
-                &bound.plain[light],
-                &plain,
-                [groups(shape.plain_count), 1, 1],
-            );
-            if let Some(bound) = &bound.meso {
-                let meso = gather::Parameters {
-                    first_element: shape.plain_count,
-                    element_count: shape.meso_count,
-                    first_block: shape.plain_blocks(),
-                    ..plain
-                };
-                let parts = GROUP.div_ceil(self.lanes);
-                let size = [groups(shape.meso_count), parts, 1];
-                cmd.dispatch(&bound[light], &meso, size);
-            }
-            cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+            let parts = GROUP.div_ceil(self.lanes);
+            let size = [groups(shape.meso_count), parts, 1];
+            cmd.dispatch(&bound[light], &meso, size);
         }
+        cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
     }
 }
 

@@ -8,12 +8,15 @@ use std::sync::Arc;
 use super::batch::{Batch, Sight};
 use super::buffers::SceneBuffers;
 use super::fresh_rows::{FreshRows, ReceiverLists};
-use super::groups;
 use super::shaders::{light_rows, light_rows_relief, light_survey, light_survey_relief};
 use super::types::ReceiverList;
+use super::{PART_PAIRS, Parts, groups};
 use crate::constants::{RECEIVE_CROSSED, RECEIVE_LISTS, SURVEY_ELEMENTS};
 use crate::error::Result;
 use crate::vk::{BoundCompute, Buffer, Commands, ComputePipeline, Device, Stage};
+
+/// Of a pair, over those of one with a source on a surface, about.
+const RAYS: u64 = 8;
 
 /// Bound to a batch of lights of one kind.
 pub struct LightRows {
@@ -152,8 +155,10 @@ impl LightRows {
             cmd.dispatch(&range.survey, &parameters(range, 0), size);
         }
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+        let mut parts = Parts::of(PART_PAIRS / RAYS);
         for range in &self.ranges {
             for slot in 0..self.slot_count {
+                parts.step(cmd, range.element_count.into());
                 let list = u64::from(slot * RECEIVE_LISTS + RECEIVE_CROSSED);
                 let at = size_of::<ReceiverList>() as u64 * list;
                 let push = parameters(range, slot);

@@ -37,6 +37,7 @@ pub mod types;
 pub mod unshot;
 
 use crate::constants::GROUP;
+use crate::vk::Commands;
 
 /// The shaders, each in a module with its words, its bindings and its push constants by name,
 /// which the build writes from the GLSL.
@@ -57,4 +58,30 @@ pub mod shaders {
 /// Workgroups for one invocation an item.
 fn groups(items: u32) -> u32 {
     items.div_ceil(GROUP)
+}
+
+/// Elements times sources whose form factors a part of a submission finds, at most: some 0.1 s by
+/// lavapipe's two cores.
+const PART_PAIRS: u64 = 1 << 18;
+
+/// Cuts what is recorded into parts, so that no submission is long enough for a driver to end it.
+struct Parts {
+    most: u64,
+    recorded: u64,
+}
+
+impl Parts {
+    /// Of so much work at most, but for what a single step takes.
+    fn of(most: u64) -> Self {
+        Self { most, recorded: 0 }
+    }
+
+    /// Before a step with so much work.
+    fn step(&mut self, cmd: &Commands, work: u64) {
+        if self.recorded > 0 && self.recorded + work > self.most {
+            cmd.part();
+            self.recorded = 0;
+        }
+        self.recorded += work;
+    }
 }

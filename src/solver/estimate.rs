@@ -67,6 +67,7 @@ impl Evaluate {
     /// Ends with a barrier before compute passes. Calls `stamp` twice: when it is sorted which
     /// elements see the sources, and when rays have decided where that was left open.
     pub fn record(&self, cmd: &Commands, mut stamp: impl FnMut()) {
+        cmd.part();
         cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
         match self {
             Self::Receivers {
@@ -75,6 +76,7 @@ impl Evaluate {
                 normalise,
             } => {
                 form_factors.record(cmd, stamp);
+                cmd.part();
                 cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
                 near.record(cmd);
                 if let Some(normalise) = normalise {

@@ -9,7 +9,7 @@ use super::Problem;
 use super::near::ByLight;
 use crate::error::Result;
 use crate::passes::buffers::{State, download, download_all};
-use crate::passes::gather::{ChunkSlots, Gather, GatherList, MOST_SLOTS, Part};
+use crate::passes::gather::{ChunkSlots, Gather, GatherList, Part, most_rows};
 use crate::passes::kept_rows::KeptRows;
 use crate::passes::measure::Measure;
 use crate::passes::measure_relief::MeasureRelief;
@@ -34,6 +34,8 @@ pub(super) struct Gathering {
     device: Arc<Device>,
     gather: Gather,
     list: GatherList,
+    /// Rows that are gathered at once, at most.
+    most: usize,
     measure: Measure,
     /// What is measured, `[source]`.
     reflected: Buffer,
@@ -47,9 +49,8 @@ pub(super) struct Gathering {
 pub(super) struct ByDirection {
     send: SendRelief,
     measure: MeasureRelief,
-    /// The sources with a relief, and how many send at once, at most.
+    /// The sources with a relief.
     sources: Range<u32>,
-    slots: usize,
 }
 
 impl Gathering {
@@ -69,12 +70,12 @@ impl Gathering {
                 send: SendRelief::new(device, scene, &list.slots, relief)?,
                 measure: MeasureRelief::new(device, scene, state, relief)?,
                 sources: relief.first_source..relief.first_source + relief.source_count,
-                slots: relief.slots.min(MOST_SLOTS) as usize,
             })
         };
         Ok(Self {
             device: Arc::clone(device),
             gather: Gather::new(device, scene, state, kept, &list, relief)?,
+            most: most_rows(scene.element_count, relief) as usize,
             measure: Measure::new(device, scene, state)?,
             reflected: state.reflected.clone(),
             near: relief
@@ -105,13 +106,10 @@ impl Gathering {
         self.list.write(&slots, &places)?;
         Commands::run(&self.device, "gather", |cmd| {
             cmd.barrier(&[Stage::Compute, Stage::Transfer], &[Stage::Compute]);
-            let most = self
-                .relief
-                .as_ref()
-                .map_or(usize::MAX, |relief| relief.slots);
             let of_chunks = rows.chunk_by(|a, b| a.row.chunk == b.row.chunk);
             let mut first = 0;
-            for some in of_chunks.flat_map(|rows| rows.chunks(most)) {
+            for some in of_chunks.flat_map(|rows| rows.chunks(self.most)) {
+                cmd.part();
                 let end = first + some.len() as u32;
                 let of = ChunkSlots {
                     chunk: some[0].row.chunk,

@@ -166,9 +166,9 @@ impl Solver {
             let what = "the paper's method keeps no form factors: bake again";
             return Err(Error::Usage(what.into()));
         };
-        let moved = self.problem.relight(&self.device, scene)?;
+        let relit = self.problem.relight(&self.device, scene)?;
         self.bound = Bound::new(&self.problem);
-        spine.relight(&self.problem, self.bound, &moved)?;
+        spine.relight(&self.problem, self.bound, &relit)?;
         self.report = Report::new(&spine.devices, &self.problem);
         self.report.seconds.setup = start.elapsed().as_secs_f64();
         Ok(())

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use super::{Estimator, Settings, Visibility};
-use crate::constants::LISTED_BITS;
+use crate::constants::{LISTED_BITS, SOURCE_EYES};
 use crate::error::{Error, Result};
 use crate::mesh::charts::Connections;
 use crate::mesh::elements::Elements;
@@ -93,7 +93,8 @@ impl Problem {
         let (occluder_tree, near) = match settings.estimator {
             Estimator::Receiver => {
                 let tree = ShadowTree::new(occluders.casters(&elements, &connections));
-                open_eyes(&elements, &mut sources.list, &tree);
+                let places = wanted_places(&sources.list, settings);
+                open_eyes(&elements, &mut sources.list, &tree, &places);
                 far_power(&elements, &mut sources.list, &tree);
                 let list = &sources.list;
                 let near = match kept {
@@ -138,12 +139,12 @@ impl Problem {
     }
 
     /// Takes the emission and the point lights of `scene`, which is otherwise this one, and forgets
-    /// all light. Which sources are lights that have moved, `[source]`.
+    /// all light.
     ///
     /// # Errors
     /// Emission of elements that neither emitted nor reflected; another number of point lights. The
     /// problem is then as it was.
-    pub(super) fn relight(&mut self, device: &Arc<Device>, scene: &Scene) -> Result<Vec<bool>> {
+    pub(super) fn relight(&mut self, device: &Arc<Device>, scene: &Scene) -> Result<Relit> {
         if scene.materials.len() < self.grouped_by.emitted.len() {
             return Err(Error::Usage("another scene: bake again".into()));
         }
@@ -168,16 +169,30 @@ impl Problem {
         let places = sources.list.iter().zip(&self.sources.list);
         let moved = places.map(|(now, before)| now.eye != before.eye || now.is_far());
         let moved = moved.collect();
+        let wanted = wanted_places(&sources.list, &self.settings);
+        let lacks = |(source, &wanted): (&Source, &usize)| {
+            source.is_surface() && source.places.len() < wanted
+        };
+        let is_receiver = self.settings.estimator == Estimator::Receiver;
+        let more_eyes = is_receiver && sources.list.iter().zip(&wanted).any(lacks);
+        if more_eyes {
+            open_eyes(
+                &self.elements,
+                &mut sources.list,
+                &self.occluder_tree,
+                &wanted,
+            );
+        }
         self.sources = sources;
         self.sky = scene.lights.sky.clone();
-        self.scene.write_sources(&self.sources.list)?;
+        (self.scene).write_sources(device, &self.sources.list, more_eyes)?;
         Commands::run(device, "no light", |cmd| {
             self.state.buffers().for_each(|buffer| cmd.fill(buffer, 0));
             let relief = self.relief.iter().flat_map(ReliefBuffers::light);
             relief.for_each(|buffer| cmd.fill(buffer, 0));
             Ok(())
         })?;
-        Ok(moved)
+        Ok(Relit { moved, more_eyes })
     }
 
     /// The scene's buffers on another device.
@@ -194,12 +209,32 @@ impl Problem {
 
     /// Whether a source emits so strongly that it is looked at with more care, `[source]`.
     pub(super) fn strong(&self) -> Vec<bool> {
-        let list = &self.sources.list;
-        let least = sources::least_strong(list, &self.settings.grouping);
-        let strong =
-            |source: &Source| !source.is_far() && least > 0.0 && source.emitted_power() >= least;
-        list.iter().map(strong).collect()
+        strong(&self.sources.list, &self.settings)
     }
+}
+
+/// What has changed with the light of a problem.
+pub(super) struct Relit {
+    /// Lights that have moved, `[source]`.
+    pub moved: Vec<bool>,
+    /// Sources are looked at with more care than before: what was made to draw them cannot.
+    pub more_eyes: bool,
+}
+
+fn strong(list: &[Source], settings: &Settings) -> Vec<bool> {
+    let least = sources::least_strong(list, &settings.grouping);
+    let strong =
+        |source: &Source| !source.is_far() && least > 0.0 && source.emitted_power() >= least;
+    list.iter().map(strong).collect()
+}
+
+/// Places from which each source is looked at where a silhouette may cut it, `[source]`.
+fn wanted_places(list: &[Source], settings: &Settings) -> Vec<usize> {
+    let places = |is_strong| match is_strong {
+        true => SOURCE_EYES as usize,
+        false => settings.places as usize,
+    };
+    strong(list, settings).into_iter().map(places).collect()
 }
 
 /// What settings ask of relief and cannot be.

@@ -17,6 +17,7 @@ use super::journal::{Checkpoints, Journal};
 use super::ledger::{Candidates, Drawn, Ledger, strongest_first};
 use super::makers::{Batch, RowKind, TeamParts};
 use super::near::NearLight;
+use super::problem::Relit;
 use super::progress::{Bound, Watch};
 use super::rows::{Factors, Made};
 use super::team::{Taken, Team};
@@ -138,9 +139,9 @@ impl Spine {
         Ok(())
     }
 
-    /// Begins again with the rows that there are, but for those of lights that have `moved`,
-    /// `[source]`.
-    pub fn relight(&mut self, on: &Problem, bound: Bound, moved: &[bool]) -> Result<()> {
+    /// Begins again with the rows that there are, but for those of lights that have moved.
+    pub fn relight(&mut self, on: &Problem, bound: Bound, relit: &Relit) -> Result<()> {
+        let moved = &relit.moved;
         // It is of the light before.
         self.journal = None;
         let before = &mut self.ledger;
@@ -162,7 +163,9 @@ impl Spine {
         let kinds = self.kinds_to_draw();
         let makes = |team: &Team, kind| kind == RowKind::Common || team.has(kind);
         let team = self.team.take();
-        let fits = |team: &Team| team.is_alone() && kinds.iter().all(|&kind| makes(team, kind));
+        let fits = |team: &Team| {
+            team.is_alone() && !relit.more_eyes && kinds.iter().all(|&kind| makes(team, kind))
+        };
         self.team = team.filter(fits);
         let kept: Vec<KeptRow> = self.ledger.sources.iter().filter_map(|d| d.row).collect();
         self.kept.forget(&dropped, &kept)

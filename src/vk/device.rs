@@ -1,15 +1,17 @@
 //! The logical device, its queue and its memory.
 
+use std::collections::BTreeMap;
 use std::ffi::CString;
 use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::Duration;
 
 use ash::{ext, khr, vk};
-use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{
     Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc,
 };
+use gpu_allocator::{AllocationSizes, MemoryLocation};
 
 use super::instance::{Candidate, Instance, graphics_family};
 use super::uploads::Uploads;
@@ -28,6 +30,7 @@ pub struct Device {
     pub(super) uploads: Mutex<Uploads>,
     /// Submissions so far.
     pub(super) submissions: AtomicU64,
+    part_times: Mutex<Option<PartTimes>>,
     #[cfg_attr(not(feature = "window"), allow(dead_code))] // read by swapchains only
     pub(super) instance: Arc<Instance>,
 }
@@ -39,6 +42,11 @@ pub(super) struct MemoryRequest<'a> {
     pub(super) location: MemoryLocation,
     pub(super) of: Resource,
 }
+
+/// How long the parts of submissions take, by the name of their commands: how many there were, and
+/// the longest.
+#[derive(Debug, Clone, Default)]
+pub struct PartTimes(pub BTreeMap<String, (u64, Duration)>);
 
 /// What memory is for.
 #[derive(Clone, Copy)]
@@ -118,6 +126,7 @@ impl Device {
             names,
             limits: Limits::new(candidate, &properties.limits),
             candidate: candidate.clone(),
+            part_times: Mutex::default(),
             uploads: Mutex::default(),
             submissions: AtomicU64::new(0),
             instance: Arc::clone(instance),
@@ -131,6 +140,29 @@ impl Device {
 
     pub fn name(&self) -> &str {
         &self.candidate.name
+    }
+
+    /// Measures each part of what is submitted from now on, one at a time: for tests, since it is
+    /// slow.
+    pub fn time_parts(&self) {
+        *lock(&self.part_times) = Some(PartTimes::default());
+    }
+
+    /// What was measured since [`Self::time_parts`].
+    pub fn timed_parts(&self) -> PartTimes {
+        lock(&self.part_times).clone().unwrap_or_default()
+    }
+
+    pub(super) fn times_parts(&self) -> bool {
+        lock(&self.part_times).is_some()
+    }
+
+    pub(super) fn add_part(&self, name: &str, time: Duration) {
+        if let Some(PartTimes(times)) = &mut *lock(&self.part_times) {
+            let (count, longest) = times.entry(name.to_owned()).or_default();
+            *count += 1;
+            *longest = time.max(*longest);
+        }
     }
 
     /// Submissions to the queue since the device was made.
@@ -262,7 +294,10 @@ fn allocator(instance: &Instance, candidate: &Candidate, raw: &ash::Device) -> R
         physical_device: candidate.raw,
         debug_settings: Default::default(),
         buffer_device_address: true,
-        allocation_sizes: Default::default(),
+        // Blocks grow as more are needed, so that a small scene takes little.
+        allocation_sizes: AllocationSizes::new(4 << 20, 4 << 20)
+            .with_max_device_memblock_size(256 << 20)
+            .with_max_host_memblock_size(64 << 20),
     })
     .map_err(|e| Error::Device(format!("{}: allocator: {e}", candidate.name)))
 }

@@ -36,7 +36,7 @@ pub use buffer::{Buffer, BufferUse, TEXEL_BYTES};
 pub use commands::Commands;
 pub use compute::{BoundCompute, ComputePipeline};
 pub use descriptors::{Bind, Binding, DescriptorSet, Sampled};
-pub use device::{Device, Left, Limits, left};
+pub use device::{Device, Left, Limits, PartTimes, left};
 pub use graphics::{Blending, GraphicsPipeline, GraphicsState, VertexAttribute};
 pub use image::{Image, ImageUse};
 pub use instance::{Candidate, Instance, validation_log, validation_messages};

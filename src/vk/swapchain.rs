@@ -215,7 +215,7 @@ impl Swapchain {
         // formats of four bytes.
         unsafe {
             self.device.raw.cmd_copy_image(
-                cmd.raw,
+                cmd.raw(),
                 image.owner.raw,
                 L::TRANSFER_SRC_OPTIMAL,
                 to,
@@ -250,7 +250,7 @@ impl Swapchain {
             )];
         let info = vk::DependencyInfo::default().image_memory_barriers(&barriers);
         // SAFETY: the image is acquired, and in the layout `old` or its content may be lost.
-        unsafe { self.device.raw.cmd_pipeline_barrier2(cmd.raw, &info) };
+        unsafe { self.device.raw.cmd_pipeline_barrier2(cmd.raw(), &info) };
     }
 }
 

@@ -93,8 +93,8 @@ pub struct Source {
     pub kind: u32,
     /// The hemicube's centre: on the surface, or at the point light.
     pub eye: DVec3,
-    /// Places on it, evenly by area, from which silhouettes cut it; none before
-    /// [`crate::mesh::open_eyes`].
+    /// Places on it, evenly by area, from which silhouettes cut it; more of a strong emitter. None
+    /// before [`crate::mesh::open_eyes`]. Of a far light its directions.
     pub places: Vec<SourcePlace>,
     /// Centroid of the area.
     pub centroid: DVec3,

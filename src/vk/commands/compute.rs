@@ -16,7 +16,7 @@ impl Commands {
         unsafe {
             self.device
                 .raw
-                .cmd_dispatch(self.raw, groups[0], groups[1], groups[2]);
+                .cmd_dispatch(self.raw(), groups[0], groups[1], groups[2]);
         }
     }
 
@@ -34,7 +34,7 @@ impl Commands {
         unsafe {
             self.device
                 .raw
-                .cmd_dispatch_indirect(self.raw, counts.owner.raw, offset);
+                .cmd_dispatch_indirect(self.raw(), counts.owner.raw, offset);
         }
     }
 
@@ -48,9 +48,9 @@ impl Commands {
         let raw = &self.device.raw;
         // SAFETY: set and constants are those of the pipeline, as checked.
         unsafe {
-            raw.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::COMPUTE, pipeline.raw);
+            raw.cmd_bind_pipeline(self.raw(), vk::PipelineBindPoint::COMPUTE, pipeline.raw);
             raw.cmd_bind_descriptor_sets(
-                self.raw,
+                self.raw(),
                 vk::PipelineBindPoint::COMPUTE,
                 pipeline.layout,
                 0,
@@ -59,7 +59,7 @@ impl Commands {
             );
             if !bytes.is_empty() {
                 raw.cmd_push_constants(
-                    self.raw,
+                    self.raw(),
                     pipeline.layout,
                     vk::ShaderStageFlags::COMPUTE,
                     0,

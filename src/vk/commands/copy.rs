@@ -25,7 +25,7 @@ impl Commands {
         unsafe {
             self.device
                 .raw
-                .cmd_copy_buffer(self.raw, from.owner.raw, to.owner.raw, &regions);
+                .cmd_copy_buffer(self.raw(), from.owner.raw, to.owner.raw, &regions);
         }
     }
 
@@ -36,7 +36,7 @@ impl Commands {
         unsafe {
             self.device
                 .raw
-                .cmd_fill_buffer(self.raw, buffer.owner.raw, 0, vk::WHOLE_SIZE, word);
+                .cmd_fill_buffer(self.raw(), buffer.owner.raw, 0, vk::WHOLE_SIZE, word);
         }
     }
 
@@ -48,7 +48,7 @@ impl Commands {
         // SAFETY: the render pass left the image in this layout, and the buffer holds its texels.
         unsafe {
             self.device.raw.cmd_copy_image_to_buffer(
-                self.raw,
+                self.raw(),
                 image.owner.raw,
                 L::TRANSFER_SRC_OPTIMAL,
                 to.owner.raw,
@@ -87,7 +87,7 @@ impl Commands {
         // SAFETY: the transition leaves the image in this layout, and the buffer holds its texels.
         unsafe {
             self.device.raw.cmd_copy_buffer_to_image(
-                self.raw,
+                self.raw(),
                 from.owner.raw,
                 owner.raw,
                 L::TRANSFER_DST_OPTIMAL,
@@ -115,7 +115,7 @@ impl Commands {
             )];
         let info = vk::DependencyInfo::default().image_memory_barriers(&barriers);
         // SAFETY: the image is in the layout `old`, or its content may be lost (undefined).
-        unsafe { self.device.raw.cmd_pipeline_barrier2(self.raw, &info) };
+        unsafe { self.device.raw.cmd_pipeline_barrier2(self.raw(), &info) };
     }
 }
 

@@ -34,13 +34,13 @@ impl Commands {
         unsafe {
             self.device
                 .raw
-                .cmd_begin_render_pass(self.raw, &info, vk::SubpassContents::INLINE);
+                .cmd_begin_render_pass(self.raw(), &info, vk::SubpassContents::INLINE);
         }
     }
 
     pub fn end_render_pass(&self) {
         // SAFETY: closes `begin_render_pass`.
-        unsafe { self.device.raw.cmd_end_render_pass(self.raw) };
+        unsafe { self.device.raw.cmd_end_render_pass(self.raw()) };
     }
 
     pub fn bind_graphics(
@@ -57,9 +57,9 @@ impl Commands {
         // SAFETY: the set is one of the pipeline, as checked; vertices match by construction of
         // the pass.
         unsafe {
-            raw.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::GRAPHICS, pipeline.raw);
+            raw.cmd_bind_pipeline(self.raw(), vk::PipelineBindPoint::GRAPHICS, pipeline.raw);
             raw.cmd_bind_descriptor_sets(
-                self.raw,
+                self.raw(),
                 vk::PipelineBindPoint::GRAPHICS,
                 pipeline.layout,
                 0,
@@ -70,7 +70,7 @@ impl Commands {
         if let Some(vertices) = vertices {
             self.hold(&vertices.owner);
             // SAFETY: the buffer feeds vertices.
-            unsafe { raw.cmd_bind_vertex_buffers(self.raw, 0, &[vertices.owner.raw], &[0]) };
+            unsafe { raw.cmd_bind_vertex_buffers(self.raw(), 0, &[vertices.owner.raw], &[0]) };
         }
     }
 
@@ -79,7 +79,7 @@ impl Commands {
         // SAFETY: the buffer feeds indices, of 32 bits each.
         unsafe {
             self.device.raw.cmd_bind_index_buffer(
-                self.raw,
+                self.raw(),
                 indices.owner.raw,
                 0,
                 vk::IndexType::UINT32,
@@ -98,7 +98,7 @@ impl Commands {
             max_depth: 1.0,
         }];
         // SAFETY: the viewport is dynamic in every pipeline of this crate.
-        unsafe { self.device.raw.cmd_set_viewport(self.raw, 0, &viewports) };
+        unsafe { self.device.raw.cmd_set_viewport(self.raw(), 0, &viewports) };
         self.scissor(x, y, width, height);
     }
 
@@ -106,7 +106,7 @@ impl Commands {
     pub fn scissor(&self, x: u32, y: u32, width: u32, height: u32) {
         let scissors = [rectangle(x, y, width, height)];
         // SAFETY: the scissor is dynamic in every pipeline of this crate.
-        unsafe { self.device.raw.cmd_set_scissor(self.raw, 0, &scissors) };
+        unsafe { self.device.raw.cmd_set_scissor(self.raw(), 0, &scissors) };
     }
 
     pub fn push_graphics<P: ShaderParameters>(&self, pipeline: &GraphicsPipeline, push: &P) {
@@ -115,7 +115,7 @@ impl Commands {
         // SAFETY: the constants fit the pipeline's range; only its layout is used, while recording.
         unsafe {
             self.device.raw.cmd_push_constants(
-                self.raw,
+                self.raw(),
                 pipeline.layout,
                 GRAPHICS_STAGES,
                 0,
@@ -131,14 +131,14 @@ impl Commands {
         unsafe {
             self.device
                 .raw
-                .cmd_draw_indirect(self.raw, draws.owner.raw, offset, 1, 16);
+                .cmd_draw_indirect(self.raw(), draws.owner.raw, offset, 1, 16);
         }
     }
 
     /// Draws without vertex and index buffers.
     pub fn draw(&self, vertex_count: u32) {
         // SAFETY: the bound pipeline reads no vertices.
-        unsafe { self.device.raw.cmd_draw(self.raw, vertex_count, 1, 0, 0) };
+        unsafe { self.device.raw.cmd_draw(self.raw(), vertex_count, 1, 0, 0) };
     }
 
     pub fn draw_indexed(&self, first_index: u32, index_count: u32) {
@@ -146,7 +146,7 @@ impl Commands {
         unsafe {
             self.device
                 .raw
-                .cmd_draw_indexed(self.raw, index_count, 1, first_index, 0, 0);
+                .cmd_draw_indexed(self.raw(), index_count, 1, first_index, 0, 0);
         }
     }
 }

@@ -5,21 +5,27 @@ mod copy;
 mod draw;
 
 use std::cell::RefCell;
+use std::slice;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::time::Instant;
 
 use ash::vk;
 
 use super::held::Held;
 use super::{Device, Stage, Timestamps};
-use crate::error::Result;
+use crate::error::{Error, Result};
 
-/// A command buffer, recorded once and submitted any number of times, with the fence of its last
+/// Commands, recorded once and submitted any number of times, with the fence of their last
 /// submission.
 ///
-/// It keeps alive what it records. Dropping it waits for the last submission.
+/// They keep alive what they record. Dropping them waits for the last submission.
 pub struct Commands {
-    pub(super) raw: vk::CommandBuffer,
+    /// In their order; the last one is being recorded. Each is a batch of its own in a submission.
+    parts: RefCell<Vec<vk::CommandBuffer>>,
+    name: String,
+    /// Why a part could not end.
+    failed: RefCell<Option<Error>>,
     pool: vk::CommandPool,
     fence: vk::Fence,
     under_way: bool,
@@ -44,7 +50,9 @@ impl Commands {
         let pool = unsafe { device.raw.create_command_pool(&info, None) }
             .map_err(device.error("creating a command pool"))?;
         let mut commands = Self {
-            raw: vk::CommandBuffer::null(),
+            parts: RefCell::default(),
+            name: name.to_owned(),
+            failed: RefCell::default(),
             pool,
             fence: vk::Fence::null(),
             under_way: false,
@@ -52,13 +60,6 @@ impl Commands {
             uploads: None,
             device: Arc::clone(device),
         };
-        let info = vk::CommandBufferAllocateInfo::default()
-            .command_pool(pool)
-            .level(vk::CommandBufferLevel::PRIMARY)
-            .command_buffer_count(1);
-        // SAFETY: the pool is this object's own.
-        commands.raw = unsafe { device.raw.allocate_command_buffers(&info) }
-            .map_err(device.error("allocating a command buffer"))?[0];
         // SAFETY: a plain creation on a live device.
         commands.fence = unsafe {
             device
@@ -66,20 +67,55 @@ impl Commands {
                 .create_fence(&vk::FenceCreateInfo::default(), None)
         }
         .map_err(device.error("creating a fence"))?;
-        device.set_name(commands.raw, name);
         device.set_name(commands.fence, name);
-        // SAFETY: the buffer is new, and recorded only here.
-        unsafe {
-            device
-                .raw
-                .begin_command_buffer(commands.raw, &vk::CommandBufferBeginInfo::default())
-        }
-        .map_err(device.error("recording"))?;
+        let first = commands.begin()?;
+        commands.parts.get_mut().push(first);
         record(&commands)?;
-        // SAFETY: recording was begun above.
-        unsafe { device.raw.end_command_buffer(commands.raw) }
-            .map_err(device.error("recording"))?;
+        if let Some(error) = commands.failed.take() {
+            return Err(error);
+        }
+        commands.end()?;
         Ok(commands)
+    }
+
+    /// Ends a part here, outside a render pass: drivers that end what takes too long measure each
+    /// by itself. Barriers reach across. Where no other can begin, this one goes on.
+    pub fn part(&self) {
+        let Ok(next) = self.begin() else {
+            return;
+        };
+        if let Err(error) = self.end() {
+            self.failed.borrow_mut().get_or_insert(error);
+        }
+        self.parts.borrow_mut().push(next);
+    }
+
+    fn begin(&self) -> Result<vk::CommandBuffer> {
+        let device = &self.device;
+        let info = vk::CommandBufferAllocateInfo::default()
+            .command_pool(self.pool)
+            .level(vk::CommandBufferLevel::PRIMARY)
+            .command_buffer_count(1);
+        // SAFETY: the pool is this object's own.
+        let buffers = unsafe { device.raw.allocate_command_buffers(&info) }
+            .map_err(device.error("allocating a command buffer"))?;
+        device.set_name(buffers[0], &self.name);
+        let info = vk::CommandBufferBeginInfo::default();
+        // SAFETY: the buffer is new, and recorded by this object alone.
+        unsafe { device.raw.begin_command_buffer(buffers[0], &info) }
+            .map_err(device.error("recording"))?;
+        Ok(buffers[0])
+    }
+
+    fn end(&self) -> Result<()> {
+        // SAFETY: `begin` has begun its recording, which is ended once.
+        unsafe { self.device.raw.end_command_buffer(self.raw()) }
+            .map_err(self.device.error("recording"))
+    }
+
+    /// What is recorded now.
+    pub(super) fn raw(&self) -> vk::CommandBuffer {
+        *self.parts.borrow().last().expect("recording has begun")
     }
 
     /// Records, submits and waits.
@@ -116,8 +152,11 @@ impl Commands {
         // they come.
         let queue = self.device.queue();
         let uploads = Self::of_uploads(&self.device)?;
-        let buffer = |of: &Self| vk::CommandBufferSubmitInfo::default().command_buffer(of.raw);
-        let infos: Vec<_> = uploads.iter().chain([&*self]).map(buffer).collect();
+        let parts = self.parts.borrow();
+        let buffers = uploads.iter().map(Self::raw).chain(parts.iter().copied());
+        let infos: Vec<_> = buffers
+            .map(|buffer| [vk::CommandBufferSubmitInfo::default().command_buffer(buffer)])
+            .collect();
         let at = |stage| {
             move |&semaphore: &vk::Semaphore| {
                 vk::SemaphoreSubmitInfo::default()
@@ -129,15 +168,36 @@ impl Commands {
         let waits: Vec<_> = after.iter().map(copies).collect();
         let all = at(vk::PipelineStageFlags2::ALL_COMMANDS);
         let signals: Vec<_> = before.iter().map(all).collect();
-        let submits = [vk::SubmitInfo2::default()
-            .command_buffer_infos(&infos)
-            .wait_semaphore_infos(&waits)
-            .signal_semaphore_infos(&signals)];
+        let mut submits: Vec<_> = infos
+            .iter()
+            .map(|infos| vk::SubmitInfo2::default().command_buffer_infos(infos))
+            .collect();
+        let (first, last) = (0, submits.len() - 1);
+        submits[first] = submits[first].wait_semaphore_infos(&waits);
+        submits[last] = submits[last].signal_semaphore_infos(&signals);
+        let raw = &self.device.raw;
         // SAFETY: the fence is unsignalled and free, the queue is locked, and the recording has
         // ended.
-        unsafe { self.device.raw.queue_submit2(*queue, &submits, self.fence) }
-            .map_err(self.device.error("submitting"))?;
+        let submit = |submits: &[_], fence| unsafe { raw.queue_submit2(*queue, submits, fence) };
+        let submitted = match self.device.times_parts() {
+            false => submit(&submits, self.fence),
+            true => submits.iter().enumerate().try_for_each(|(i, part)| {
+                let start = Instant::now();
+                let fence = if i == last {
+                    self.fence
+                } else {
+                    vk::Fence::null()
+                };
+                submit(slice::from_ref(part), fence)?;
+                // SAFETY: the queue is locked.
+                unsafe { raw.queue_wait_idle(*queue) }?;
+                self.device.add_part(&self.name, start.elapsed());
+                Ok(())
+            }),
+        };
+        submitted.map_err(self.device.error("submitting"))?;
         drop(queue);
+        drop(parts);
         self.device.submissions.fetch_add(1, Ordering::Relaxed);
         self.uploads = uploads.map(Box::new);
         self.under_way = true;
@@ -191,7 +251,7 @@ impl Commands {
             .dst_access_mask(dst_access)];
         let info = vk::DependencyInfo::default().memory_barriers(&barriers);
         // SAFETY: a plain barrier, which the passes record outside render passes.
-        unsafe { self.device.raw.cmd_pipeline_barrier2(self.raw, &info) };
+        unsafe { self.device.raw.cmd_pipeline_barrier2(self.raw(), &info) };
     }
 
     /// Writes timestamp `index` when everything before it is done.
@@ -201,7 +261,7 @@ impl Commands {
         // SAFETY: the index lies within the pool, which `reset_timestamps` has reset.
         unsafe {
             self.device.raw.cmd_write_timestamp2(
-                self.raw,
+                self.raw(),
                 vk::PipelineStageFlags2::ALL_COMMANDS,
                 timestamps.owner.raw,
                 index,
@@ -216,7 +276,7 @@ impl Commands {
         unsafe {
             self.device
                 .raw
-                .cmd_reset_query_pool(self.raw, pool.raw, 0, pool.count);
+                .cmd_reset_query_pool(self.raw(), pool.raw, 0, pool.count);
         }
     }
 }
