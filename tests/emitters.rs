@@ -6,6 +6,7 @@ use std::ops::Range;
 
 use common::{Build, Solved, assert_silent, device};
 use glam::DVec3;
+use mesolux::bake;
 use mesolux::mesh::sources::Grouping;
 use mesolux::solver::{Estimator, Report, Settings, Solver, StopReason};
 
@@ -305,4 +306,50 @@ fn emitters_may_have_fewer_slots_than_others() {
     let apart = apart.fold(0.0, f32::max) / mean;
     println!("batches of 16 and of 3: {apart:.1e} apart");
     assert!(apart <= 1e-6);
+}
+
+/// Common sources keep the places from which rays ask whether a silhouette cuts them, strong
+/// emitters all. One that becomes strong as the light changes has all from then on.
+#[test]
+fn sources_keep_the_places_that_are_asked() {
+    let mut scene = Build::room_with_ball(false).0.scene;
+    let settings = Settings {
+        shots: Some(4),
+        ..Settings::default()
+    };
+    let lamp = scene.materials.len() - 1;
+    let mut solver =
+        bake::solve(&device(), &scene, &settings, None, |_| true).expect("it is solved");
+    let check = |solver: &Solver, strong: &[usize]| {
+        let elements = &solver.problem.elements;
+        let (mut all, mut some) = (0, 0);
+        for source in solver
+            .problem
+            .sources
+            .list
+            .iter()
+            .filter(|s| s.is_surface())
+        {
+            let material = elements.material[source.first_element as usize] as usize;
+            if strong.contains(&material) {
+                assert_eq!(source.places.len(), settings.emitter_places as usize);
+                all += 1;
+            } else {
+                assert!(
+                    [settings.places, settings.emitter_places]
+                        .contains(&(source.places.len() as u32))
+                );
+                some += u32::from(source.places.len() as u32 == settings.places);
+            }
+        }
+        println!("{all} strong emitters, {some} common sources");
+        assert!(all > 0 && some > 0);
+    };
+    check(&solver, &[lamp]);
+    let ball = lamp - 1;
+    scene.materials[ball].ke = [9.0; 3];
+    solver.relight(&scene).expect("it is lit again");
+    check(&solver, &[ball]);
+    solver.run(|_| true).expect("it is solved");
+    assert_silent();
 }

@@ -1,4 +1,5 @@
-//! How long the longest part of a submission takes: drivers end what takes them more than 2 s.
+//! Submissions come in parts, since drivers end what takes them more than 2 s. How long the longest
+//! of each kind takes is printed; that they are many enough is asserted.
 
 mod common;
 
@@ -8,9 +9,12 @@ use mesolux::render::{Lighting, View, render};
 use mesolux::scene::{LoadOptions, load};
 use mesolux::solver::Settings;
 
+/// Elements times sources of a part that makes rows, at most.
+const PAIRS: u64 = 1 << 18;
+
 #[test]
 #[ignore = "long: runs by scripts/test --all"]
-fn no_part_is_long() {
+fn what_is_submitted_comes_in_parts() {
     for (name, patches) in [("cornell", 100_000), ("cornell-relief", 40_000)] {
         let device = device();
         let options = LoadOptions {
@@ -40,6 +44,15 @@ fn no_part_is_long() {
         for (name, (count, longest)) in parts.iter().take(12) {
             println!("  {name}: {count}, {:.3} s at most", longest.as_secs_f64());
         }
+        let count = |name: &str| {
+            parts
+                .iter()
+                .find(|part| part.0 == name)
+                .map_or(0, |p| p.1.0)
+        };
+        let least = solver.report().kept_sources * patches as u64 / PAIRS;
+        assert!(count("make rows") >= least, "{least}");
+        assert!(count("shade") >= 8 * 6, "tiles of 80 pixels");
     }
     assert_silent();
 }

@@ -39,6 +39,10 @@ pub struct Care {
     pub places: u32,
 }
 
+/// Elements times sources that a dispatch sorts by item buffers, at most: some 0.1 s by lavapipe's
+/// two cores.
+const SORT_PAIRS: u32 = 1 << 20;
+
 /// Bound to a batch.
 pub struct FormFactors {
     /// Elements without relief, and in scenes that have some those with it.
@@ -139,7 +143,11 @@ impl FormFactors {
         }
         // Rays of one slot at a time.
         let (face_size, at_once) = match &batch.sight {
-            Sight::Hemicubes(hemicubes) => (hemicubes.face_size, SORT_SLOTS),
+            Sight::Hemicubes(hemicubes) => {
+                let elements = rows.shape.plain_count + rows.shape.meso_count;
+                let most = (SORT_PAIRS / elements.max(1)).clamp(1, SORT_SLOTS);
+                (hemicubes.face_size, most)
+            }
             Sight::Rays(_) => (0, 1),
         };
         Ok(Self {
@@ -182,7 +190,7 @@ impl FormFactors {
         for first in (0..self.slot_count).step_by(self.at_once as usize) {
             for range in &self.ranges {
                 let slots = first..(first + self.at_once).min(self.slot_count);
-                parts.step(cmd, u64::from(range.element_count) * slots.len() as u64);
+                parts.step(cmd, PART_PAIRS);
                 let size = [groups(range.element_count.div_ceil(SORT_ELEMENTS)), 1, 1];
                 cmd.dispatch(&range.sort, &parameters(range, slots), size);
             }

@@ -106,7 +106,7 @@ const MOST_SLOTS: u32 = 1024;
 /// Elements times rows of a part of a submission, at most, and where some have a relief: some 0.1 s
 /// by lavapipe's two cores.
 const PART_PAIRS: u32 = 1 << 26;
-const RELIEF_PAIRS: u32 = 1 << 22;
+const RELIEF_PAIRS: u32 = 1 << 21;
 
 /// Rows that are gathered at once, at most.
 pub fn most_rows(elements: u32, relief: Option<&ReliefBuffers>) -> u32 {

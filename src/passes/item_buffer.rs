@@ -1,6 +1,7 @@
 //! Draws the hemicubes of a batch: five faces a source as element IDs. Shaders: `item_buffer.vert`,
 //! `.frag`; twin: [`crate::reference::item_buffer`].
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use glam::Vec2;
@@ -12,7 +13,7 @@ use super::shaders::item_buffer::{Bindings, Parameters, SHADER};
 use super::types::Draw;
 use crate::constants::{FACES, NONE};
 use crate::error::Result;
-use crate::math::hemicube::face_rectangle;
+use crate::math::hemicube::{face_rectangle, pixel_count};
 use crate::vk::{
     Attachment, Blending, Commands, DescriptorSet, Device, Format, GraphicsPipeline, GraphicsState,
     RenderPass, Stage,
@@ -27,6 +28,9 @@ pub struct ItemBuffer {
 
 /// Distance of the near plane, internal units: nearer than any two surfaces that are not one.
 const NEAR: f32 = 1e-6;
+
+/// Pixels and occluders of a part of a submission, at most: some 0.1 s by lavapipe's two cores.
+const PART: u32 = 1 << 20;
 
 impl ItemBuffer {
     pub fn new(device: &Arc<Device>) -> Result<Self> {
@@ -88,11 +92,35 @@ impl ItemBuffer {
         }
     }
 
+    /// Draws all slots, some of them in each part of the submission.
     fn draw(&self, cmd: &Commands, set: &DescriptorSet, batch: &Batch, pass: &RenderPass) {
         let hemicubes = batch.hemicubes();
-        cmd.begin_render_pass(pass, &hemicubes.framebuffer, [NONE; 4]);
+        let work = pixel_count(hemicubes.face_size) as u32 + hemicubes.room;
+        let at_once = (PART / work).max(1);
+        for first in (0..batch.slot_count).step_by(at_once as usize) {
+            let slots = first..(first + at_once).min(batch.slot_count);
+            cmd.part();
+            if first > 0 {
+                cmd.barrier(&[Stage::Draw], &[Stage::Draw]);
+            }
+            // The first pass clears all slots.
+            let (pass, columns) = match first {
+                0 => (pass, 0..batch.slot_count * hemicubes.face_size),
+                _ => (
+                    &self.further,
+                    slots.start * hemicubes.face_size..slots.end * hemicubes.face_size,
+                ),
+            };
+            cmd.begin_render_pass_in(pass, &hemicubes.framebuffer, columns, [NONE; 4]);
+            self.draw_slots(cmd, set, batch, slots);
+            cmd.end_render_pass();
+        }
+    }
+
+    fn draw_slots(&self, cmd: &Commands, set: &DescriptorSet, batch: &Batch, slots: Range<u32>) {
+        let hemicubes = batch.hemicubes();
         cmd.bind_graphics(&self.pipeline, set, None);
-        for slot in 0..batch.slot_count {
+        for slot in slots {
             for face in 0..FACES {
                 let [x, y, width, height] = face_rectangle(face, hemicubes.face_size);
                 let region = slot * FACES + face;
@@ -111,6 +139,5 @@ impl ItemBuffer {
                 );
             }
         }
-        cmd.end_render_pass();
     }
 }

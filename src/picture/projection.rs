@@ -19,6 +19,21 @@ pub struct Tile {
 }
 
 impl Tile {
+    /// The tiles of a picture, of `side` pixels a side at most.
+    pub fn of((width, height): (u32, u32), side: u32) -> impl Iterator<Item = Self> {
+        let step = side as usize;
+        let places = (0..height).step_by(step).flat_map(move |row| {
+            let columns = (0..width).step_by(step);
+            columns.map(move |column| (row, column))
+        });
+        places.map(move |(row, column)| Self {
+            column,
+            row,
+            width: side.min(width - column),
+            height: side.min(height - row),
+        })
+    }
+
     /// The sample in its top left corner, counted over the whole picture; `samples` are along a
     /// pixel's side.
     pub fn corner(self, samples: u32) -> [u32; 2] {

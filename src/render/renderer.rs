@@ -19,9 +19,8 @@ use crate::scene::Scene;
 use crate::scene::sky::Sky;
 use crate::vk::{Commands, Device, Timestamps};
 
-/// Pixels along a side of a tile: 2048² samples take 64 MiB of colour, as much again to read them,
-/// and 16 MiB of depth.
-const TILE: u32 = 2048 / SAMPLES;
+/// Pixels along a side of a tile, each a submission: some 0.1 s by lavapipe's two cores.
+const TILE: u32 = 80;
 
 /// Marks pixels of plain triangles when pixels of relief are counted.
 const NOT_RELIEF: f32 = 2.0;
@@ -201,50 +200,67 @@ impl<'a> Renderer<'a> {
         Ok(whole.expect("nothing stops this picture"))
     }
 
+    /// While a tile is drawn, the samples of the one before are resolved.
     fn tiles(
         &self,
         side: u32,
         mut go_on: impl FnMut() -> bool,
     ) -> Result<Option<(Picture, Vec<f32>)>> {
         let (width, height) = self.view.size;
-        let canvas = self.canvas((width.min(side) * SAMPLES, height.min(side) * SAMPLES))?;
-        let target = &canvas.target;
+        let canvas = || self.canvas((width.min(side) * SAMPLES, height.min(side) * SAMPLES));
+        let canvases = [canvas()?, canvas()?];
         let mut gathered = Gathered::new(self.view.size);
-        let sky = self.fixed.sky();
         let mut distances = Vec::new();
-        for row in (0..height).step_by(side as usize) {
-            for column in (0..width).step_by(side as usize) {
-                if !go_on() {
-                    return Ok(None);
-                }
-                let tile = Tile {
-                    column,
-                    row,
-                    width: side.min(width - column),
-                    height: side.min(height - row),
-                };
-                Commands::run(&self.fixed.device, "shade", |cmd| {
-                    self.record(cmd, &canvas, tile, SAMPLES, None, || ());
-                    Ok(())
-                })?;
-                let (mut samples, stride) = (target.rows(tile.height * SAMPLES), target.width);
-                if let Some(sky) = sky {
-                    draw_sky(sky, &self.view.projection, tile, &mut samples, stride);
-                }
-                gathered.add(tile, &samples, stride as usize);
-                if let Some(depths) = target.depths(tile.height * SAMPLES) {
-                    distances.resize(width as usize * height as usize, 0.0);
-                    for place in 0..tile.width * tile.height {
-                        let (x, y) = (place % tile.width, place / tile.width);
-                        let sample = (y * SAMPLES + SAMPLES / 2) * target.width;
-                        let depth = depths[(sample + x * SAMPLES + SAMPLES / 2) as usize];
-                        let pixel = (tile.row + y) * width + tile.column + x;
-                        distances[pixel as usize] = if depth > 0.0 { NEAR / depth } else { 0.0 };
-                    }
-                }
+        let mut before = None;
+        for (i, tile) in Tile::of((width, height), side).enumerate() {
+            if !go_on() {
+                return Ok(None);
+            }
+            let canvas = &canvases[i % 2];
+            let mut commands = Commands::record(&self.fixed.device, "shade", |cmd| {
+                self.record(cmd, canvas, tile, SAMPLES, None, || ());
+                Ok(())
+            })?;
+            commands.submit()?;
+            if let Some((tile, commands, canvas)) = before.replace((tile, commands, canvas)) {
+                self.take_in(tile, commands, canvas, &mut gathered, &mut distances)?;
             }
         }
+        if let Some((tile, commands, canvas)) = before {
+            self.take_in(tile, commands, canvas, &mut gathered, &mut distances)?;
+        }
         Ok(Some((gathered.into_picture(), distances)))
+    }
+
+    /// Waits for a tile and resolves it.
+    fn take_in(
+        &self,
+        tile: Tile,
+        mut commands: Commands,
+        canvas: &Canvas,
+        gathered: &mut Gathered,
+        distances: &mut Vec<f32>,
+    ) -> Result<()> {
+        commands.wait()?;
+        let target = &canvas.target;
+        let (mut samples, stride) = (target.rows(tile.height * SAMPLES), target.width);
+        if let Some(sky) = self.fixed.sky() {
+            draw_sky(sky, &self.view.projection, tile, &mut samples, stride);
+        }
+        gathered.add(tile, &samples, stride as usize);
+        let Some(depths) = target.depths(tile.height * SAMPLES) else {
+            return Ok(());
+        };
+        let (width, height) = self.view.size;
+        distances.resize(width as usize * height as usize, 0.0);
+        for place in 0..tile.width * tile.height {
+            let (x, y) = (place % tile.width, place / tile.width);
+            let sample = (y * SAMPLES + SAMPLES / 2) * target.width;
+            let depth = depths[(sample + x * SAMPLES + SAMPLES / 2) as usize];
+            let pixel = (tile.row + y) * width + tile.column + x;
+            distances[pixel as usize] = if depth > 0.0 { NEAR / depth } else { 0.0 };
+        }
+        Ok(())
     }
 
     /// Draws the whole view `count` times with one sample a pixel, as a window would. Returns the

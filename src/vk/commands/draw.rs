@@ -1,5 +1,7 @@
 //! Render passes and draws.
 
+use std::ops::Range;
+
 use ash::vk;
 
 use super::Commands;
@@ -12,6 +14,23 @@ impl Commands {
     /// Begins a render pass over the whole framebuffer: colour cleared to `clear` (one word a
     /// channel), depth to 0.
     pub fn begin_render_pass(&self, pass: &RenderPass, target: &Framebuffer, clear: [u32; 4]) {
+        let columns = 0..target.owner.width;
+        self.begin_render_pass_in(pass, target, columns, clear);
+    }
+
+    /// The same over some columns of the framebuffer; nothing else may be drawn to.
+    pub fn begin_render_pass_in(
+        &self,
+        pass: &RenderPass,
+        target: &Framebuffer,
+        columns: Range<u32>,
+        clear: [u32; 4],
+    ) {
+        assert!(
+            columns.end <= target.owner.width,
+            "columns of the framebuffer"
+        );
+        let width = columns.end - columns.start;
         self.hold(&pass.owner);
         self.hold(&target.owner);
         let clears = [
@@ -28,7 +47,7 @@ impl Commands {
         let info = vk::RenderPassBeginInfo::default()
             .render_pass(pass.owner.raw)
             .framebuffer(target.owner.raw)
-            .render_area(rectangle(0, 0, target.owner.width, target.owner.height))
+            .render_area(rectangle(columns.start, 0, width, target.owner.height))
             .clear_values(&clears);
         // SAFETY: the framebuffer was made for a render pass with these attachments.
         unsafe {
