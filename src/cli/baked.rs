@@ -7,8 +7,9 @@ use clap::parser::ValueSource;
 use clap::{ArgMatches, Id};
 
 use super::Builtin;
-use super::bake::{SolveOptions, bake_visibly, origin};
+use super::bake::{bake_visibly, origin};
 use super::bake_scene::BakeScene;
+use super::solve_options::SolveOptions;
 use mesolux::bake::cache::CachedBake;
 use mesolux::bake::solution::Bake;
 use mesolux::error::{Error, Result};

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::bake::{PresetName, progress};
+use super::bake::progress;
 use super::bake_scene::BakeScene;
 use super::progress::{Bar, interrupted};
+use super::solve_options::PresetName;
 use super::{Builtin, DeviceOptions};
 use mesolux::bake::quality;
 use mesolux::bake::solution::Bake;
@@ -237,7 +238,7 @@ fn run_frame(options: &FrameOptions) -> Result<()> {
         false => options.scene.clone(),
     };
     let device = options.device.open()?;
-    let cache = super::bake::cache_folder();
+    let cache = super::solve_options::cache_folder();
     let wanted = frame::Options {
         sizes: options.size.clone(),
         rounds: options.rounds.max(1),
@@ -298,7 +299,7 @@ fn run_figure3(options: &Figure3Options) -> Result<()> {
         drawn
     };
     let mut ours = Settings::default();
-    ours.relief.cache = super::bake::cache_folder();
+    ours.relief.cache = super::solve_options::cache_folder();
     draw("figure3.png", ours)?;
     if options.preset.is_some() && !interrupted() {
         draw("figure3-paper.png", quality::paper(64)?)?;
@@ -368,7 +369,7 @@ fn run_table1(options: &Table1Options) -> Result<()> {
         paper: options.preset.is_some(),
         high_poly: !options.no_high_poly,
         frame_rounds: options.frame_rounds,
-        cache: super::bake::cache_folder(),
+        cache: super::solve_options::cache_folder(),
     };
     let device = options.device.open()?;
     super::progress::catch_interrupts();

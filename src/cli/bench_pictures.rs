@@ -31,7 +31,7 @@ pub struct Options {
 
 pub fn run(options: &Options) -> Result<()> {
     let device = options.device.open()?;
-    let cache = super::bake::cache_folder();
+    let cache = super::solve_options::cache_folder();
     let wanted = pictures::Options {
         side: options.size,
         paths: options.paths,

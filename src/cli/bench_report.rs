@@ -69,7 +69,7 @@ fn measure(options: &Options, against: Option<Report>) -> Result<Report> {
     let wanted = report::Options {
         form,
         plan,
-        cache: super::bake::cache_folder(),
+        cache: super::solve_options::cache_folder(),
         against,
     };
     catch_interrupts();

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::bake::writable;
+use super::output::writable;
 use mesolux::error::Result;
 use mesolux::render::{Comparison, FileKind, Flip, Picture, side_by_side};
 

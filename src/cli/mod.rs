@@ -15,6 +15,7 @@ mod info;
 mod inside;
 #[cfg(unix)]
 mod out_of_memory;
+mod output;
 mod pareto;
 mod progress;
 mod reference;
@@ -23,6 +24,7 @@ mod scene;
 mod series;
 mod shell;
 mod show;
+mod solve_options;
 #[cfg(feature = "window")]
 mod view;
 

@@ -5,15 +5,16 @@ use std::sync::Arc;
 
 use clap::{ArgMatches, Args};
 
-use super::bake::{SolveOptions, writable};
 use super::bake_scene::BakeScene;
 use super::baked::{Wanted, is_bake};
 use super::camera::CameraOptions;
 use super::develop::DevelopOptions;
+use super::output::writable;
 use super::progress::interrupted;
 use super::reference::{self, ReferenceOptions};
 use super::series::{self, SeriesOptions};
 use super::show::ShowOptions;
+use super::solve_options::SolveOptions;
 use super::{Builtin, DeviceOptions};
 use mesolux::error::{Error, Result};
 use mesolux::render::{Development, FileKind, Lighting, Picture, Renderer, SAMPLES, View};

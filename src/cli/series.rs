@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 
-use super::bake::writable;
+use super::output::writable;
 use super::progress::{Bar, catch_interrupts, interrupted};
 use mesolux::atomic_file::with_ending;
 use mesolux::error::Result;

@@ -7,11 +7,13 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::bake::{SolveOptions, beside, writable};
+use super::bake::beside;
 use super::bake_scene::BakeScene;
 use super::baked::is_bake;
 use super::camera::CameraOptions;
+use super::output::writable;
 use super::render::size;
+use super::solve_options::SolveOptions;
 use super::{Builtin, DeviceOptions};
 use mesolux::bake::quality::Quality;
 use mesolux::bake::solution::Bake;

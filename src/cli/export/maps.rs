@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 
-use crate::cli::bake::writable;
 use crate::cli::develop::check_exposure;
+use crate::cli::output::writable;
 use crate::cli::progress::{Bar, catch_interrupts, interrupted};
 use mesolux::error::{Error, Result};
 use mesolux::export::baked_colours;

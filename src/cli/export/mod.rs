@@ -9,9 +9,9 @@ use maps::MapOptions;
 use probes::ProbeOptions;
 use sensors::SensorOptions;
 
-use super::bake::SolveOptions;
 use super::bake_scene::BakeScene;
 use super::baked::Wanted;
+use super::solve_options::SolveOptions;
 use super::{Builtin, DeviceOptions};
 use mesolux::bake::lit_scene::LitScene;
 use mesolux::error::{Error, Result};

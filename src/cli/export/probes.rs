@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use glam::DVec3;
 
-use crate::cli::bake::writable;
+use crate::cli::output::writable;
 use crate::cli::progress::{Bar, catch_interrupts, interrupted};
 use mesolux::error::{Error, Result};
 use mesolux::export::probes::{self, Grid, ProbeFile, Probes};

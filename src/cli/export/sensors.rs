@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::cli::bake::writable;
+use crate::cli::output::writable;
 use crate::cli::progress::{Bar, catch_interrupts, interrupted};
 use mesolux::error::{Error, Result};
 use mesolux::export::sensors::{self, SensorFile, SensorGrid};
