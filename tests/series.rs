@@ -3,8 +3,9 @@
 
 mod common;
 
+use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output, Stdio};
 
 use common::{assert_silent, device};
 use glam::DVec3;
@@ -14,6 +15,7 @@ use mesolux::bench::relief_room::{CASES, room};
 use mesolux::render::{Lighting, Renderer, SAMPLES, View, render};
 use mesolux::scene::{Camera, LoadOptions, camera_path, load};
 use mesolux::solver::Settings;
+use safetensors::SafeTensors;
 
 /// Places of cameras are a few products of numbers about 1, each rounded to 2⁻⁵³.
 const ROUNDING: f64 = 1e-14;
@@ -341,4 +343,75 @@ fn bakes_of_scenes_are_kept() {
     let (said, other) = draw(&[]);
     assert!(said.contains("bake kept as") && other != plain, "{said}");
     assert_eq!(bakes().len(), 5);
+}
+
+/// Three bakes that begin at once with one empty cache give the bytes of one alone, and leave a
+/// cache that the next bake uses.
+#[test]
+fn bakes_side_by_side_share_a_cache() {
+    let folder = folder();
+    let bake = |output: &str, cache: &str| {
+        Command::new(env!("CARGO_BIN_EXE_mesolux"))
+            .args(["bake", "cornell-relief", "--patches", "1500"])
+            .args(["--directions", "16", "--quality", "draft", "-o", output])
+            .current_dir(folder.path())
+            .env("XDG_CACHE_HOME", folder.path().join(cache))
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program starts")
+    };
+    let ends = |child: Child| {
+        let run = child.wait_with_output().expect("it ran");
+        assert!(run.status.success(), "{}", text(&run));
+    };
+    let tensors = |name: &str| {
+        let bytes = std::fs::read(folder.path().join(name)).expect("a bake");
+        let (header, _) = SafeTensors::read_metadata(&bytes).expect("a header");
+        bytes[8 + header..].to_vec()
+    };
+    ends(bake("alone.safetensors", "own"));
+    let names = ["a.safetensors", "b.safetensors", "c.safetensors"];
+    let together = names.map(|name| bake(name, "shared"));
+    together.into_iter().for_each(ends);
+    let cached = |cache: &str| {
+        let entries = std::fs::read_dir(folder.path().join(cache).join("mesolux"));
+        let entries = entries.expect("a cache").map(|entry| {
+            let entry = entry.expect("an entry");
+            let written = entry.metadata().and_then(|of| of.modified());
+            (entry.file_name(), written.expect("a time"))
+        });
+        entries.collect::<BTreeMap<_, _>>()
+    };
+    let entries = cached("shared");
+    assert!(!entries.is_empty() && entries.keys().eq(cached("own").keys()));
+    ends(bake("d.safetensors", "shared"));
+    assert_eq!(cached("shared"), entries, "it is read, not written again");
+    let alone = tensors("alone.safetensors");
+    for name in names.into_iter().chain(["d.safetensors"]) {
+        assert!(tensors(name) == alone, "{name}");
+    }
+}
+
+/// The job array of `docs/clusters.md` bakes the line of its number, and refuses one that is not
+/// there.
+#[test]
+fn jobs_of_an_array_bake_their_line() {
+    let folder = folder();
+    std::fs::write(folder.path().join("scenes.txt"), "other.obj\n./room.obj\n").expect("written");
+    let job = |number: &str| {
+        Command::new(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/bake-array.sh"))
+            .args(["--no-refine", "--shots", "1"])
+            .current_dir(folder.path())
+            .env("SLURM_ARRAY_TASK_ID", number)
+            .env("MESOLUX", env!("CARGO_BIN_EXE_mesolux"))
+            .env("BAKES", ".")
+            .output()
+            .expect("the script runs")
+    };
+    let run = job("2");
+    assert!(run.status.success(), "{}", text(&run));
+    assert!(Bake::load(&folder.path().join("room.safetensors")).is_ok());
+    let beyond = job("3");
+    assert_eq!(beyond.status.code(), Some(2), "{}", text(&beyond));
+    assert!(text(&beyond).contains("no line 3"), "{}", text(&beyond));
 }

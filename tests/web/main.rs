@@ -12,6 +12,7 @@ mod loaders;
 mod server;
 
 use std::path::Path;
+use std::sync::{Arc, Mutex, Weak};
 
 use image::RgbImage;
 use mesolux::render::ldr;
@@ -47,28 +48,44 @@ fn run(folder: &Path, args: &[&str]) {
     assert!(output.status.success(), "{}", told(&output));
 }
 
-/// A folder with a bake of the Cornell box, `box.safetensors`.
-fn baked_box() -> TempDir {
+/// A folder with a bake of the Cornell box, `box.safetensors`, and all that is exported of it; the
+/// tests of one run share it.
+fn exported_box() -> Arc<TempDir> {
+    static FOLDER: Mutex<Weak<TempDir>> = Mutex::new(Weak::new());
+    let mut shared = FOLDER.lock().unwrap_or_else(|e| e.into_inner());
+    if let Some(folder) = shared.upgrade() {
+        return folder;
+    }
     let folder = tempfile::tempdir().expect("a folder for the test");
     let bake = ["bake", "cornell-box", "-o", "box.safetensors", "--no-cache"];
     run(folder.path(), &bake);
+    run(
+        folder.path(),
+        &[
+            "export",
+            "box.safetensors",
+            "--page",
+            "512",
+            "--exposure",
+            "1",
+            "--web",
+            "page",
+            "--glb",
+            "mapped.glb",
+            "--unlit-glb",
+            "unlit.glb",
+            "--vertex-glb",
+            "vertices.glb",
+        ],
+    );
+    let folder = Arc::new(folder);
+    *shared = Arc::downgrade(&folder);
     folder
 }
 
 #[test]
 fn the_page_shows_the_light_and_is_moved_by_the_mouse() {
-    let folder = baked_box();
-    let run = |args: &[&str]| run(folder.path(), args);
-    run(&[
-        "export",
-        "box.safetensors",
-        "--page",
-        "512",
-        "--web",
-        "page",
-        "--exposure",
-        "1",
-    ]);
+    let folder = exported_box();
     let display = Display::new();
     let server = Server::start(&folder.path().join("page"));
     let _browser = Browser::open(&display, &folder.path().join("profile"), &server.address);
@@ -77,16 +94,11 @@ fn the_page_shows_the_light_and_is_moved_by_the_mouse() {
     });
     let (width, height) = first.picture.dimensions();
     let size = format!("{width}x{height}");
-    run(&[
-        "render",
-        "box.safetensors",
-        "-o",
-        "box.png",
-        "--exposure",
-        "1",
-        "--size",
-        &size,
-    ]);
+    let view = ["-o", "box.png", "--exposure", "1", "--size", &size];
+    run(
+        folder.path(),
+        &[&["render", "box.safetensors"], &view[..]].concat(),
+    );
     let expected = picture(folder.path(), "box.png");
     let error = apart(&first.picture, &expected);
     println!("FLIP {error:.4} beside `render`");

@@ -7,7 +7,7 @@ use crate::browser::{Browser, wait};
 use crate::display::Display;
 use crate::harness::{picture, told};
 use crate::server::{Server, State};
-use crate::{apart, baked_box, run};
+use crate::{apart, exported_box, run};
 
 /// Where this file's neighbours are.
 fn sources() -> PathBuf {
@@ -47,23 +47,8 @@ fn issues(packages: &Path, file: &Path) -> String {
 #[ignore = "long: runs by scripts/test --all"]
 fn others_load_the_gltf() {
     let packages = packages();
-    let folder = baked_box();
-    let run = |args: &[&str]| run(folder.path(), args);
-    run(&[
-        "export",
-        "box.safetensors",
-        "--page",
-        "512",
-        "--exposure",
-        "1",
-        "--glb",
-        "mapped.glb",
-        "--unlit-glb",
-        "unlit.glb",
-        "--vertex-glb",
-        "vertices.glb",
-    ]);
-    let page = folder.path().join("page");
+    let folder = exported_box();
+    let page = folder.path().join("three");
     std::fs::create_dir(&page).expect("a folder for the page");
     std::os::unix::fs::symlink(packages.join("node_modules/three"), page.join("three"))
         .expect("a link to the library");
@@ -96,16 +81,11 @@ fn others_load_the_gltf() {
         let (width, height) = state.picture.dimensions();
         let size = format!("{width}x{height}");
         let file = format!("{name}.png");
-        run(&[
-            "render",
-            "box.safetensors",
-            "-o",
-            &file,
-            "--exposure",
-            "1",
-            "--size",
-            &size,
-        ]);
+        let view = ["-o", &file, "--exposure", "1", "--size", &size];
+        run(
+            folder.path(),
+            &[&["render", "box.safetensors"], &view[..]].concat(),
+        );
         let error = apart(&state.picture, &picture(folder.path(), &file));
         println!("{name}: FLIP {error:.4} in three.js beside `render`");
         assert!(error <= limit);
