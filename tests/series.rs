@@ -13,7 +13,7 @@ use mesolux::bake::bake;
 use mesolux::bake::solution::Bake;
 use mesolux::bench::relief_room::{CASES, room};
 use mesolux::render::{Lighting, Renderer, SAMPLES, View, render};
-use mesolux::scene::{Camera, LoadOptions, camera_path, load};
+use mesolux::scene::{Camera, LoadOptions, camera_path, load, write_scene};
 use mesolux::solver::Settings;
 use safetensors::SafeTensors;
 
@@ -350,10 +350,19 @@ fn bakes_of_scenes_are_kept() {
 #[test]
 fn bakes_side_by_side_share_a_cache() {
     let folder = folder();
+    let scene = write_scene(&room(&CASES[1]), folder.path()).expect("it is written");
     let bake = |output: &str, cache: &str| {
         Command::new(env!("CARGO_BIN_EXE_mesolux"))
-            .args(["bake", "cornell-relief", "--patches", "1500"])
-            .args(["--directions", "16", "--quality", "draft", "-o", output])
+            .args([
+                "bake",
+                "--no-refine",
+                "--directions",
+                "16",
+                "--quality",
+                "preview",
+            ])
+            .args(["-o", output])
+            .arg(&scene)
             .current_dir(folder.path())
             .env("XDG_CACHE_HOME", folder.path().join(cache))
             .stderr(Stdio::piped())
