@@ -56,7 +56,7 @@ pub struct Options {
     device: BakingDevices,
     /// Threads of the CPU's own work; the result does not depend on it
     #[arg(long, value_name = "N")]
-    threads: Option<usize>,
+    pub threads: Option<usize>,
     /// Print one JSON object on stdout
     #[arg(long)]
     json: bool,
@@ -78,7 +78,6 @@ struct Printed<'a> {
 
 pub fn run(options: &Options) -> Result<()> {
     let start = Instant::now();
-    set_threads(options.threads)?;
     let mut settings = Settings {
         checkpoints: options.checkpoints()?,
         ..options.solve.settings()?
@@ -259,19 +258,6 @@ pub fn origin(scene: &str, builtin: &Builtin, hash: String) -> Origin {
         import: builtin.import(),
         hash,
     }
-}
-
-fn set_threads(threads: Option<usize>) -> Result<()> {
-    let Some(threads) = threads else {
-        return Ok(());
-    };
-    if threads == 0 {
-        return Err(Error::Usage("--threads 0: must be at least 1".into()));
-    }
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build_global()
-        .map_err(|e| Error::Usage(format!("--threads {threads}: {e}")))
 }
 
 fn peak_resident_bytes() -> Option<u64> {

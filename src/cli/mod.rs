@@ -323,6 +323,24 @@ fn log_to_stderr(cli: &Cli) {
         .init();
 }
 
+/// Starts the CPU's threads before any of them is needed: where there is no room for them, nothing
+/// else has been done.
+fn start_threads(command: &Command) -> Result<()> {
+    let mut pool = rayon::ThreadPoolBuilder::new();
+    if let Command::Bake(bake::Options {
+        threads: Some(threads),
+        ..
+    }) = command
+    {
+        if *threads == 0 {
+            return Err(Error::Usage("--threads 0: must be at least 1".into()));
+        }
+        pool = pool.num_threads(*threads);
+    }
+    pool.build_global()
+        .map_err(|e| Error::Usage(format!("starting threads: {e}")))
+}
+
 pub fn main() -> ExitCode {
     #[cfg(feature = "window")]
     let start = std::time::Instant::now();
@@ -331,7 +349,7 @@ pub fn main() -> ExitCode {
     let given = matches.subcommand().map_or(&matches, |(_, given)| given);
     log_to_stderr(&cli);
     progress::survive_limits();
-    let done = match &cli.command {
+    let done = start_threads(&cli.command).and_then(|()| match &cli.command {
         Command::Bake(options) => bake::run(options),
         Command::Render(options) => render::run(options, given),
         Command::Export(options) => export::run(options, given),
@@ -348,7 +366,7 @@ pub fn main() -> ExitCode {
         Command::Bench(options) => bench::run(options),
         Command::Completions(options) => shell::completions(options),
         Command::Man(options) => shell::man(options),
-    };
+    });
     let lost = || match console::lost() {
         Some(source) => Err(Error::write(Path::new("stdout"), source)),
         None => Ok(()),
