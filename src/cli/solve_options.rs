@@ -91,7 +91,7 @@ pub struct SolveOptions {
     /// of scenes, the 16 used last and 1 GiB at most [default: mesolux in the user's cache folder]
     #[arg(long, value_name = "DIR")]
     cache: Option<PathBuf>,
-    /// Compute everything anew and keep nothing
+    /// Neither read nor write the cache
     #[arg(long, conflicts_with = "cache")]
     no_cache: bool,
 }

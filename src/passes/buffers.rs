@@ -145,8 +145,8 @@ impl SceneBuffers {
 }
 
 impl SceneBuffers {
-    /// Other light of the same sources, and other places of point lights; sources that see from more
-    /// places than before have theirs in other buffers then.
+    /// Other light of the same sources, and other places of point lights; sources that see from
+    /// more places than before have theirs in other buffers then.
     pub fn write_sources(
         &mut self,
         device: &Arc<Device>,
@@ -168,8 +168,8 @@ impl SceneBuffers {
     }
 }
 
-/// Places on each source, with the packed normals of curved ones, one source after another. Only the
-/// `receiver` estimator gives sources places, and reads them.
+/// Places on each source, with the packed normals of curved ones, one source after another. Only
+/// the `receiver` estimator gives sources places, and reads them.
 fn eyes(sources: &[sources::Source]) -> Vec<[f32; 4]> {
     let texels = |source: &sources::Source| {
         let is_curved = source.cone > 0.0;

@@ -39,9 +39,8 @@ pub struct Care {
     pub places: u32,
 }
 
-/// Elements times sources that a dispatch sorts by item buffers, at most: some 0.1 s by lavapipe's
-/// two cores.
-const SORT_PAIRS: u32 = 1 << 20;
+/// Pairs that are sorted by item buffers in the time in which rays sort one.
+const SORT_RATE: u64 = 4;
 
 /// Bound to a batch.
 pub struct FormFactors {
@@ -145,7 +144,8 @@ impl FormFactors {
         let (face_size, at_once) = match &batch.sight {
             Sight::Hemicubes(hemicubes) => {
                 let elements = rows.shape.plain_count + rows.shape.meso_count;
-                let most = (SORT_PAIRS / elements.max(1)).clamp(1, SORT_SLOTS);
+                let most = (SORT_RATE * PART_PAIRS / u64::from(elements.max(1))) as u32;
+                let most = most.clamp(1, SORT_SLOTS);
                 (hemicubes.face_size, most)
             }
             Sight::Rays(_) => (0, 1),
@@ -190,7 +190,9 @@ impl FormFactors {
         for first in (0..self.slot_count).step_by(self.at_once as usize) {
             for range in &self.ranges {
                 let slots = first..(first + self.at_once).min(self.slot_count);
-                parts.step(cmd, PART_PAIRS);
+                let pairs = u64::from(range.element_count) * slots.len() as u64;
+                let rate = if self.face_size > 0 { SORT_RATE } else { 1 };
+                parts.step(cmd, pairs / rate);
                 let size = [groups(range.element_count.div_ceil(SORT_ELEMENTS)), 1, 1];
                 cmd.dispatch(&range.sort, &parameters(range, slots), size);
             }

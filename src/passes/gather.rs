@@ -103,8 +103,8 @@ struct On<'a> {
 /// Slots of a dispatch: a software device ends a shader's loops after 65,535 turns of all together.
 const MOST_SLOTS: u32 = 1024;
 
-/// Elements times rows of a part of a submission, at most, and where some have a relief: some 0.1 s
-/// by lavapipe's two cores.
+/// Elements times rows of a part of a submission, at most, and where some have a relief: 0.1 to
+/// 0.3 s by lavapipe's two cores.
 const PART_PAIRS: u32 = 1 << 26;
 const RELIEF_PAIRS: u32 = 1 << 21;
 

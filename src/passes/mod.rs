@@ -60,7 +60,7 @@ fn groups(items: u32) -> u32 {
     items.div_ceil(GROUP)
 }
 
-/// Elements times sources whose form factors a part of a submission finds, at most: some 0.1 s by
+/// Elements times sources whose form factors a part of a submission finds, at most: 0.1 to 0.3 s by
 /// lavapipe's two cores.
 const PART_PAIRS: u64 = 1 << 18;
 
