@@ -60,9 +60,9 @@ fn groups(items: u32) -> u32 {
     items.div_ceil(GROUP)
 }
 
-/// Elements times sources whose form factors a part of a submission finds, at most: 0.1 to 0.3 s by
+/// Elements times sources whose form factors a part of a submission finds, at most: 0.1 s and more by
 /// lavapipe's two cores.
-const PART_PAIRS: u64 = 1 << 18;
+const PART_PAIRS: u64 = 1 << 17;
 
 /// Cuts what is recorded into parts, so that no submission is long enough for a driver to end it.
 struct Parts {
