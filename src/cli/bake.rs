@@ -29,7 +29,7 @@ use mesolux::vk::Device;
 #[derive(Args)]
 pub struct Options {
     /// A built-in name (cornell, cornell-box, cornell-relief, bowl-and-bunny, fruit-platter,
-    /// brick-court, brick-wall, woven-cloth, embossed-plate), an .obj, .gltf or .glb
+    /// brick-court, brick-corner, brick-wall, woven-cloth, embossed-plate), an .obj, .gltf or .glb
     /// file, or a scene.toml
     scene: String,
     /// The file to write

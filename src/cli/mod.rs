@@ -44,10 +44,10 @@ use tracing_subscriber::prelude::*;
 /// buffers.
 ///
 /// SCENE is a built-in name (cornell, cornell-box, cornell-relief, bowl-and-bunny, fruit-platter,
-/// brick-court, brick-wall, woven-cloth, embossed-plate), an .obj, .gltf or .glb file, or a
-/// scene.toml. Results go to files and stdout, everything else to stderr. Exit code 2 means that an
-/// input was wrong or an output could not be written; 130, 143 and 129 that Ctrl-C, `kill` or a
-/// closed terminal stopped the work, and that what was done by then is kept.
+/// brick-court, brick-corner, brick-wall, woven-cloth, embossed-plate), an .obj, .gltf or .glb file,
+/// or a scene.toml. Results go to files and stdout, everything else to stderr. Exit code 2 means
+/// that an input was wrong or an output could not be written; 130, 143 and 129 that Ctrl-C, `kill`
+/// or a closed terminal stopped the work, and that what was done by then is kept.
 #[derive(Parser)]
 #[command(version, about)]
 struct Cli {

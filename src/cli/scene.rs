@@ -12,7 +12,7 @@ use mesolux::error::{Error, Result};
 #[derive(Args)]
 pub struct Options {
     /// A built-in name: cornell, fruit-platter, bowl-and-bunny, cornell-relief, brick-court,
-    /// cornell-box, brick-wall, woven-cloth or embossed-plate
+    /// cornell-box, brick-corner, brick-wall, woven-cloth or embossed-plate
     name: String,
     /// The folder to write to
     #[arg(short, long, value_name = "DIR")]

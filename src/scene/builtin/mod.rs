@@ -26,20 +26,27 @@ use crate::error::{Error, Result};
 
 /// Names that [`super::load`] takes instead of a path. The second to the fourth stand in for the
 /// scenes of the paper's Table 1.
-pub const NAMES: [&str; 9] = [
+pub const NAMES: [&str; 10] = [
     "cornell",
     "fruit-platter",
     "bowl-and-bunny",
     "cornell-relief",
     "brick-court",
     "cornell-box",
+    "brick-corner",
     "brick-wall",
     "woven-cloth",
     "embossed-plate",
 ];
 
 /// Those whose meshes are as coarse as people draw them, and are cut as those of files are.
-pub const COARSE: [&str; 4] = ["cornell-box", "brick-wall", "woven-cloth", "embossed-plate"];
+pub const COARSE: [&str; 5] = [
+    "cornell-box",
+    "brick-corner",
+    "brick-wall",
+    "woven-cloth",
+    "embossed-plate",
+];
 
 /// Builds the scene of that name.
 pub(super) fn build(name: &str, options: &LoadOptions) -> Result<Scene> {
@@ -66,6 +73,7 @@ fn coarse(name: &str, options: &LoadOptions) -> Result<Scene> {
     }
     match name {
         "cornell-box" => cornell_box::build(options),
+        "brick-corner" => panels::brick_corner(options),
         "brick-wall" => panels::brick_wall(options),
         "woven-cloth" => panels::woven_cloth(options),
         _ => panels::embossed_plate(options),

@@ -1,5 +1,5 @@
-//! Small scenes of one surface with relief each: a brick wall in raking light, a woven cloth beside
-//! a coloured wall, an embossed plate.
+//! Small scenes of one surface with relief each: a brick wall in raking light, the same wall beside a
+//! coloured one with a lamp to move, a woven cloth beside a coloured wall, an embossed plate.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::scene::assemble::{Assembly, Mesh, MeshTriangle};
 use crate::scene::sky::{Dome, Sky};
 use crate::scene::{
-    Camera, HeightMap, Lights, LoadOptions, Material, NormalMap, Scene, Sun, check,
+    Camera, HeightMap, Lights, LoadOptions, Material, NormalMap, PointLight, Scene, Sun, check,
 };
 
 /// Texels a side of the brickwork's map, and half as many up.
@@ -144,18 +144,67 @@ fn camera(position: DVec3, look_at: DVec3, fov_y: f64) -> Camera {
     }
 }
 
+/// Old bricks.
+fn bricks() -> Result<Material> {
+    let maps = masonry_maps::brickwork([BRICK_TEXELS, BRICK_TEXELS / 2])?;
+    let size = BRICKWORK.to_array();
+    Ok(Material {
+        map_kd: Some(Arc::new(maps.colours)),
+        ..relief("bricks", [1.0; 3], maps.heights, maps.height_scale, size)
+    })
+}
+
+/// A wall of old bricks beside a blue one; a lamp close to the bricks grazes them, and can be moved.
+///
+/// # Errors
+/// None that maps made by code can cause.
+pub(super) fn brick_corner(options: &LoadOptions) -> Result<Scene> {
+    let materials = [
+        bricks()?,
+        diffuse("blue", [0.07, 0.19, 0.60]),
+        diffuse("paving", [0.62, 0.60, 0.56]),
+    ];
+    let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+    let (wide, high, deep) = (2.4, 2.1, 1.6);
+    // Of the bricks, behind the blue wall and beneath the paving.
+    let under = 0.075;
+    let sheets = [
+        (
+            "bricks",
+            Sheet {
+                origin: -under * y,
+                u: (wide + under) * x,
+                v: (high + under) * y,
+                cells: [16, 12],
+                repeats: [(wide + under) / BRICKWORK.x, (high + under) / BRICKWORK.y],
+                material: 0,
+            },
+        ),
+        ("blue wall", Sheet::plain(wide * x, deep * z, high * y, 1)),
+        ("ground", Sheet::plain(deep * z, wide * x, -deep * z, 2)),
+    ];
+    let lamp = PointLight {
+        name: "lamp".into(),
+        position: DVec3::new(1.05, 1.38, 0.42),
+        intensity: [1.50, 1.22, 0.86],
+        beam: None,
+    };
+    let lights = Lights::from(lamp);
+    let look = camera(
+        DVec3::new(0.72, 1.06, 3.05),
+        DVec3::new(1.30, 0.80, 0.0),
+        36.0,
+    );
+    assembled("brick-corner", &materials, &sheets, lights, look, options)
+}
+
 /// A wall of old bricks above pale paving; the sun grazes it from the left.
 ///
 /// # Errors
 /// None that maps made by code can cause.
 pub(super) fn brick_wall(options: &LoadOptions) -> Result<Scene> {
-    let maps = masonry_maps::brickwork([BRICK_TEXELS, BRICK_TEXELS / 2])?;
+    let materials = [bricks()?, diffuse("paving", [0.62, 0.60, 0.56])];
     let size = BRICKWORK.to_array();
-    let bricks = Material {
-        map_kd: Some(Arc::new(maps.colours)),
-        ..relief("bricks", [1.0; 3], maps.heights, maps.height_scale, size)
-    };
-    let materials = [bricks, diffuse("paving", [0.62, 0.60, 0.56])];
     let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
     let wall = DVec3::new(3.6, 1.8, 0.0);
     let sheets = [
