@@ -269,7 +269,7 @@ fn contacts_leak_no_light_and_surfaces_do_not_shadow_themselves() {
         ..Paths::default()
     };
     let film = tracer
-        .render(&view(&camera), &paths, |_| true)
+        .render(&view(&camera), &paths, |_, _| true)
         .expect("a picture");
     let truth = film.picture();
     show("point light", &picture, &truth);

@@ -1,6 +1,5 @@
 // A surface in a window as sRGB codes: its radiance L = ρ(u, v) · E / π + Le by the light of the
-// corners. LAID: what pictures drawn before show there comes first. OVERLAID, with LAID: outlines
-// of elements, colours of sources and a marked element over it.
+// corners. RELIEF: E on the relief's own normal, less what the relief about it hides of an even sky.
 #include "shared/view_parameters.glsl"
 
 layout(location = 0) in vec3 corner_light;
@@ -8,7 +7,39 @@ layout(location = 1) in vec2 corner_uv;
 
 layout(location = 0) out vec4 code;
 
-layout(binding = 0) uniform sampler2D albedo;
+layout(binding = 1) uniform sampler2D albedo;
+
+#ifdef RELIEF
+// Slopes of the relief along u and v, and the share of an even sky's light that arrives there.
+layout(binding = 6) uniform sampler2D slopes;
+
+layout(location = 2) in vec3 slanted_u;
+layout(location = 3) in vec3 slanted_v;
+layout(location = 4) in vec3 lift;
+layout(location = 5) flat in vec4 stretch;
+
+// Slope for which `lift` is; as in src/view/snapshot.rs.
+const float TILT = 0.7;
+
+vec3 irradiance(vec3 rho) {
+    vec3 relief = texture(slopes, corner_uv).rgb;
+    vec2 slope = relief.xy;
+    float square = dot(stretch.xyz, vec3(slope.x * slope.x, slope.x * slope.y, slope.y * slope.y));
+    vec3 lifted = corner_light + lift * (2.0 * square / (TILT * TILT + square));
+    float cosine = inversesqrt(1.0 + square);
+    vec3 open = max(lifted - slope.x * slanted_u - slope.y * slanted_v, vec3(0.0)) * cosine;
+    float openness = 1.0 / (1.0 + stretch.w * (1.0 / relief.z - 1.0));
+    // What is not open shows relief lit as the level is: what the horizon hides, and what lies below
+    // the level before a slope. What has bounced is no direct light.
+    float shut = 1.0 - openness;
+    vec3 bounced = parts.x * rho * corner_light * openness / (1.0 - rho * shut);
+    return openness * open + (shut + 0.5 * (1.0 - cosine)) * bounced;
+}
+#else
+vec3 irradiance(vec3 rho) {
+    return corner_light;
+}
+#endif
 
 const float PI = 3.14159265358979;
 
@@ -34,109 +65,7 @@ vec3 srgb(vec3 linear) {
     return mix(1.055 * pow(linear, vec3(1.0 / 2.4)) - 0.055, 12.92 * linear, lessThanEqual(linear, vec3(0.0031308)));
 }
 
-vec3 lit() {
-    if (corner_light.r < 0.0) {
-        return vec3(0.0);
-    }
-    vec3 rho = reflectance * texture(albedo, corner_uv).rgb;
-    return srgb(neutral(exposure * (rho * corner_light / PI + emitted)));
-}
-
-#ifdef LAID
-// sRGB codes of whole views, with how far along the view each pixel is: the last with all its
-// pixels, and a later coarse one.
-layout(binding = 4) uniform sampler2D whole;
-layout(binding = 5) uniform sampler2D coarse;
-layout(binding = 6) uniform sampler2D whole_distances;
-layout(binding = 7) uniform sampler2D coarse_distances;
-
-layout(location = 2) in vec3 in_whole;
-layout(location = 3) in vec3 in_coarse;
-layout(location = 4) flat in vec4 of_whole;
-layout(location = 5) flat in vec4 of_coarse;
-layout(location = 6) flat in float triangle_rise;
-
-// Least height of a picture's eye over a surface, in distances along its view: a pixel there is as
-// wide as four here.
-const float LEAST_HEIGHT = 0.25;
-// Half pixels by which a surface may lie before or behind what the picture's pixel shows beside it.
-const float SLACK = 3.0;
-
-// Whether a picture shows this place, and where in its image.
-bool in_picture(vec3 place, vec4 view, sampler2D distances, out vec2 at) {
-    float away = place.z;
-    at = 0.5 * place.xy / away + 0.5;
-    float height = view.x / away;
-    bool within = view.y > 0.0 && away > 0.0 && height > LEAST_HEIGHT
-         && all(greaterThan(at, vec2(0.0))) && all(lessThan(at, vec2(1.0)));
-    at *= view.zw;
-    // Relief is where its mesh is by so much; what stands before it is nearer.
-    float seen = texelFetch(distances, ivec2(clamp(at, 0.0, 1.0) * vec2(textureSize(distances, 0))), 0).r;
-    float slack = (triangle_rise + SLACK * view.y * away) / height;
-    return within && abs(seen - away) <= slack;
-}
-
-vec3 laid() {
-    vec2 at;
-    if (in_picture(in_whole, of_whole, whole_distances, at)) {
-        return textureLod(whole, at, 0.0).rgb;
-    }
-    if (in_picture(in_coarse, of_coarse, coarse_distances, at)) {
-        return textureLod(coarse, at, 0.0).rgb;
-    }
-    return lit();
-}
-#endif
-
-#ifdef OVERLAID
-layout(location = 7) in vec3 corner_share;
-layout(location = 8) in vec3 corner_position;
-layout(location = 9) flat in uint corner_triangle;
-
-vec3 shown() {
-    if (from_picture == 1 || from_picture == 2) {
-        vec4 p = vec4(corner_position, 1.0);
-        vec2 at = 0.5 * vec2(dot(p, x), dot(p, y)) / dot(p, w) + 0.5;
-        return from_picture == 1 ? textureLod(whole, at * of_whole.zw, 0.0).rgb : textureLod(coarse, at * of_coarse.zw, 0.0).rgb;
-    }
-    return from_picture == 0 ? lit() : laid();
-}
-
-// A hue for a number; neighbours differ.
-vec3 hue(uint number) {
-    float turn = fract(float(number) * 0.61803399);
-    return clamp(abs(fract(turn + vec3(1.0, 2.0 / 3.0, 1.0 / 3.0)) * 6.0 - 3.0) - 1.0, 0.0, 1.0);
-}
-
-vec3 overlaid(vec3 colour) {
-    About own = about[corner_triangle];
-    if (sources > 0.0) {
-        colour = mix(colour, hue(own.source), 0.45 * sources);
-    }
-    // Pixels to the nearest edge.
-    vec3 to_edge = corner_share / max(fwidth(corner_share), vec3(1e-6));
-    float edge = min(to_edge.x, min(to_edge.y, to_edge.z));
-    if (elements > 0.0) {
-        // Edges closer together than a few pixels fade, or the far end of a fine mesh would be
-        // black.
-        float widest = max(fwidth(corner_share).x, max(fwidth(corner_share).y, fwidth(corner_share).z));
-        float seen = elements * clamp(1.0 - 3.0 * widest, 0.0, 1.0);
-        colour = mix(colour, vec3(0.0), 0.6 * seen * clamp(1.2 - edge, 0.0, 1.0));
-    }
-    if (own.triangle == chosen) {
-        colour = mix(colour, vec3(1.0, 0.6, 0.1), edge < 2.0 ? 1.0 : 0.25);
-    }
-    return colour;
-}
-#endif
-
 void main() {
-#if defined(OVERLAID)
-    vec3 colour = overlaid(shown());
-#elif defined(LAID)
-    vec3 colour = laid();
-#else
-    vec3 colour = lit();
-#endif
-    code = vec4(colour, 1.0);
+    vec3 rho = reflectance * texture(albedo, corner_uv).rgb;
+    code = vec4(srgb(neutral(exposure * (rho * irradiance(rho) / PI + emitted))), 1.0);
 }

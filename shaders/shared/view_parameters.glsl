@@ -3,8 +3,6 @@ layout(push_constant, scalar) uniform Parameters {
     vec4 x;
     vec4 y;
     vec4 w;
-    vec3 eye;
-    float near;
     vec3 reflectance;
     float exposure;        // what radiance is multiplied by
     vec3 emitted;          // Le, W·m⁻²·sr⁻¹
@@ -12,15 +10,16 @@ layout(push_constant, scalar) uniform Parameters {
     vec2 parts;            // how often all light and direct light count
     float elements;        // 1: outlined
     float sources;         // 1: coloured
-    uint from_picture;     // 1, 2: shows the whole or the coarse picture; 3: them from elsewhere
+    uint first_relief;     // the first corner of triangles with relief
     uint chosen;           // element that is marked
 };
 
 struct About {
     uint triangle;         // its place in the input
     uint source;
-    float rise;            // how far relief reaches above or below it, internal units
+    vec4 stretch;          // by which slopes of its relief lengthen its normal: uu, uv, vv; and
+                           // the square of how high it is over what its openness was found for
 };
 
 // [drawn triangle]
-layout(scalar, binding = 3) readonly buffer AboutTriangles { About about[]; };
+layout(scalar, binding = 0) readonly buffer AboutTriangles { About about[]; };

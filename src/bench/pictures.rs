@@ -66,7 +66,7 @@ impl Reference {
             light,
             ..Paths::default()
         };
-        let film = tracer.render(view, &settings, |_| true)?;
+        let film = tracer.render(view, &settings, |_, _| true)?;
         Ok(Self {
             picture: film.picture(),
             variance: film.standard_error().iter().map(|e| e * e).collect(),

@@ -59,7 +59,7 @@ pub fn draw(scene: &Scene, view: &View<'_>, settings: &Settings) -> Result<Film>
     let tracer = PathTracer::new(scene)?;
     catch_interrupts();
     let bar = Bar::new();
-    let film = tracer.render(view, settings, |progress| {
+    let film = tracer.render(view, settings, |progress, _| {
         bar.show(format!(
             "{} of {} paths a pixel in {:.0} s",
             progress.paths,

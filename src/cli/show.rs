@@ -24,6 +24,9 @@ pub struct ShowOptions {
         conflicts_with = "reference"
     )]
     view: ViewName,
+    /// Leave out surfaces seen from behind, which are black otherwise: from outside, a room is open
+    #[arg(long)]
+    hide_backs: bool,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -118,6 +121,7 @@ impl ShowOptions {
                 ViewName::Slots => Show::Slots,
                 ViewName::Overdraw => Show::Overdraw,
             },
+            hide_backs: self.hide_backs,
             ..lighting
         }
     }

@@ -147,6 +147,17 @@ impl SolveOptions {
         }
     }
 
+    /// The same with what the window may change: the directions, and whether it is by the paper.
+    #[cfg(feature = "window")]
+    pub fn solved_by(&self, settings: &Settings) -> Self {
+        let paper = settings.estimator == Estimator::Paper;
+        Self {
+            directions: settings.relief.directions.count() as u32,
+            preset: paper.then_some(PresetName::Paper),
+            ..self.clone()
+        }
+    }
+
     /// The same with nothing left to the preset, to be kept beside the result.
     pub fn filled(&self) -> Result<Self> {
         let settings = self.settings()?;

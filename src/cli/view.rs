@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::bake::beside;
+use super::bake::{beside, origin};
 use super::bake_scene::BakeScene;
 use super::baked::is_bake;
 use super::camera::CameraOptions;
@@ -27,12 +27,12 @@ use mesolux::vk;
 ///
 /// The middle button of the mouse orbits, with Shift it pans, the wheel zooms; Alt with the left
 /// button acts as the middle button. The right button looks about, W A S D Q E fly, Shift faster. 1
-/// 2 3: all, direct, indirect light. Tab: the panel, which names the other keys. Changed lights are
-/// shown by kept form factors.
+/// 2 3: all, direct, indirect light. Lights are dragged by their marks. F1 lists the other keys.
+/// Changed lights are shown by kept form factors.
 #[derive(Args)]
 pub struct Options {
     /// A scene (see `bake`) or a bake (.safetensors)
-    #[arg(value_name = "SCENE|BAKE", default_value = "cornell")]
+    #[arg(value_name = "SCENE|BAKE", default_value = "brick-corner")]
     input: String,
     /// Pixels across and down
     #[arg(long, value_name = "WxH", default_value = "1024x640", value_parser = size)]
@@ -48,10 +48,10 @@ pub struct Options {
     #[arg(long, value_name = "OUT.png", requires = "frames")]
     screenshot: Option<PathBuf>,
     /// Do what a script says, one step a line, then close: move X Y, press|release
-    /// left|middle|right, wheel N, key NAME [down|up], see front|right|top, resize W H, minimise,
-    /// restore W H, set SWITCH VALUE, set lamp NAME colour|strength|position N..., frames N, wait
-    /// SECONDS, open SCENE|BAKE, bake, relit, detail, overlays, screenshot FILE, save FILE,
-    /// lose-surface, close
+    /// left|middle|right, wheel N, key [Ctrl+][Shift+]NAME [down|up], see front|right|top, resize W
+    /// H, minimise, restore W H, set SWITCH VALUE, set lamp NAME colour|strength|position N...,
+    /// compare held|traced|off, line X, frames N, wait SECONDS, open SCENE|BAKE, bake, relit,
+    /// detail, compared, overlays, screenshot FILE, save FILE, save-bake FILE, lose-surface, close
     #[arg(long, value_name = "FILE")]
     script: Option<PathBuf>,
     #[command(flatten)]
@@ -178,6 +178,7 @@ pub fn run(options: &Options, start: Instant) -> Result<()> {
         bake_scene: BakeScene::default(),
         ..reader
     };
+    let (builtin, solve) = (options.builtin.clone(), options.solve.clone());
     let lines = view::run(view::Options {
         opened,
         session: Session {
@@ -185,6 +186,11 @@ pub fn run(options: &Options, start: Instant) -> Result<()> {
             device: DeviceChoice::new(options.device.device.clone(), options.device.validate),
             offered: offered(&options.input).into(),
             open: Arc::new(move |name| reader.open(name)),
+            save: Arc::new(move |path, name, scene, solution, settings| {
+                let origin = origin(name, &builtin, scene.input_hash());
+                let filled = solve.solved_by(settings).filled()?;
+                solution.save(path, &origin, &filled)
+            }),
         },
         size: options.size,
         script,

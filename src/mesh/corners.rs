@@ -106,6 +106,29 @@ pub enum Joined {
     Plane,
 }
 
+/// Means at each corner of what triangles of its smooth surface have, `[triangle][corner]`, by their
+/// angles there.
+pub fn corner_means<const N: usize>(scene: &Scene, values: &[[Vec3; N]]) -> Vec<[[Vec3; N]; 3]> {
+    let corners = Corners::new(scene);
+    let triangles = scene.triangles.par_iter().enumerate();
+    let mean = |e: usize, vertex: u32| {
+        let (mut sum, mut weight) = ([DVec3::ZERO; N], 0.0);
+        for (other, angle) in corners.smooth(e, vertex) {
+            for (sum, value) in sum.iter_mut().zip(values[other]) {
+                *sum += value.as_dvec3() * angle;
+            }
+            weight += angle;
+        }
+        match weight > 0.0 {
+            true => sum.map(|sum| (sum / weight).as_vec3()),
+            false => values[e],
+        }
+    };
+    triangles
+        .map(|(e, triangle)| triangle.vertices.map(|v| mean(e, v)))
+        .collect()
+}
+
 /// Irradiance at each corner, `[triangle][corner]`, W·m⁻², RGB. Linear between the corners and
 /// continuous where triangles are joined, it has nearly the means of the triangles: the mean of the
 /// triangles about a corner, and of what that mean leaves of theirs (one step of Landweber's

@@ -16,7 +16,7 @@ use crate::error::Result;
 use crate::math::hemicube::{face_rectangle, pixel_count};
 use crate::vk::{
     Attachment, Blending, Commands, DescriptorSet, Device, Format, GraphicsPipeline, GraphicsState,
-    RenderPass, Stage,
+    RenderPass, Sides, Stage,
 };
 
 pub struct ItemBuffer {
@@ -46,7 +46,7 @@ impl ItemBuffer {
                 vertex_stride: 0,
                 attributes: &[],
                 blending: Blending::Nearest,
-                backs_alone: false,
+                sides: Sides::Both,
             },
         )?;
         Ok(Self {

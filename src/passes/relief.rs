@@ -14,7 +14,7 @@ use super::types::ParallelLight;
 use crate::error::Result;
 use crate::vk::{
     Blending, Buffer, BufferUse, Commands, DescriptorSet, Device, GraphicsPipeline, GraphicsState,
-    Image, Sampled, Sampler,
+    Image, Sampled, Sampler, Sides,
 };
 
 /// Push constants of one draw, most as those of [`super::shade::Parameters`]; `pixel` is the angle
@@ -89,7 +89,7 @@ impl Relief {
                     attributes: &[],
                     // Where no relief was found, nothing is shaded.
                     blending: Blending::Under,
-                    backs_alone: false,
+                    sides: Sides::Both,
                 },
             )?,
             by_texel: Sampler::new(device, "relief hits", false)?,

@@ -14,8 +14,8 @@ use super::shaders::relief_hits::{Bindings, SHADER};
 use super::types::{HeightTile, Prism, ReliefSurface};
 use crate::error::Result;
 use crate::vk::{
-    Attachment, Blending, Buffer, BufferUse, Commands, Depths, DescriptorSet, Device, Format,
-    Framebuffer, GraphicsPipeline, GraphicsShaders, GraphicsState, Image, ImageUse, RenderPass,
+    Attachment, Blending, Buffer, BufferUse, Commands, DescriptorSet, Device, Format, Framebuffer,
+    GraphicsPipeline, GraphicsShaders, GraphicsState, Image, ImageUse, RenderPass, Sides,
     VertexAttribute,
 };
 
@@ -84,7 +84,7 @@ impl ReliefHits {
     /// A device that fails.
     pub fn new(device: &Arc<Device>, shading: u32) -> Result<Self> {
         let hits = Attachment::read_by_shaders(FORMAT);
-        let pass = RenderPass::with_depths(device, "relief hits", hits, Depths::Kept)?;
+        let pass = RenderPass::keeping_depths(device, "relief hits", hits)?;
         let constants = [shading];
         let state = prisms("relief hits", &SHADER, &constants);
         let pipeline = GraphicsPipeline::new(device, &pass, &state)?;
@@ -154,7 +154,7 @@ pub(super) fn prisms<'a>(
         vertex_stride: size_of::<Vertex>() as u32,
         attributes: &ATTRIBUTES,
         blending: Blending::Nearest,
-        backs_alone: true,
+        sides: Sides::Backs,
     }
 }
 

@@ -14,9 +14,9 @@ use super::types::LitTriangle;
 use crate::constants::{LIT_IN_PARTS, LIT_NOT, LIT_OPEN};
 use crate::error::Result;
 use crate::vk::{
-    Attachment, Blending, Buffer, BufferUse, Commands, Depths, DescriptorSet, Device, Format,
-    Framebuffer, GraphicsPipeline, GraphicsState, Image, ImageUse, RenderPass, Sampled, Sampler,
-    Stage, VertexAttribute,
+    Attachment, Blending, Buffer, BufferUse, Commands, DescriptorSet, Device, Format, Framebuffer,
+    GraphicsPipeline, GraphicsState, Image, ImageUse, RenderPass, Sampled, Sampler, Sides, Stage,
+    VertexAttribute,
 };
 
 /// One corner of an element.
@@ -89,8 +89,6 @@ pub struct Shade {
     pass: RenderPass,
     /// The same over depths that another pass has drawn.
     over_depths: RenderPass,
-    /// Whether depths are read back beside the radiance.
-    depths: bool,
     /// `[LIT_…]`
     lit: [GraphicsPipeline; 3],
     /// For draws that add; None unless asked for.
@@ -105,7 +103,6 @@ pub struct Target {
     colour: Image,
     depth: Image,
     readback: Buffer,
-    depth_readback: Option<Buffer>,
 }
 
 /// Radiance and the meter's flag.
@@ -113,19 +110,14 @@ const FORMAT: Format = Format::R32G32B32A32_SFLOAT;
 const TEXEL_BYTES: u64 = 16;
 
 impl Shade {
-    /// With `depths`, these are read back beside the radiance; only with `adds` draws can add, and
-    /// only with `beams` point lights shine in beams.
+    /// Only with `adds` draws can add, and only with `beams` point lights shine in beams.
     ///
     /// # Errors
     /// A device that fails.
-    pub fn new(device: &Arc<Device>, depths: bool, adds: bool, beams: bool) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, adds: bool, beams: bool) -> Result<Self> {
         let colour = Attachment::copied(FORMAT);
-        let after = match depths {
-            true => Depths::Copied,
-            false => Depths::Dropped,
-        };
-        let pass = RenderPass::with_depths(device, "shade", colour, after)?;
-        let over_depths = RenderPass::over_depths(device, "shade", colour, after)?;
+        let pass = RenderPass::new(device, "shade", colour)?;
+        let over_depths = RenderPass::over_depths(device, "shade", colour)?;
         let attribute = |format, offset: usize| VertexAttribute {
             format,
             offset: offset as u32,
@@ -147,7 +139,7 @@ impl Shade {
                 attribute(Format::R32G32_SFLOAT, std::mem::offset_of!(Vertex, uv)),
             ],
             blending: Blending::Nearest,
-            backs_alone: false,
+            sides: Sides::Both,
         };
         let added = GraphicsState {
             blending: Blending::Add,
@@ -163,7 +155,6 @@ impl Shade {
         };
         let adding = adds.then(|| GraphicsPipeline::new(device, &pass, &added));
         Ok(Self {
-            depths,
             lit: [lit(LIT_NOT)?, lit(LIT_OPEN)?, lit(LIT_IN_PARTS)?],
             adding: adding.transpose()?,
             over_depths,
@@ -237,9 +228,6 @@ impl Shade {
         cmd.end_render_pass();
         drawn();
         cmd.copy_image_to_buffer(&target.colour, &target.readback);
-        if let Some(readback) = &target.depth_readback {
-            cmd.copy_image_to_buffer(&target.depth, readback);
-        }
         cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
     }
 }
@@ -265,10 +253,7 @@ impl Target {
             "shade depth",
             size,
             Format::D32_SFLOAT,
-            match shade.depths {
-                true => ImageUse::CopiedDepth,
-                false => ImageUse::DepthTarget,
-            },
+            ImageUse::DepthTarget,
         )?;
         let samples = u64::from(width) * u64::from(height);
         let readback = |name, bytes| Buffer::new(device, name, bytes, BufferUse::Readback);
@@ -279,10 +264,6 @@ impl Target {
             colour,
             depth,
             readback: readback("shade readback", samples * TEXEL_BYTES)?,
-            depth_readback: match shade.depths {
-                true => Some(readback("shade depths", samples * 4)?),
-                false => None,
-            },
         })
     }
 
@@ -294,12 +275,5 @@ impl Target {
     /// W·m⁻²·sr⁻¹, and the meter's flag. The submission must be done.
     pub fn rows(&self, rows: u32) -> Vec<[f32; 4]> {
         self.readback.read(0, self.width as usize * rows as usize)
-    }
-
-    /// The same rows' depths, near plane over distance along the view, 0 where nothing is; none of
-    /// a shade without them.
-    pub fn depths(&self, rows: u32) -> Option<Vec<f32>> {
-        let readback = self.depth_readback.as_ref()?;
-        Some(readback.read(0, self.width as usize * rows as usize))
     }
 }

@@ -112,8 +112,8 @@ impl<'a> PathTracer<'a> {
     }
 
     /// Traces a picture: box filter over the pixel, jittered strata. The same settings give the
-    /// same bits for any number of threads. `go_on` is called after each pass from the second on;
-    /// when it returns false, the picture so far is the result.
+    /// same bits for any number of threads. `go_on` is called after each pass from the second on,
+    /// with the picture so far; when it returns false, that is the result.
     ///
     /// # Errors
     /// Paths not in 2..=[`MOST_PATHS`]; a size of 0, above [`crate::picture::MOST_PIXELS`] a
@@ -122,7 +122,7 @@ impl<'a> PathTracer<'a> {
         &self,
         view: &View<'_>,
         settings: &Settings,
-        mut go_on: impl FnMut(&Progress) -> bool,
+        mut go_on: impl FnMut(&Progress, &Film) -> bool,
     ) -> Result<Film> {
         view.check()?;
         let pixels = u64::from(view.width) * u64::from(view.height);
@@ -183,7 +183,7 @@ impl<'a> PathTracer<'a> {
             };
             let next_ends = film.elapsed + film.elapsed / film.passes;
             let in_time = settings.budget.is_none_or(|budget| next_ends <= budget);
-            if film.passes >= 2 && !(go_on(&progress) && in_time) {
+            if film.passes >= 2 && !(go_on(&progress, &film) && in_time) {
                 break;
             }
         }

@@ -299,6 +299,15 @@ impl Picture {
 
     /// 8-bit sRGB codes, `[row][column][channel]`.
     pub(crate) fn srgb_codes(&self, development: impl Into<Development>) -> Vec<u8> {
+        self.srgb_codes_at([0, 0], development)
+    }
+
+    /// The same of a part of a larger picture, by the column and the row of its corner there.
+    pub(crate) fn srgb_codes_at(
+        &self,
+        [left, top]: [u32; 2],
+        development: impl Into<Development>,
+    ) -> Vec<u8> {
         let linear = self.developed(&development.into());
         let width = self.width as usize;
         let mut codes = vec![0; 3 * linear.len()];
@@ -309,7 +318,8 @@ impl Picture {
             .for_each(|(row, (codes, linear))| {
                 for (column, (code, linear)) in codes.chunks_mut(3).zip(linear).enumerate() {
                     for channel in 0..3 {
-                        code[channel] = tone::code(linear[channel], column as u32, row as u32);
+                        code[channel] =
+                            tone::code(linear[channel], left + column as u32, top + row as u32);
                     }
                 }
             });

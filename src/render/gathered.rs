@@ -64,6 +64,31 @@ impl Gathered {
         }
     }
 
+    /// The tile that was added last as a picture of its own, not metered.
+    #[cfg(feature = "window")]
+    pub fn last(&self, tile: Tile) -> Picture {
+        let columns = tile.column..tile.column + tile.width;
+        let rows = tile.row..tile.row + tile.height;
+        let row = |row: u32| {
+            let start = (row * self.width) as usize;
+            &self.radiance[start + columns.start as usize..start + columns.end as usize]
+        };
+        let within = |place: u32| {
+            let (column, row) = (place % self.width, place / self.width);
+            let inside = columns.contains(&column) && rows.contains(&row);
+            inside.then(|| (row - tile.row) * tile.width + column - tile.column)
+        };
+        let latest = self.contrasts.iter().rev();
+        let contrasts = latest.map_while(|(place, samples)| Some((within(*place)?, *samples)));
+        Picture {
+            width: tile.width,
+            height: tile.height,
+            radiance: rows.clone().flat_map(row).copied().collect(),
+            automatic_exposure: 0.0,
+            contrasts: contrasts.collect(),
+        }
+    }
+
     pub fn into_picture(mut self) -> Picture {
         self.contrasts.par_sort_unstable_by_key(|c| c.0);
         Picture {

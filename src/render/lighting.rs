@@ -119,6 +119,9 @@ pub struct Lighting<'a> {
     /// Whether samples of plain triangles with nothing between them and the lights skip the shadow
     /// rays: quicker, and the same picture.
     pub skip_open: bool,
+    /// Whether triangles seen from behind are left out, so that one looks into a room through its
+    /// walls; else they are black.
+    pub hide_backs: bool,
     /// Folder that keeps the visibility of reliefs from run to run.
     pub cache: Option<&'a Path>,
 }
@@ -134,6 +137,7 @@ impl<'a> Lighting<'a> {
             direct: Direct::default(),
             show: Show::default(),
             skip_open: true,
+            hide_backs: false,
             cache: None,
         }
     }

@@ -120,6 +120,7 @@ impl Mesh {
                 };
                 Drawn { kind, triangle: e }
             })
+            .filter(|drawn| !(lighting.hide_backs && drawn.kind == Kind::Back))
             .collect();
         // Nothing is added where no texture emits.
         if shows_emission(lighting) {

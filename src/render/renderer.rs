@@ -14,7 +14,7 @@ use super::{Lighting, Overdraw, Show, View};
 use crate::error::Result;
 use crate::passes::shade::{self, Shade, Target};
 use crate::passes::shadow_rays::LightBuffers;
-use crate::picture::{Light, NEAR, Picture, Projection, SAMPLES, Tile};
+use crate::picture::{Light, Picture, Projection, SAMPLES, Tile};
 use crate::scene::Scene;
 use crate::scene::sky::Sky;
 use crate::vk::{Commands, Device, Timestamps};
@@ -107,21 +107,6 @@ impl<'a> Renderer<'a> {
         view: &View<'a>,
         samples: u32,
     ) -> Result<Self> {
-        Self::with_depths(device, scene, lighting, view, samples, false)
-    }
-
-    /// As [`Self::new`]; with `depths`, [`Self::picture_while`] also returns distances.
-    ///
-    /// # Errors
-    /// As [`super::render`].
-    pub fn with_depths(
-        device: &Arc<Device>,
-        scene: &'a Scene,
-        lighting: Lighting<'a>,
-        view: &View<'a>,
-        samples: u32,
-        depths: bool,
-    ) -> Result<Self> {
         assert_eq!(
             lighting.irradiance.len(),
             scene.triangles.len(),
@@ -129,7 +114,7 @@ impl<'a> Renderer<'a> {
         );
         view.check()?;
         let glows = scene.materials.iter().any(|m| m.map_ke.is_some());
-        let shade = Shade::new(device, depths, glows, scene.lights.have_beams())?;
+        let shade = Shade::new(device, glows, scene.lights.have_beams())?;
         let fixed = Fixed {
             textures: Textures::new(device, scene)?,
             relief: ReliefScene::new(device, &shade, scene, &lighting)?,
@@ -167,19 +152,17 @@ impl<'a> Renderer<'a> {
         }
     }
 
-    /// As [`Self::picture`], in tiles of `tile` pixels a side. `go_on` is asked before each tile;
-    /// when it returns false, drawing stops and the result is None. The second value is the
-    /// distance of each pixel's middle along the view, `[row][column]`, internal units, 0 where
-    /// nothing is; it is empty for a renderer without depths.
+    /// As [`Self::picture`]; `go_on` is asked after each tile, with what is there so far. When it
+    /// returns false, drawing stops and the result is None.
     ///
     /// # Errors
     /// A device that fails.
-    pub fn picture_while(
+    #[cfg(feature = "window")]
+    pub(crate) fn picture_while(
         &self,
-        tile: u32,
-        go_on: impl FnMut() -> bool,
-    ) -> Result<Option<(Picture, Vec<f32>)>> {
-        self.tiles(tile.clamp(1, TILE), go_on)
+        go_on: impl FnMut(Tile, &Gathered) -> bool,
+    ) -> Result<Option<Picture>> {
+        self.tiles(go_on)
     }
 
     /// What [`Show::Overdraw`] counts.
@@ -196,26 +179,18 @@ impl<'a> Renderer<'a> {
     }
 
     fn gathered(&self) -> Result<Picture> {
-        let whole = self.tiles(TILE, || true)?.map(|whole| whole.0);
+        let whole = self.tiles(|_, _| true)?;
         Ok(whole.expect("nothing stops this picture"))
     }
 
     /// While a tile is drawn, the samples of the one before are resolved.
-    fn tiles(
-        &self,
-        side: u32,
-        mut go_on: impl FnMut() -> bool,
-    ) -> Result<Option<(Picture, Vec<f32>)>> {
+    fn tiles(&self, mut go_on: impl FnMut(Tile, &Gathered) -> bool) -> Result<Option<Picture>> {
         let (width, height) = self.view.size;
-        let canvas = || self.canvas((width.min(side) * SAMPLES, height.min(side) * SAMPLES));
+        let canvas = || self.canvas((width.min(TILE) * SAMPLES, height.min(TILE) * SAMPLES));
         let canvases = [canvas()?, canvas()?];
         let mut gathered = Gathered::new(self.view.size);
-        let mut distances = Vec::new();
         let mut before = None;
-        for (i, tile) in Tile::of((width, height), side).enumerate() {
-            if !go_on() {
-                return Ok(None);
-            }
+        for (i, tile) in Tile::of((width, height), TILE).enumerate() {
             let canvas = &canvases[i % 2];
             let mut commands = Commands::record(&self.fixed.device, "shade", |cmd| {
                 self.record(cmd, canvas, tile, SAMPLES, None, || ());
@@ -223,13 +198,17 @@ impl<'a> Renderer<'a> {
             })?;
             commands.submit()?;
             if let Some((tile, commands, canvas)) = before.replace((tile, commands, canvas)) {
-                self.take_in(tile, commands, canvas, &mut gathered, &mut distances)?;
+                self.take_in(tile, commands, canvas, &mut gathered)?;
+                if !go_on(tile, &gathered) {
+                    return Ok(None);
+                }
             }
         }
         if let Some((tile, commands, canvas)) = before {
-            self.take_in(tile, commands, canvas, &mut gathered, &mut distances)?;
+            self.take_in(tile, commands, canvas, &mut gathered)?;
+            go_on(tile, &gathered);
         }
-        Ok(Some((gathered.into_picture(), distances)))
+        Ok(Some(gathered.into_picture()))
     }
 
     /// Waits for a tile and resolves it.
@@ -239,7 +218,6 @@ impl<'a> Renderer<'a> {
         mut commands: Commands,
         canvas: &Canvas,
         gathered: &mut Gathered,
-        distances: &mut Vec<f32>,
     ) -> Result<()> {
         commands.wait()?;
         let target = &canvas.target;
@@ -248,18 +226,6 @@ impl<'a> Renderer<'a> {
             draw_sky(sky, &self.view.projection, tile, &mut samples, stride);
         }
         gathered.add(tile, &samples, stride as usize);
-        let Some(depths) = target.depths(tile.height * SAMPLES) else {
-            return Ok(());
-        };
-        let (width, height) = self.view.size;
-        distances.resize(width as usize * height as usize, 0.0);
-        for place in 0..tile.width * tile.height {
-            let (x, y) = (place % tile.width, place / tile.width);
-            let sample = (y * SAMPLES + SAMPLES / 2) * target.width;
-            let depth = depths[(sample + x * SAMPLES + SAMPLES / 2) as usize];
-            let pixel = (tile.row + y) * width + tile.column + x;
-            distances[pixel as usize] = if depth > 0.0 { NEAR / depth } else { 0.0 };
-        }
         Ok(())
     }
 

@@ -1,6 +1,6 @@
 //! The camera of the window: it orbits about a point and flies.
 
-use glam::{DQuat, DVec3, Vec3, Vec4};
+use glam::{DQuat, DVec3, Vec4};
 
 use crate::scene::{Camera, Scene};
 
@@ -22,14 +22,12 @@ pub struct Eye {
     size: f64,
 }
 
-/// Rows of a projection over (p, 1), p from the scene's middle in internal units, and the eye
-/// there.
+/// Rows of a projection over (p, 1), p from the scene's middle in internal units.
 #[derive(Debug, Clone, Copy)]
 pub struct Rows {
     pub x: Vec4,
     pub y: Vec4,
     pub w: Vec4,
-    pub eye: Vec3,
 }
 
 impl Eye {
@@ -180,7 +178,6 @@ impl Eye {
             x: row(self.right() * (scale * f64::from(height) / f64::from(width))),
             y: row(-up * scale),
             w: row(self.forward()),
-            eye: eye.as_vec3(),
         }
     }
 }

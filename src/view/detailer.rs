@@ -1,10 +1,9 @@
 //! Detailed pictures of views, drawn as `render` draws them, on a thread and a Vulkan device of
 //! their own.
 //!
-//! A view that stays is drawn coarsely first, then whole. While the view moves, coarse pictures are
-//! drawn of its place when the last one is done, and whole ones if they are quick enough. Each
-//! comes with the distances of its pixels, so that the window can lay it over the surfaces seen
-//! from elsewhere.
+//! Only a view that stays is drawn. Of a finished bake it is shown tile by tile as it is drawn, over
+//! the last picture of the same view where there is one; of a bake under way as a whole, since tiles
+//! of different stages would not match.
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -18,7 +17,9 @@ use super::snapshot::{Snapshot, even_moments};
 use super::{DeviceChoice, Wake};
 use crate::bake::solution::DirectionalLight;
 use crate::error::Result;
-use crate::render::{Direct, Light, Lighting, ReliefShading, Renderer, SAMPLES, Show, View};
+use crate::render::{
+    Direct, Light, Lighting, Picture, ReliefShading, Renderer, SAMPLES, Show, View,
+};
 use crate::scene::Camera;
 use crate::vk::Device;
 use glam::Vec3;
@@ -38,25 +39,18 @@ pub struct Wanted {
     pub ambient: Vec3,
     /// Stops.
     pub exposure: f32,
-}
-
-impl Drawn {
-    /// Whether it has all pixels of the wanted picture.
-    pub fn is_whole(&self) -> bool {
-        self.size == self.of.size
-    }
+    /// Of the left side of a comparison.
+    pub left: bool,
 }
 
 impl Wanted {
     /// Whether a picture of `other` shows the same view in the same way, at any stage of the same
     /// bake.
     pub fn looks_like(&self, other: &Self) -> bool {
-        self.size == other.size && self.camera == other.camera && self.colours_like(other)
-    }
-
-    /// Whether a picture of `other` gives surfaces the same colours, from any view.
-    pub fn colours_like(&self, other: &Self) -> bool {
-        self.snapshot.epoch == other.snapshot.epoch
+        self.left == other.left
+            && self.size == other.size
+            && self.camera == other.camera
+            && self.snapshot.epoch == other.snapshot.epoch
             && self.shows_like(other)
             && self.exposure.to_bits() == other.exposure.to_bits()
     }
@@ -74,16 +68,16 @@ impl Wanted {
     }
 }
 
-/// A picture that was wanted.
+/// A picture that was wanted, or a part of it.
+#[derive(Clone)]
 pub struct Drawn {
     pub of: Wanted,
-    /// Pixels; fewer than wanted for a coarse picture.
-    pub size: (u32, u32),
-    /// sRGB, `[row][column]`.
+    /// sRGB, `[row][column]`; transparent where nothing has been drawn yet.
     pub codes: Vec<Color32>,
-    /// Distance of each pixel's middle along the view, `[row][column]`, internal units; 0 where
-    /// nothing is.
-    pub distances: Vec<f32>,
+    /// Once it is whole.
+    pub picture: Option<Arc<Picture>>,
+    pub is_whole: bool,
+    /// Time that it has taken so far.
     pub seconds: f64,
 }
 
@@ -101,15 +95,14 @@ struct Shared {
 
 #[derive(Default)]
 struct State {
-    wanted: Option<Wanted>,
-    /// Whether the wanted view is moving.
-    moving: bool,
-    /// Number of requests so far: a new request stops the picture in progress, unless the view
-    /// moves.
+    /// In the order in which they are drawn.
+    wanted: VecDeque<Wanted>,
+    /// Number of requests so far: a new one stops the picture in progress.
     asked: u64,
     /// Pictures for files come before the view's.
     to_save: VecDeque<(Wanted, PathBuf)>,
-    drawn: Option<Drawn>,
+    /// Of the left side, of the view as it is.
+    drawn: [Option<Drawn>; 2],
     /// Saved files, with their exposures.
     saved: Vec<(PathBuf, Result<f32>)>,
     error: Option<crate::error::Error>,
@@ -132,6 +125,7 @@ impl Detailer {
                     shared: &work,
                     wake: &wake,
                     device,
+                    last: [None, None],
                 }
                 .run()
             });
@@ -146,15 +140,12 @@ impl Detailer {
         }
     }
 
-    /// Replaces the wanted picture by another one, of a view that moves or stays; None wants no
-    /// picture.
-    pub fn want(&self, wanted: Option<Wanted>, moving: bool) {
+    /// Replaces the wanted pictures by others, which are drawn one after another.
+    pub fn want(&self, wanted: Vec<Wanted>) {
         {
             let mut state = self.shared.state();
-            let goes_on = moving && state.moving && wanted.is_some();
-            state.asked += u64::from(!goes_on);
-            state.moving = moving;
-            state.wanted = wanted;
+            state.asked += 1;
+            state.wanted = wanted.into();
         }
         self.shared.changed.notify_all();
     }
@@ -165,9 +156,9 @@ impl Detailer {
         self.shared.changed.notify_all();
     }
 
-    /// The latest picture since the last call.
-    pub fn take(&self) -> Option<Drawn> {
-        self.shared.state().drawn.take()
+    /// The latest pictures since the last call: of the left side, of the view as it is.
+    pub fn take(&self) -> [Option<Drawn>; 2] {
+        std::mem::take(&mut self.shared.state().drawn)
     }
 
     /// Files that were written, or failed, since the last call.
@@ -191,17 +182,15 @@ impl Drop for Detailer {
     }
 }
 
-/// Pixels along each side that are one pixel of a coarse picture.
-const COARSE: u32 = 4;
-/// Pixels along a side of a tile; between tiles the thread checks for new requests.
-const TILE: u32 = 96;
-/// Longest time of a whole picture that is drawn while the view moves.
-const QUICK: Duration = Duration::from_millis(300);
+/// Between two parts of a picture that are shown.
+const PARTS: Duration = Duration::from_millis(150);
 
 struct Work<'a> {
     shared: &'a Shared,
     wake: &'a Wake,
     device: Arc<Device>,
+    /// The last pictures of each side that were drawn whole.
+    last: [Option<Drawn>; 2],
 }
 
 /// The next picture of a renderer.
@@ -219,7 +208,7 @@ impl Next {
 }
 
 impl Work<'_> {
-    fn run(&self) -> Result<()> {
+    fn run(mut self) -> Result<()> {
         let mut next = self.wait();
         while let Some(first) = next {
             next = self.draw_alike(first)?;
@@ -237,7 +226,7 @@ impl Work<'_> {
             if let Some((wanted, path)) = state.to_save.pop_front() {
                 return Some(Next::Save(wanted, path));
             }
-            if let Some(wanted) = state.wanted.take() {
+            if let Some(wanted) = state.wanted.pop_front() {
                 return Some(Next::Draw(wanted));
             }
             state = self
@@ -255,7 +244,7 @@ impl Work<'_> {
 
     /// Draws pictures as long as one renderer can draw them; returns the first request that it
     /// cannot.
-    fn draw_alike(&self, first: Next) -> Result<Option<Next>> {
+    fn draw_alike(&mut self, first: Next) -> Result<Option<Next>> {
         let wanted = first.wanted().clone();
         let snapshot = Arc::clone(&wanted.snapshot);
         let irradiance: Vec<Vec3> = snapshot
@@ -275,15 +264,15 @@ impl Work<'_> {
             show: wanted.show,
             ..snapshot.lighting(&irradiance)
         };
-        let view = view(&wanted, 1);
+        let view = view(&wanted);
         let (device, scene) = (&self.device, &snapshot.scene);
-        let mut renderer = Renderer::with_depths(device, scene, lighting, &view, SAMPLES, true)?;
+        let mut renderer = Renderer::new(device, scene, lighting, &view, SAMPLES)?;
         let mut next = first;
         loop {
             match &next {
                 Next::Draw(wanted) => self.draw(&mut renderer, wanted)?,
                 Next::Save(wanted, path) => {
-                    renderer.look(&self::view(wanted, 1))?;
+                    renderer.look(&self::view(wanted))?;
                     let written = renderer
                         .picture()?
                         .write(path, Some(wanted.exposure))
@@ -299,34 +288,52 @@ impl Work<'_> {
         }
     }
 
-    fn draw(&self, renderer: &mut Renderer<'_>, wanted: &Wanted) -> Result<()> {
+    fn draw(&mut self, renderer: &mut Renderer<'_>, wanted: &Wanted) -> Result<()> {
         let start = Instant::now();
-        let (asked, moving) = {
-            let state = self.shared.state();
-            (state.asked, state.moving)
+        let asked = self.shared.state().asked;
+        renderer.look(&view(wanted))?;
+        let (width, height) = wanted.size;
+        let side = side(wanted);
+        let before = self.last[side].take();
+        let before = before.filter(|last| last.of.looks_like(wanted));
+        let none = || vec![Color32::TRANSPARENT; width as usize * height as usize];
+        let mut drawn = Drawn {
+            of: wanted.clone(),
+            codes: before.map_or_else(none, |before| before.codes),
+            picture: None,
+            is_whole: false,
+            seconds: 0.0,
         };
-        for coarse in [COARSE, 1] {
-            // If the view moves on meanwhile, a whole picture that takes long shows an outdated
-            // view.
-            if moving && coarse == 1 && start.elapsed() * COARSE * COARSE > QUICK {
-                return Ok(());
+        let in_parts = wanted.snapshot.progress.done;
+        let mut shown = start;
+        let picture = renderer.picture_while(|tile, gathered| {
+            let corner = [tile.column, tile.row];
+            let codes = codes(&gathered.last(tile), corner, wanted.exposure);
+            for (row, codes) in (tile.row..).zip(codes.chunks_exact(tile.width as usize)) {
+                let place = (row * width + tile.column) as usize;
+                drawn.codes[place..place + tile.width as usize].copy_from_slice(codes);
             }
-            let view = view(wanted, coarse);
-            renderer.look(&view)?;
-            let drawn = renderer.picture_while(TILE, || !self.is_overtaken(asked))?;
-            let Some((picture, distances)) = drawn else {
-                return Ok(());
-            };
-            let codes = picture.srgb_codes(Some(wanted.exposure));
-            let codes = codes.chunks_exact(3);
-            self.shared.state().drawn = Some(Drawn {
-                of: wanted.clone(),
-                size: (view.width, view.height),
-                codes: codes.map(|c| Color32::from_rgb(c[0], c[1], c[2])).collect(),
-                distances,
-                seconds: start.elapsed().as_secs_f64(),
-            });
+            if in_parts && shown.elapsed() >= PARTS {
+                shown = Instant::now();
+                drawn.seconds = start.elapsed().as_secs_f64();
+                self.shared.state().drawn[side] = Some(drawn.clone());
+                (self.wake)();
+            }
+            !self.is_overtaken(asked)
+        })?;
+        if let Some(picture) = picture {
+            drawn.picture = Some(Arc::new(picture));
+            drawn.is_whole = true;
+            drawn.seconds = start.elapsed().as_secs_f64();
+            self.last[side] = Some(drawn.clone());
+            self.shared.state().drawn[side] = Some(drawn);
             (self.wake)();
+        } else {
+            // A picture that is saved comes first; this one is drawn after it.
+            let mut state = self.shared.state();
+            if state.asked == asked {
+                state.wanted.push_front(wanted.clone());
+            }
         }
         Ok(())
     }
@@ -355,11 +362,23 @@ fn under(relief: &DirectionalLight, ambient: Vec3) -> Option<DirectionalLight> {
     })
 }
 
-fn view(wanted: &Wanted, coarse: u32) -> View<'_> {
+/// A picture, or the part of one whose corner is at a column and a row, in sRGB.
+pub fn codes(picture: &Picture, corner: [u32; 2], exposure: f32) -> Vec<Color32> {
+    let codes = picture.srgb_codes_at(corner, Some(exposure));
+    let codes = codes.chunks_exact(3);
+    codes.map(|c| Color32::from_rgb(c[0], c[1], c[2])).collect()
+}
+
+/// Its place in lists of both sides.
+fn side(wanted: &Wanted) -> usize {
+    usize::from(!wanted.left)
+}
+
+fn view(wanted: &Wanted) -> View<'_> {
     View {
         camera: &wanted.camera,
-        width: wanted.size.0.div_ceil(coarse),
-        height: wanted.size.1.div_ceil(coarse),
+        width: wanted.size.0,
+        height: wanted.size.1,
     }
 }
 

@@ -14,33 +14,41 @@
 //! that each device has its own instance too; and the other two threads, with all that they start,
 //! run at a lower priority.
 
+mod backdrop;
 mod baker;
 mod camera;
+mod compare;
 mod detailer;
 mod event;
-mod laid_pictures;
+mod history;
 mod lamps;
+mod notes;
 mod orders;
 mod overlay;
 mod panel;
 mod panel_pass;
 mod pick;
+mod recent;
 mod runner;
 mod screen;
 mod script;
+mod slopes;
 mod snapshot;
 mod surface_mesh;
 mod surface_pass;
 mod switches;
 mod timing;
+mod tracer;
 mod viewer;
+mod watch;
 mod window;
 
+use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Instant;
 
-use crate::bake::solution::Bake;
+use crate::bake::solution::{Bake, Solution};
 use crate::error::Result;
 use crate::scene::{Camera, Scene};
 use crate::solver::{self, Settings, Visibility};
@@ -82,10 +90,14 @@ pub struct Session {
     pub offered: Arc<[String]>,
     /// Reads a scene or a bake: a name of `offered`, or a file dropped on the window.
     pub open: Open,
+    pub save: Save,
 }
 
 /// Reads a scene by its name or path.
 pub type Open = Arc<dyn Fn(&str) -> Result<Opened> + Send + Sync>;
+
+/// Writes a solution of a scene, opened by its name and solved by these settings, to a file.
+pub type Save = Arc<dyn Fn(&Path, &str, &Scene, &Solution, &Settings) -> Result<()> + Send + Sync>;
 
 /// Tells the window that there is something new.
 type Wake = Arc<dyn Fn() + Send + Sync>;

@@ -18,6 +18,8 @@ pub enum Order {
     /// Lights the scene of the last bake, of which emission and point lights have changed, by the
     /// form factors that are kept.
     Relight { scene: Arc<Scene>, epoch: u64 },
+    /// Saves the bake.
+    Save,
     /// Finds the sources of a bake from a file.
     Sources,
     /// Draws what a source sees.

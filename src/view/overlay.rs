@@ -1,6 +1,6 @@
 //! Small pictures over the view: light by direction, an item buffer, error bounds, marks of lights.
 
-use egui::{Color32, ColorImage, Painter, Pos2, Sense, Shape, Stroke, Ui, Vec2, pos2, vec2};
+use egui::{Color32, ColorImage, Painter, Pos2, Sense, Shape, Stroke, Ui, pos2, vec2};
 use glam::{DVec3, Vec3};
 
 use crate::bake::solution::DirectionalLight;
@@ -42,7 +42,8 @@ pub fn hemisphere(light: &DirectionalLight, triangle: u32, exposure: f32) -> Opt
     Some(ColorImage::new([SIDE, SIDE], pixels.collect()))
 }
 
-fn code(linear: [f32; 3]) -> Color32 {
+/// The sRGB code of exposed radiance.
+pub fn code(linear: [f32; 3]) -> Color32 {
     // A place near the middle of the dither's matrix, which amounts to rounding.
     let [r, g, b] = tone::neutral(linear).map(|c| tone::code(c, 0, 4));
     Color32::from_rgb(r, g, b)
@@ -96,36 +97,69 @@ fn unfolded(face: u32, (column, row): (u32, u32), half: u32) -> (u32, u32) {
     }
 }
 
-/// Error bounds over seconds, on a logarithmic axis.
+/// Points across that the figures of a bound take.
+const FIGURES: f32 = 54.0;
+
+/// Error bounds over seconds: the bound on a logarithmic axis, the time from 0 on.
 pub fn bounds(ui: &mut Ui, bounds: &[[f64; 2]]) {
-    let (place, _) = ui.allocate_exact_size(vec2(210.0, 60.0), Sense::hover());
+    let size = vec2(ui.available_width(), 76.0);
+    let (all, _) = ui.allocate_exact_size(size, Sense::hover());
     let painter = ui.painter();
+    let (mut place, axis) = all.split_top_bottom_at_y(all.bottom() - 13.0);
     painter.rect_filled(place, 2.0, Color32::from_black_alpha(120));
-    let logs: Vec<[f64; 2]> = bounds
-        .iter()
-        .filter(|[_, bound]| *bound > 0.0)
-        .map(|&[t, bound]| [t, bound.log10()])
-        .collect();
-    let (Some(first), Some(last)) = (logs.first(), logs.last()) else {
+    let logs = bounds.iter().filter(|[_, bound]| *bound > 0.0);
+    let logs: Vec<[f64; 2]> = logs.map(|&[t, bound]| [t, bound.log10()]).collect();
+    let Some([end, _]) = logs.last().copied() else {
         return;
     };
     let high = logs.iter().map(|l| l[1]).fold(f64::NEG_INFINITY, f64::max);
     let low = logs.iter().map(|l| l[1]).fold(f64::INFINITY, f64::min);
-    let span = [(last[0] - first[0]).max(1e-9), (high - low).max(1e-9)];
-    let points = logs.iter().map(|[t, l]| {
-        let x = ((t - first[0]) / span[0]) as f32;
-        let y = ((high - l) / span[1]) as f32;
-        place.min + vec2(x * place.width(), y * place.height())
-    });
-    let stroke = Stroke::new(1.5, Color32::LIGHT_GREEN);
-    painter.add(Shape::line(points.collect(), stroke));
-    let font = egui::FontId::proportional(9.0);
+    let font = egui::FontId::proportional(10.0);
+    let grey = Color32::from_gray(170);
     for (at, align, log) in [
         (place.left_top(), egui::Align2::LEFT_TOP, high),
         (place.left_bottom(), egui::Align2::LEFT_BOTTOM, low),
     ] {
-        let text = format!("{:.2} %", 100.0 * 10_f64.powf(log));
-        painter.text(at, align, text, font.clone(), Color32::GRAY);
+        let text = format!("{:.3} %", 100.0 * 10_f64.powf(log));
+        painter.text(at, align, text, font.clone(), grey);
+    }
+    for (at, align, seconds) in [
+        (
+            axis.left_top() + vec2(FIGURES, 0.0),
+            egui::Align2::LEFT_TOP,
+            0.0,
+        ),
+        (
+            pos2((axis.left() + FIGURES + axis.right()) / 2.0, axis.top()),
+            egui::Align2::CENTER_TOP,
+            end / 2.0,
+        ),
+        (axis.right_top(), egui::Align2::RIGHT_TOP, end),
+    ] {
+        painter.text(at, align, format!("{seconds:.1} s"), font.clone(), grey);
+    }
+    // Beside the figures, not over them.
+    place.min.x += FIGURES;
+    let points = logs.iter().map(|[t, l]| {
+        let x = (t / end.max(1e-9)) as f32;
+        let y = ((high - l) / (high - low).max(1e-9)) as f32;
+        place.min + vec2(x * place.width(), y * place.height())
+    });
+    let stroke = Stroke::new(1.5, Color32::LIGHT_GREEN);
+    painter.add(Shape::line(points.collect(), stroke));
+}
+
+/// What the overlays that are shown mean, in the lower left corner of the view.
+pub fn legend(painter: &Painter, corner: Pos2, lines: &[&str]) {
+    let font = egui::FontId::proportional(12.0);
+    let mut at = corner;
+    for line in lines.iter().rev() {
+        let text = painter.layout_no_wrap((*line).to_owned(), font.clone(), Color32::WHITE);
+        let size = text.size();
+        at.y -= size.y + 6.0;
+        let place = egui::Rect::from_min_size(at, size).expand2(vec2(6.0, 2.0));
+        painter.rect_filled(place, 3.0, Color32::from_black_alpha(190));
+        painter.galley(at, text, Color32::WHITE);
     }
 }
 
@@ -137,15 +171,11 @@ pub fn lamp(painter: &Painter, at: (f64, f64), scale: f32, colour: [f32; 3], nam
     let ring = if name.is_some() { 2.0 } else { 1.0 };
     painter.circle_stroke(at, 7.0, Stroke::new(ring, Color32::WHITE));
     if let Some(name) = name {
-        let beside: Pos2 = at + Vec2::new(10.0, 0.0);
         let font = egui::FontId::proportional(12.0);
-        painter.text(
-            beside,
-            egui::Align2::LEFT_CENTER,
-            name,
-            font,
-            Color32::WHITE,
-        );
+        let text = painter.layout_no_wrap(name.to_owned(), font, Color32::WHITE);
+        let place = egui::Align2::LEFT_CENTER.anchor_size(at + vec2(12.0, 0.0), text.size());
+        painter.rect_filled(place.expand(3.0), 3.0, Color32::from_black_alpha(150));
+        painter.galley(place.min, text, Color32::WHITE);
     }
 }
 

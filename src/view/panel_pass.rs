@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::passes::shaders::panel::{Bindings, Parameters, SHADER};
 use crate::vk::{
     Blending, Buffer, BufferUse, Commands, DescriptorSet, Device, Format, GraphicsPipeline,
-    GraphicsState, Image, ImageUse, RenderPass, Sampled, Sampler, VertexAttribute,
+    GraphicsState, Image, ImageUse, RenderPass, Sampled, Sampler, Sides, VertexAttribute,
 };
 
 /// Draws panels, one frame at a time.
@@ -19,8 +19,8 @@ pub struct PanelPass {
     pipeline: GraphicsPipeline,
     sampler: Sampler,
     textures: HashMap<TextureId, Texture>,
-    /// Share of the image that is the picture.
-    picture_share: Vec2,
+    /// Shares of the images that are the pictures, `[Layer]`.
+    shares: [Vec2; LAYERS.len()],
     vertices: Buffer,
     indices: Buffer,
     device: Arc<Device>,
@@ -32,8 +32,24 @@ struct Texture {
     pixels: ColorImage,
 }
 
-/// The picture under the panel.
-const PICTURE: TextureId = TextureId::User(0);
+/// Pictures as large as the window.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Layer {
+    /// Behind the surfaces.
+    Backdrop,
+    /// Over them.
+    Picture,
+    /// Over them on the left side of a comparison.
+    Left,
+}
+
+const LAYERS: [Layer; 3] = [Layer::Backdrop, Layer::Picture, Layer::Left];
+
+impl Layer {
+    fn texture(self) -> TextureId {
+        TextureId::User(self as u64)
+    }
+}
 
 /// Triangles of one texture within one rectangle.
 struct Draw {
@@ -46,7 +62,7 @@ struct Draw {
 
 /// Draws of one frame, uploaded by [`PanelPass::prepare`].
 pub struct Prepared {
-    /// The picture first.
+    /// Those of the layers first.
     draws: Vec<Draw>,
     /// Size of the window in points.
     size: Vec2,
@@ -78,7 +94,7 @@ impl PanelPass {
                     attribute(Format::R8G8B8A8_UNORM, std::mem::offset_of!(Vertex, color)),
                 ],
                 blending: Blending::Over,
-                backs_alone: false,
+                sides: Sides::Both,
             },
         )?;
         let stream = |name| Buffer::new(device, name, roomy(0), BufferUse::Stream);
@@ -86,7 +102,7 @@ impl PanelPass {
             pipeline,
             sampler: Sampler::held(device, "panel")?,
             textures: HashMap::new(),
-            picture_share: Vec2::ONE,
+            shares: [Vec2::ONE; LAYERS.len()],
             vertices: stream("panel vertices")?,
             indices: stream("panel indices")?,
             device: Arc::clone(device),
@@ -120,17 +136,21 @@ impl PanelPass {
         Ok(())
     }
 
-    /// Takes the picture that [`Self::record_picture`] draws, from the left top of an image.
+    /// Takes a picture for [`Self::record_layer`], of any size, sRGB `[row][column]`.
     ///
     /// # Errors
     /// A device without the memory.
-    pub fn set_picture(&mut self, image: &Image, share: Vec2) -> Result<()> {
-        self.picture_share = share;
+    pub fn set_layer(&mut self, layer: Layer, size: (u32, u32), codes: &[Color32]) -> Result<()> {
+        let name = "picture";
+        let padded = padded_size(size);
+        let image = upload(&self.device, name, padded, &fill(size, codes))?;
+        let vector = |(width, height): (u32, u32)| Vec2::new(width as f32, height as f32);
+        self.shares[layer as usize] = vector(size) / vector(padded);
         let texture = Texture {
-            set: self.bind("detailed picture", image)?,
+            set: self.bind(name, &image)?,
             pixels: ColorImage::default(),
         };
-        self.textures.insert(PICTURE, texture);
+        self.textures.insert(layer.texture(), texture);
         Ok(())
     }
 
@@ -145,25 +165,25 @@ impl PanelPass {
         scale: f32,
     ) -> Result<Prepared> {
         let size = Vec2::new(width as f32, height as f32) / scale;
-        let share = self.picture_share;
-        let corner = |x: f32, y: f32| Vertex {
-            pos: egui::pos2(x * size.x, y * size.y),
-            uv: egui::pos2(x * share.x, y * share.y),
-            color: Color32::WHITE,
-        };
-        let mut vertices = vec![
-            corner(0.0, 0.0),
-            corner(1.0, 0.0),
-            corner(1.0, 1.0),
-            corner(0.0, 1.0),
-        ];
-        let mut indices = vec![0, 1, 2, 0, 2, 3];
-        let mut draws = vec![Draw {
-            first_index: 0,
-            index_count: indices.len() as u32,
-            texture: PICTURE,
-            clip: [0, 0, width, height],
-        }];
+        let (mut vertices, mut indices, mut draws) = (Vec::new(), Vec::new(), Vec::new());
+        for (layer, share) in LAYERS.into_iter().zip(self.shares) {
+            let corner = |x: f32, y: f32| Vertex {
+                pos: egui::pos2(x * size.x, y * size.y),
+                uv: egui::pos2(x * share.x, y * share.y),
+                color: Color32::WHITE,
+            };
+            let first = vertices.len() as u32;
+            draws.push(Draw {
+                first_index: indices.len() as u32,
+                index_count: 6,
+                texture: layer.texture(),
+                clip: [0, 0, width, height],
+            });
+            indices.extend([0, 1, 2, 0, 2, 3].map(|i| first + i));
+            vertices.extend(
+                [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|(x, y)| corner(x, y)),
+            );
+        }
         for ClippedPrimitive {
             clip_rect,
             primitive,
@@ -223,14 +243,16 @@ impl PanelPass {
         self.pipeline.bind(name, &Bindings { image })
     }
 
-    /// Draws the picture over everything drawn so far, within a render pass that has begun.
-    pub fn record_picture(&self, cmd: &Commands, prepared: &Prepared) {
-        self.draw(cmd, prepared, &prepared.draws[..1]);
+    /// Draws a picture over everything drawn so far, within a render pass that has begun and within
+    /// `clip`: left, top, width, height in pixels.
+    pub fn record_layer(&self, cmd: &Commands, prepared: &Prepared, layer: Layer, clip: [u32; 4]) {
+        let of_layer = &prepared.draws[layer as usize];
+        self.draw(cmd, prepared, &[Draw { clip, ..*of_layer }]);
     }
 
     /// Draws the panel within a render pass that has begun.
     pub fn record(&self, cmd: &Commands, prepared: &Prepared) {
-        self.draw(cmd, prepared, &prepared.draws[1..]);
+        self.draw(cmd, prepared, &prepared.draws[LAYERS.len()..]);
     }
 
     fn draw(&self, cmd: &Commands, prepared: &Prepared, draws: &[Draw]) {
@@ -259,13 +281,23 @@ fn patched(mut whole: ColorImage, part: &ColorImage, [left, top]: [usize; 2]) ->
     whole
 }
 
+/// Sides of the image of a picture. A software driver recompiles a shader when the sides of an
+/// image become powers of two or cease to be; odd numbers from 3 on never are.
+fn padded_size((width, height): (u32, u32)) -> (u32, u32) {
+    ((width | 1).max(3), (height | 1).max(3))
+}
+
+/// A picture padded to such an image by repeating its edges.
+fn fill((width, height): (u32, u32), picture: &[Color32]) -> Vec<Color32> {
+    let (wide, high) = padded_size((width, height));
+    let row = |y: u32| (y.min(height - 1) * width) as usize;
+    let rows =
+        (0..high).flat_map(|y| (0..wide).map(move |x| picture[row(y) + x.min(width - 1) as usize]));
+    rows.collect()
+}
+
 /// An image of 8-bit codes that shaders read without conversion.
-pub fn upload(
-    device: &Arc<Device>,
-    name: &str,
-    size: (u32, u32),
-    pixels: &[Color32],
-) -> Result<Image> {
+fn upload(device: &Arc<Device>, name: &str, size: (u32, u32), pixels: &[Color32]) -> Result<Image> {
     let image = Image::new(
         device,
         name,

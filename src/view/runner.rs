@@ -110,6 +110,23 @@ impl Runner {
                     }
                     viewer.saving.is_empty()
                 }
+                Step::SaveBake(path) => {
+                    if first {
+                        viewer.saving.push(path.clone());
+                        viewer.save_bake(path.clone());
+                    }
+                    viewer.saving.is_empty()
+                }
+                Step::Compare(against) => {
+                    viewer.compare_to(*against);
+                    true
+                }
+                Step::Compared => viewer.is_compared(),
+                Step::Line(column) => {
+                    viewer.line.move_to(*column, viewer.size.0);
+                    viewer.dirty = true;
+                    true
+                }
                 Step::LoseSurface => {
                     viewer.screen.lose();
                     viewer.dirty = true;

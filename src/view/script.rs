@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use super::event::{Event, Key, PointerButton};
+use super::compare::Against;
+use super::event::{Event, Key, Modifiers, PointerButton};
 use crate::error::{Error, Result};
 use crate::input_file::read_text;
 
@@ -35,6 +36,14 @@ pub enum Step {
     Screenshot(PathBuf),
     /// Writes the view to a file, drawn as by `render`.
     Save(PathBuf),
+    /// Writes the bake to a file.
+    SaveBake(PathBuf),
+    /// Holds the view as it is on the left of a line, traces it there, or ends that.
+    Compare(Option<Against>),
+    /// Moves the line to this column.
+    Line(f32),
+    /// Waits until the picture of the left side is shown.
+    Compared,
     /// Behaves as if the system had lost the surface.
     LoseSurface,
 }
@@ -84,9 +93,24 @@ fn parse(words: &[&str]) -> Option<Vec<Step>> {
         }),
         ["wheel", steps] => one(Event::Wheel(number(steps)?)),
         ["key", name] => {
-            let key = Key::from_name(name)?;
+            // As in Ctrl+Shift+Z.
+            let mut names: Vec<_> = name.split('+').collect();
+            let key = Key::from_name(names.pop()?)?;
+            let mut held = Modifiers::NONE;
+            for name in names {
+                held |= match name {
+                    "Ctrl" => Modifiers::CTRL | Modifiers::COMMAND,
+                    "Shift" => Modifiers::SHIFT,
+                    "Alt" => Modifiers::ALT,
+                    _ => return None,
+                };
+            }
             let tap = |pressed| Step::Do(Event::Key { key, pressed });
-            Some(vec![tap(true), tap(false)])
+            let hold = |modifiers| Step::Do(Event::Modifiers(modifiers));
+            Some(match held == Modifiers::NONE {
+                true => vec![tap(true), tap(false)],
+                false => vec![hold(held), tap(true), tap(false), hold(Modifiers::NONE)],
+            })
         }
         ["key", name, "down"] => one(Event::Key {
             key: Key::from_name(name)?,
@@ -124,6 +148,12 @@ fn parse(words: &[&str]) -> Option<Vec<Step>> {
         )]),
         ["screenshot", path] => Some(vec![Step::Screenshot(path.into())]),
         ["save", path] => Some(vec![Step::Save(path.into())]),
+        ["save-bake", path] => Some(vec![Step::SaveBake(path.into())]),
+        ["compare", "held"] => Some(vec![Step::Compare(Some(Against::Held))]),
+        ["compare", "traced"] => Some(vec![Step::Compare(Some(Against::Traced))]),
+        ["compare", "off"] => Some(vec![Step::Compare(None)]),
+        ["compared"] => Some(vec![Step::Compared]),
+        ["line", x] => Some(vec![Step::Line(number(x)?)]),
         ["lose-surface"] => Some(vec![Step::LoseSurface]),
         _ => None,
     }

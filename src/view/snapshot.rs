@@ -6,6 +6,7 @@ use glam::{DVec3, Vec3};
 
 use crate::bake::solution::{Bake, DirectionalLight, Solution};
 use crate::error::Result;
+use crate::mesh::corners::corner_means;
 use crate::picture::exposure_by_area;
 use crate::render::{Joined, Lighting, corner_irradiance, tone};
 use crate::scene::{Scene, Triangle};
@@ -31,11 +32,67 @@ pub struct Snapshot {
     /// The same at the corners, smoothed over each surface.
     pub corners: Vec<[Vec3; 3]>,
     pub corners_direct: Vec<[Vec3; 3]>,
+    /// Where there is light by direction.
+    pub slanted: Option<Slanted>,
     /// What has not been shot, spread evenly.
     pub ambient: Ambient,
     /// Stops by which the light is exposed if nobody asks otherwise.
     pub exposure: f32,
     pub progress: Progress,
+}
+
+/// How light on relief depends on its slope, at the corners, `[triangle][corner]`, smoothed as
+/// [`corner_means`] does; zero on triangles without relief.
+///
+/// On a normal n that is no unit vector, F(n) = Σ max(0, n · m) over the moments m of the slots; a
+/// normal tilted by a slope s along the surface is n = N + s, and its irradiance F(n) / |n|.
+pub struct Slanted {
+    pub all: Vec<[Slant; 3]>,
+    pub direct: Vec<[Slant; 3]>,
+}
+
+/// Of each colour the vector t (scene axes) for which F(N + s) − F(N − s) is 2 s · t for tilts of
+/// [`TILT`]; and, per colour, how much the mean of F over such tilts is above F(N). W·m⁻².
+pub type Slant = [Vec3; 4];
+
+/// Slope at which light on slopes is found; `TILT` of `shared/view_mesh.glsl`.
+const TILT: f32 = 0.7;
+
+impl Slanted {
+    fn new(scene: &Scene, light: &DirectionalLight) -> Self {
+        let slots = light.directions.len();
+        let corners = |moments: &[[Vec3; 3]]| {
+            let mut slants = vec![[Vec3::ZERO; 4]; scene.triangles.len()];
+            let of_elements = moments.chunks_exact(slots).zip(&light.frames);
+            for ((moments, frame), &e) in of_elements.zip(&light.elements) {
+                slants[e as usize] = slant(moments, frame);
+            }
+            corner_means(scene, &slants)
+        };
+        Self {
+            all: corners(&light.incident_moment),
+            direct: corners(&light.incident_moment_direct),
+        }
+    }
+}
+
+/// Of one element by its moments, `[slot][colour]`, in its frame.
+fn slant(moments: &[[Vec3; 3]], frame: &[Vec3; 3]) -> Slant {
+    let lit = |normal: Vec3| {
+        let slots = moments.iter();
+        let sum = slots.map(|m| Vec3::from_array(m.map(|m| normal.dot(m).max(0.0))));
+        sum.sum::<Vec3>()
+    };
+    let level = lit(Vec3::Z);
+    let mut slant = [Vec3::ZERO; 4];
+    for (axis, along) in [Vec3::X, Vec3::Y].into_iter().zip(frame) {
+        let [ahead, behind] = [TILT, -TILT].map(|tilt| lit(Vec3::Z + tilt * axis));
+        for (of_colour, change) in slant.iter_mut().zip((ahead - behind).to_array()) {
+            *of_colour += *along * (change / (2.0 * TILT));
+        }
+        slant[3] += (ahead + behind) / 4.0 - level / 2.0;
+    }
+    slant
 }
 
 impl Snapshot {
@@ -52,6 +109,7 @@ impl Snapshot {
             corners: corner_irradiance(scene, &irradiance, Joined::Smooth),
             corners_direct: corner_irradiance(scene, &direct, Joined::Smooth),
             exposure: exposure(scene, &irradiance, ambient.irradiance),
+            slanted: relief.as_ref().map(|light| Slanted::new(scene, light)),
             scene: Arc::clone(scene),
             irradiance,
             direct,
@@ -113,6 +171,7 @@ impl Snapshot {
         Lighting {
             irradiance_direct: Some(&self.direct),
             relief: self.relief.as_ref(),
+            hide_backs: true,
             ..Lighting::from(irradiance)
         }
     }
@@ -161,6 +220,23 @@ fn exposure(scene: &Scene, irradiance: &[Vec3], ambient: Vec3) -> f32 {
 mod tests {
     use super::*;
     use crate::scene::{Material, Triangle};
+
+    /// One slot: as steep as its light falls, and dark where it turns away.
+    #[test]
+    fn a_slope_receives_what_faces_it() {
+        let frame = [Vec3::Y, Vec3::Z, Vec3::X];
+        // Light from 63° off the normal, along the first axis: behind a slope of TILT away from it.
+        let from = Vec3::new(2.0, 0.0, 1.0);
+        let [r, g, b, lift] = slant(&[[from, Vec3::ZERO, from]], &frame);
+        let ahead = 1.0 + 2.0 * TILT;
+        assert!((r - Vec3::Y * ahead / (2.0 * TILT)).length() < 1e-6, "{r}");
+        assert_eq!((g, b), (Vec3::ZERO, r));
+        let expected = (ahead + 0.0 + 1.0 + 1.0) / 4.0 - 1.0;
+        assert!(
+            (lift - Vec3::new(expected, 0.0, expected)).length() < 1e-6,
+            "{lift}"
+        );
+    }
 
     /// Ten triangles of one area: the exposure is for the ninth of them by brightness.
     #[test]

@@ -1,13 +1,14 @@
-//! The triangles that the surface pass draws, in order of their materials.
+//! The triangles that the surface pass draws, in order of their materials, those with relief last.
 
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec2, Vec3};
 
+use super::slopes::slope_axes;
 use crate::error::Result;
 use crate::passes::buffers::upload;
-use crate::scene::{Material, Scene};
+use crate::scene::Scene;
 use crate::vk::{Buffer, BufferUse, Device};
 
 /// One corner of a triangle.
@@ -16,7 +17,6 @@ use crate::vk::{Buffer, BufferUse, Device};
 pub struct Vertex {
     /// From the scene's middle, internal units.
     pub position: Vec3,
-    pub normal: Vec3,
     /// v down, as images are stored.
     pub uv: Vec2,
 }
@@ -28,8 +28,9 @@ pub struct About {
     /// Index in the input.
     pub triangle: u32,
     pub source: u32,
-    /// How far its relief reaches above or below it, internal units.
-    pub rise: f32,
+    /// Squares and product of the axes of its slopes, see [`slope_axes`]: uu, 2uv, vv; and the
+    /// square of how high its relief is over what it was when the mesh was made.
+    pub stretch: [f32; 4],
 }
 
 /// No element is marked, or an element belongs to no source.
@@ -42,6 +43,7 @@ pub struct MeshRange {
     pub first: u32,
     /// Number of vertices.
     pub count: u32,
+    pub relief: bool,
 }
 
 /// A scene's triangles on the device.
@@ -51,15 +53,20 @@ pub struct SurfaceMesh {
     /// Index in the scene, `[drawn triangle]`.
     pub order: Vec<u32>,
     pub ranges: Vec<MeshRange>,
+    /// The first drawn triangle with relief.
+    pub first_relief: usize,
+    /// Scales of the heights when it was made, `[material]`.
+    heights: Vec<f32>,
 }
 
 impl SurfaceMesh {
     /// # Errors
     /// A device without the memory.
     pub fn new(device: &Arc<Device>, scene: &Scene) -> Result<Self> {
-        let mut order: Vec<u32> = (0..scene.triangles.len() as u32).collect();
         let material = |e: u32| scene.triangles[e as usize].material;
-        order.sort_by_key(|&e| material(e));
+        let has_relief = |e: u32| scene.materials[material(e) as usize].has_relief();
+        let mut order: Vec<u32> = (0..scene.triangles.len() as u32).collect();
+        order.sort_by_key(|&e| (has_relief(e), material(e)));
         let mut ranges = Vec::new();
         let mut first = 0;
         for same in order.chunk_by(|&a, &b| material(a) == material(b)) {
@@ -68,6 +75,7 @@ impl SurfaceMesh {
                 material: material(same[0]),
                 first,
                 count,
+                relief: has_relief(same[0]),
             });
             first += count;
         }
@@ -76,6 +84,8 @@ impl SurfaceMesh {
         Ok(Self {
             vertices: upload(device, "surface vertices", &vertices, BufferUse::Geometry)?,
             indices: upload(device, "surface indices", &indices, BufferUse::Geometry)?,
+            first_relief: order.partition_point(|&e| !has_relief(e)),
+            heights: scene.materials.iter().map(|m| m.height_scale).collect(),
             order,
             ranges,
         })
@@ -83,26 +93,24 @@ impl SurfaceMesh {
 
     /// `[drawn triangle]`; `sources` are `[triangle]` of the input, or empty.
     pub fn about(&self, scene: &Scene, sources: &[u32]) -> Vec<About> {
-        let unit = scene.local_frame().1;
-        let rises: Vec<f32> = scene.materials.iter().map(|m| rise(m, unit)).collect();
-        let about = self.order.iter().map(|&e| About {
-            triangle: e,
-            source: sources.get(e as usize).copied().unwrap_or(NOTHING),
-            rise: rises[scene.triangles[e as usize].material as usize],
+        let about = self.order.iter().map(|&e| {
+            let triangle = &scene.triangles[e as usize];
+            let [u, v] = slope_axes(scene, triangle);
+            let stretch = DVec3::new(u.length_squared(), 2.0 * u.dot(v), v.length_squared());
+            let material = triangle.material as usize;
+            let before = self.heights[material];
+            let rise = match before == 0.0 {
+                true => 0.0,
+                false => scene.materials[material].height_scale / before,
+            };
+            About {
+                triangle: e,
+                source: sources.get(e as usize).copied().unwrap_or(NOTHING),
+                stretch: stretch.as_vec3().extend(rise * rise).to_array(),
+            }
         });
         about.collect()
     }
-}
-
-/// Greatest height of a material's relief above or below its mean, internal units.
-fn rise(material: &Material, unit: f64) -> f32 {
-    let Some(map) = &material.map_height else {
-        return 0.0;
-    };
-    let mean = map.mean();
-    let most = map.values.iter().map(|&v| (f64::from(v) - mean).abs());
-    let scale = f64::from(material.height_scale.abs());
-    (most.fold(0.0, f64::max) * scale / unit) as f32
 }
 
 /// `[drawn triangle][corner]`.
@@ -113,14 +121,11 @@ fn vertices(scene: &Scene, order: &[u32]) -> Vec<Vertex> {
         .flat_map(|&e| {
             let triangle = &scene.triangles[e as usize];
             let corners = scene.corners(triangle).map(|p: DVec3| (p - origin) / unit);
-            let [a, b, c] = corners;
-            let normal = (b - a).cross(c - a).normalize_or_zero().as_vec3();
             let images = triangle.uv.map(|[u, v]| Vec2::new(u, 1.0 - v));
             // The texture repeats: coordinates shifted to near 0 are more precise.
             let whole = images[0].floor();
             [0, 1, 2].map(|k| Vertex {
                 position: corners[k].as_vec3(),
-                normal,
                 uv: images[k] - whole,
             })
         })

@@ -1,32 +1,22 @@
 //! Draws the surfaces of a scene by the light at their corners, from an eye that moves freely.
-//! Shaders: `view_mesh`, `view_mesh_laid` and `view_mesh_overlaid`, each `.vert` and `.frag`.
+//! Shaders: `view_mesh`, `view_mesh_relief` and `view_overlay`, each `.vert` and `.frag`.
 
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
 use super::camera::Rows;
-use super::detailer::Drawn;
-use super::laid_pictures::LaidPictures;
-use super::surface_mesh::{About, NOTHING, SurfaceMesh, Vertex};
+use super::slopes::{Slopes, mean_tile, slope_axes};
+use super::snapshot::{Slant, Snapshot};
+use super::surface_mesh::{About, MeshRange, NOTHING, SurfaceMesh, Vertex};
 use crate::error::Result;
-use crate::passes::shaders::{view_mesh, view_mesh_laid, view_mesh_overlaid};
+use crate::passes::shaders::{view_mesh, view_mesh_relief, view_overlay};
 use crate::render::upload_texture;
 use crate::scene::Scene;
 use crate::vk::{
     Blending, Buffer, BufferUse, Commands, DescriptorSet, Device, Format, GraphicsPipeline,
-    GraphicsShaders, GraphicsState, Image, RenderPass, Sampled, Sampler, VertexAttribute,
+    GraphicsShaders, GraphicsState, Image, RenderPass, Sampled, Sampler, Sides, VertexAttribute,
 };
-
-/// How surfaces show detailed pictures.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Laid {
-    No,
-    /// The last picture is of this view and is shown unchanged.
-    Exactly,
-    /// Pictures of other views, where they show the place.
-    FromElsewhere,
-}
 
 /// What a frame shows of the surfaces.
 #[derive(Debug, Clone, Copy)]
@@ -37,50 +27,47 @@ pub struct Shown {
     pub ambient: Vec3,
     /// Factors of all light, of direct light and of emission.
     pub parts: [f32; 3],
+    /// Whether relief is shown on its own normals.
+    pub relief: bool,
     /// Outlines of elements, colours of sources.
     pub elements: bool,
     pub sources: bool,
-    /// What is shown in place of the light of the corners.
-    pub picture: Laid,
     /// The marked element.
     pub chosen: Option<u32>,
 }
 
 impl Shown {
-    fn has_overlays(&self) -> bool {
+    pub fn has_overlays(&self) -> bool {
         self.elements || self.sources || self.chosen.is_some()
     }
 }
 
-/// What is bound of one texture.
+/// What is bound of one material.
 struct Sets {
     plain: DescriptorSet,
-    /// With pictures, for two pipelines.
-    laid: DescriptorSet,
+    /// Of a material with relief.
+    relief: Option<DescriptorSet>,
+}
+
+/// Light at the corners, W·m⁻².
+struct Corners {
+    /// `[drawn triangle][corner]`.
+    light: Buffer,
+    /// `[drawn triangle with relief][corner][along u, along v, lift]`.
+    slanted: Buffer,
 }
 
 /// A scene ready to be drawn.
 pub struct SurfacePass {
     plain: GraphicsPipeline,
-    /// With detailed pictures laid over the surfaces.
-    laid: GraphicsPipeline,
-    /// With outlines, colours and a mark over the surfaces and the pictures.
-    overlaid: GraphicsPipeline,
-    sampler: Sampler,
-    /// For pictures: clamped at their edges.
-    held: Sampler,
-    nearest: Sampler,
-    /// The first is white.
-    textures: Vec<Image>,
-    /// Index into `textures`, `[material]`.
-    texture_of: Vec<usize>,
-    pictures: LaidPictures,
-    /// `[texture]`.
+    relief: GraphicsPipeline,
+    overlay: GraphicsPipeline,
+    /// `[material]`.
     sets: Vec<Sets>,
+    overlays: DescriptorSet,
     mesh: SurfaceMesh,
-    /// `[drawn triangle][corner]`.
-    all: Buffer,
-    direct: Buffer,
+    all: Corners,
+    direct: Corners,
     /// `[drawn triangle]`.
     about: Buffer,
     /// `[triangle]` of the input; empty while there are none.
@@ -88,90 +75,127 @@ pub struct SurfacePass {
     /// `[material]`.
     reflectance: Vec<Vec3>,
     emitted: Vec<Vec3>,
-    device: Arc<Device>,
 }
 
-/// Distance of the near plane, internal units.
-const NEAR: f32 = 1e-4;
+impl Corners {
+    /// No light yet.
+    fn new(device: &Arc<Device>, name: &str, mesh: &SurfaceMesh) -> Result<Self> {
+        let dark = |count: usize| -> Result<Buffer> {
+            let values = vec![Vec3::ZERO; count.max(1)];
+            let bytes = size_of_val(&values[..]) as u64;
+            let mut buffer = Buffer::new(device, name, bytes, BufferUse::Stream)?;
+            buffer.write(0, &values);
+            Ok(buffer)
+        };
+        let triangles = mesh.order.len();
+        Ok(Self {
+            light: dark(3 * triangles)?,
+            slanted: dark(9 * (triangles - mesh.first_relief))?,
+        })
+    }
+
+    /// Takes light `[triangle][corner]` in the order of the input, and how it depends on slopes.
+    fn write(
+        &mut self,
+        mesh: &SurfaceMesh,
+        scene: &Scene,
+        light: &[[Vec3; 3]],
+        slants: Option<&[[Slant; 3]]>,
+    ) {
+        let order = mesh.order.iter();
+        let light: Vec<[Vec3; 3]> = order.map(|&e| light[e as usize]).collect();
+        self.light.write(0, &light);
+        let with_relief = &mesh.order[mesh.first_relief..];
+        let slanted: Vec<[[Vec3; 3]; 3]> = match slants {
+            None => vec![[[Vec3::ZERO; 3]; 3]; with_relief.len()],
+            Some(slants) => with_relief
+                .iter()
+                .map(|&e| {
+                    let axes = slope_axes(scene, &scene.triangles[e as usize]);
+                    let axes = axes.map(|axis| axis.as_vec3());
+                    slants[e as usize].map(|[r, g, b, lift]| {
+                        let [u, v] =
+                            axes.map(|axis| Vec3::new(axis.dot(r), axis.dot(g), axis.dot(b)));
+                        [u, v, lift]
+                    })
+                })
+                .collect(),
+        };
+        if !slanted.is_empty() {
+            self.slanted.write(0, &slanted);
+        }
+    }
+}
 
 impl SurfacePass {
     /// # Errors
     /// A scene that does not fit the device.
     pub fn new(device: &Arc<Device>, pass: &RenderPass, scene: &Scene) -> Result<Self> {
-        let pipeline = |name, shaders| pipeline(device, pass, name, shaders);
-        let mesh = SurfaceMesh::new(device, scene)?;
-        let corners = 3 * mesh.order.len();
-        let light = |name| -> Result<Buffer> {
-            let mut buffer = Buffer::new(device, name, 12 * corners as u64, BufferUse::Stream)?;
-            buffer.write(0, &vec![Vec3::ZERO; corners]);
-            Ok(buffer)
+        let pipeline = |name, shaders, blending, attributes| {
+            pipeline(device, pass, name, shaders, blending, attributes)
         };
-        let about = (size_of::<About>() * mesh.order.len()) as u64;
+        let plain = pipeline("surfaces", &view_mesh::SHADER, Blending::Nearest, 2)?;
+        let relief = pipeline("relief", &view_mesh_relief::SHADER, Blending::Nearest, 2)?;
+        let overlay = pipeline("overlays", &view_overlay::SHADER, Blending::Glaze, 1)?;
+        let mesh = SurfaceMesh::new(device, scene)?;
+        let all = Corners::new(device, "all light", &mesh)?;
+        let direct = Corners::new(device, "direct light", &mesh)?;
+        let bytes = (size_of::<About>() * mesh.order.len()) as u64;
+        let about = Buffer::new(device, "about triangles", bytes, BufferUse::Stream)?;
+        let sampler = Sampler::new(device, "surfaces", true)?;
         let (textures, texture_of) = textures(device, scene)?;
+        let slopes = scene.materials.iter().enumerate().map(|(i, material)| {
+            let slopes = Slopes::new(material, mean_tile(scene, i));
+            let image = slopes.map(|s| upload_texture(device, "slopes", s.size, &s.texels));
+            image.transpose()
+        });
+        let slopes: Vec<Option<Image>> = slopes.collect::<Result<_>>()?;
+        let sets = slopes.iter().zip(&texture_of).map(|(slopes, &texture)| {
+            let sampled = |image| Sampled {
+                image,
+                sampler: &sampler,
+            };
+            let albedo = sampled(&textures[texture]);
+            let bindings = view_mesh::Bindings {
+                albedo,
+                all_light: &all.light,
+                direct_light: &direct.light,
+                about: &about,
+            };
+            let of_relief = slopes.as_ref().map(|slopes| {
+                let bindings = view_mesh_relief::Bindings {
+                    albedo,
+                    all_light: &all.light,
+                    direct_light: &direct.light,
+                    about: &about,
+                    all_slanted: &all.slanted,
+                    direct_slanted: &direct.slanted,
+                    slopes: sampled(slopes),
+                };
+                relief.bind("relief", &bindings)
+            });
+            Ok(Sets {
+                plain: plain.bind("surfaces", &bindings)?,
+                relief: of_relief.transpose()?,
+            })
+        });
         let mut surfaces = Self {
-            plain: pipeline("surfaces", &view_mesh::SHADER)?,
-            laid: pipeline("surfaces under pictures", &view_mesh_laid::SHADER)?,
-            overlaid: pipeline("surfaces under overlays", &view_mesh_overlaid::SHADER)?,
-            sampler: Sampler::new(device, "surfaces", true)?,
-            held: Sampler::held(device, "detailed picture")?,
-            nearest: Sampler::new(device, "distances", false)?,
-            textures,
-            texture_of,
-            pictures: LaidPictures::new(device)?,
-            sets: Vec::new(),
-            all: light("all light")?,
-            direct: light("direct light")?,
-            about: Buffer::new(device, "about triangles", about, BufferUse::Stream)?,
+            sets: sets.collect::<Result<_>>()?,
+            overlays: overlay.bind("overlays", &view_overlay::Bindings { about: &about })?,
+            plain,
+            relief,
+            overlay,
+            all,
+            direct,
+            about,
             sources: Vec::new(),
             mesh,
             reflectance: scene.materials.iter().map(|m| m.kd.into()).collect(),
             emitted: Vec::new(),
-            device: Arc::clone(device),
         };
         surfaces.set_emission(scene);
         surfaces.set_about(scene);
-        surfaces.bind()?;
         Ok(surfaces)
-    }
-
-    fn bind(&mut self) -> Result<()> {
-        let [whole, coarse] = &self.pictures.kept;
-        let held = |image| Sampled {
-            image,
-            sampler: &self.held,
-        };
-        let nearest = |image| Sampled {
-            image,
-            sampler: &self.nearest,
-        };
-        let sets = |image| {
-            let plain = view_mesh::Bindings {
-                albedo: Sampled {
-                    image,
-                    sampler: &self.sampler,
-                },
-                all_light: &self.all,
-                direct_light: &self.direct,
-                about: &self.about,
-            };
-            let laid = view_mesh_laid::Bindings {
-                albedo: plain.albedo,
-                all_light: plain.all_light,
-                direct_light: plain.direct_light,
-                about: plain.about,
-                whole: held(&whole.image),
-                coarse: held(&coarse.image),
-                whole_distances: nearest(&whole.distances),
-                coarse_distances: nearest(&coarse.distances),
-                views: &self.pictures.views,
-            };
-            Ok(Sets {
-                plain: self.plain.bind("surfaces", &plain)?,
-                laid: self.laid.bind("surfaces under pictures", &laid)?,
-            })
-        };
-        self.sets = self.textures.iter().map(sets).collect::<Result<_>>()?;
-        Ok(())
     }
 
     /// Sets the emission to that of `scene`, which is otherwise the same scene; of textured
@@ -182,15 +206,14 @@ impl SurfacePass {
             .collect();
     }
 
-    /// Sets the light, irradiance `[triangle][corner]` in the order of the input, W·m⁻².
-    pub fn set_light(&mut self, all: &[[Vec3; 3]], direct: &[[Vec3; 3]]) {
-        let by_order = |light: &[[Vec3; 3]]| -> Vec<[Vec3; 3]> {
-            let order = self.mesh.order.iter();
-            order.map(|&e| light[e as usize]).collect()
-        };
-        let (all, direct) = (by_order(all), by_order(direct));
-        self.all.write(0, &all);
-        self.direct.write(0, &direct);
+    /// Shows the light of a snapshot.
+    pub fn set_light(&mut self, light: &Snapshot) {
+        let (scene, slanted) = (&light.scene, light.slanted.as_ref());
+        let all = slanted.map(|slants| &slants.all[..]);
+        let direct = slanted.map(|slants| &slants.direct[..]);
+        self.all.write(&self.mesh, scene, &light.corners, all);
+        let corners = &light.corners_direct;
+        self.direct.write(&self.mesh, scene, corners, direct);
     }
 
     /// Sets the source of each triangle, `[triangle]` in the order of the input.
@@ -205,83 +228,87 @@ impl SurfacePass {
         self.about.write(0, &about);
     }
 
-    /// Takes a detailed picture and shows it in place of the one that it replaces. A coarse one is
-    /// shown only where the last whole one shows nothing. Returns the image, and the share of it
-    /// that is the picture.
-    ///
-    /// # Errors
-    /// A device without the memory.
-    pub fn set_picture(&mut self, drawn: &Drawn, rows: &Rows) -> Result<(&Image, Vec2)> {
-        let share = self.pictures.set(&self.device, drawn, rows)?;
-        self.bind()?;
-        Ok((&self.pictures.kept[self.pictures.last].image, share))
-    }
-
-    /// Sets which pictures may be laid over the surfaces: the whole one, the coarse one.
-    pub fn lay(&mut self, shown: [bool; 2]) {
-        self.pictures.lay(shown);
-    }
-
     /// Records the draws within a render pass that has begun.
     pub fn record(&self, cmd: &Commands, seen: &Rows, shown: &Shown) {
         cmd.bind_indices(&self.mesh.indices);
-        let plain = shown.picture == Laid::No && !shown.has_overlays();
-        let pipeline = match shown.picture {
-            _ if shown.has_overlays() => &self.overlaid,
-            Laid::No => &self.plain,
-            Laid::FromElsewhere => &self.laid,
-            // A picture that covers all of the frame is drawn without the surfaces.
-            Laid::Exactly => return,
-        };
         for range in &self.mesh.ranges {
-            let material = range.material as usize;
-            let sets = &self.sets[self.texture_of[material]];
-            let set = match plain {
-                true => &sets.plain,
-                false => &sets.laid,
+            let sets = &self.sets[range.material as usize];
+            let relief = sets.relief.as_ref();
+            let (pipeline, set) = match relief.filter(|_| shown.relief && range.relief) {
+                Some(set) => (&self.relief, set),
+                None => (&self.plain, &sets.plain),
             };
-            cmd.bind_graphics(pipeline, set, Some(&self.mesh.vertices));
-            let [all, direct, emission] = shown.parts;
-            cmd.push_graphics(
+            self.draw(
+                cmd,
                 pipeline,
-                // The same in all three.
-                &view_mesh::Parameters {
-                    x: seen.x,
-                    y: seen.y,
-                    w: seen.w,
-                    eye: seen.eye,
-                    near: NEAR,
-                    reflectance: self.reflectance[material],
-                    exposure: shown.exposure,
-                    emitted: self.emitted[material] * emission,
-                    ambient: shown.ambient,
-                    parts: Vec2::new(all, direct),
-                    elements: f32::from(u8::from(shown.elements)),
-                    sources: f32::from(u8::from(shown.sources)),
-                    from_picture: match shown.picture {
-                        Laid::No => 0,
-                        Laid::Exactly => 1 + self.pictures.last as u32,
-                        Laid::FromElsewhere => 3,
-                    },
-                    chosen: shown.chosen.unwrap_or(NOTHING),
-                },
+                set,
+                range,
+                &self.parameters(seen, shown, range),
             );
-            cmd.draw_indexed(range.first, range.count);
         }
+    }
+
+    /// Records what lies over the surfaces, which have been drawn.
+    pub fn record_overlays(&self, cmd: &Commands, seen: &Rows, shown: &Shown) {
+        cmd.bind_indices(&self.mesh.indices);
+        for range in &self.mesh.ranges {
+            let parameters = self.parameters(seen, shown, range);
+            self.draw(cmd, &self.overlay, &self.overlays, range, &parameters);
+        }
+    }
+
+    fn parameters(&self, seen: &Rows, shown: &Shown, range: &MeshRange) -> view_mesh::Parameters {
+        let material = range.material as usize;
+        let [all, direct, emission] = shown.parts;
+        // The same of all three.
+        view_mesh::Parameters {
+            x: seen.x,
+            y: seen.y,
+            w: seen.w,
+            reflectance: self.reflectance[material],
+            exposure: shown.exposure,
+            emitted: self.emitted[material] * emission,
+            ambient: shown.ambient,
+            parts: Vec2::new(all, direct),
+            elements: f32::from(u8::from(shown.elements)),
+            sources: f32::from(u8::from(shown.sources)),
+            first_relief: 3 * self.mesh.first_relief as u32,
+            chosen: shown.chosen.unwrap_or(NOTHING),
+        }
+    }
+
+    fn draw(
+        &self,
+        cmd: &Commands,
+        pipeline: &GraphicsPipeline,
+        set: &DescriptorSet,
+        range: &MeshRange,
+        parameters: &view_mesh::Parameters,
+    ) {
+        cmd.bind_graphics(pipeline, set, Some(&self.mesh.vertices));
+        cmd.push_graphics(pipeline, parameters);
+        cmd.draw_indexed(range.first, range.count);
     }
 }
 
+/// A pipeline that reads the first `attributes` of a vertex.
 fn pipeline(
     device: &Arc<Device>,
     pass: &RenderPass,
     name: &'static str,
     shaders: &GraphicsShaders<'_>,
+    blending: Blending,
+    attributes: usize,
 ) -> Result<GraphicsPipeline> {
     let attribute = |format, offset: usize| VertexAttribute {
         format,
         offset: offset as u32,
     };
     let three = Format::R32G32B32_SFLOAT;
+    let all = [
+        attribute(three, std::mem::offset_of!(Vertex, position)),
+        attribute(Format::R32G32_SFLOAT, std::mem::offset_of!(Vertex, uv)),
+    ];
     GraphicsPipeline::new(
         device,
         pass,
@@ -290,13 +317,9 @@ fn pipeline(
             shaders,
             constants: &[],
             vertex_stride: size_of::<Vertex>() as u32,
-            attributes: &[
-                attribute(three, std::mem::offset_of!(Vertex, position)),
-                attribute(three, std::mem::offset_of!(Vertex, normal)),
-                attribute(Format::R32G32_SFLOAT, std::mem::offset_of!(Vertex, uv)),
-            ],
-            blending: Blending::Nearest,
-            backs_alone: false,
+            attributes: &all[..attributes],
+            blending,
+            sides: Sides::Fronts,
         },
     )
 }

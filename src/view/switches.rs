@@ -26,6 +26,9 @@ pub struct Switches {
     /// The error bound over the time of the bake.
     pub bound: bool,
     pub panel: bool,
+    /// Notes over the view, and the list of keys.
+    pub notes: bool,
+    pub keys: bool,
 }
 
 impl Default for Switches {
@@ -44,6 +47,8 @@ impl Default for Switches {
             items: false,
             bound: false,
             panel: true,
+            notes: true,
+            keys: false,
         }
     }
 }
@@ -121,6 +126,8 @@ impl Switches {
             "items" => &mut self.items,
             "bound" => &mut self.bound,
             "panel" => &mut self.panel,
+            "notes" => &mut self.notes,
+            "keys" => &mut self.keys,
             _ => return Err(Error::Usage(format!("there is no switch \"{name}\""))),
         };
         *flag = named(&ON_OFF, value)?;

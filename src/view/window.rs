@@ -13,6 +13,7 @@ use winit::window::{Window, WindowId};
 
 use glam::DVec3;
 
+use super::camera::Eye;
 use super::event::{Event, Key, Modifiers, PointerButton};
 use super::runner::Runner;
 use super::viewer::Viewer;
@@ -138,12 +139,17 @@ impl App {
         match read {
             Err(error) => viewer.fail(error),
             Ok(opened) => {
-                let switches = viewer.switches;
+                let (switches, line) = (viewer.switches, viewer.line);
+                let eye = (viewer.name == opened.name).then(|| viewer.eye.camera.clone());
                 if let Some(window) = self.close() {
                     self.show(opened, window, since)?;
                 }
                 if let Some((viewer, _)) = &mut self.open {
                     viewer.switches = switches;
+                    viewer.line = line;
+                    if let Some(camera) = eye {
+                        viewer.eye = Eye::new(&viewer.scene, &camera);
+                    }
                 }
                 Ok(())
             }

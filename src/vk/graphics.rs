@@ -26,8 +26,16 @@ pub struct GraphicsState<'a> {
     pub vertex_stride: u32,
     pub attributes: &'a [VertexAttribute],
     pub blending: Blending,
-    /// Only triangles that turn their back to the eye are drawn.
-    pub backs_alone: bool,
+    pub sides: Sides,
+}
+
+/// Which sides of triangles are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sides {
+    Both,
+    /// Those that face the eye.
+    Fronts,
+    Backs,
 }
 
 /// A graphics pipeline. A clone is another handle to the same pipeline.
@@ -54,6 +62,8 @@ pub enum Blending {
     /// The later lies over the earlier by its alpha, with which its colour is premultiplied; depth
     /// is ignored.
     Over,
+    /// As `Over`, on what lies in the same place or behind; depths stay.
+    Glaze,
     /// Added to what lies in the same place or behind; depths stay.
     Add,
 }
@@ -94,9 +104,10 @@ impl GraphicsPipeline {
             .scissor_count(1);
         let raster = vk::PipelineRasterizationStateCreateInfo::default()
             .polygon_mode(vk::PolygonMode::FILL)
-            .cull_mode(match state.backs_alone {
-                true => vk::CullModeFlags::FRONT,
-                false => vk::CullModeFlags::NONE,
+            .cull_mode(match state.sides {
+                Sides::Both => vk::CullModeFlags::NONE,
+                Sides::Fronts => vk::CullModeFlags::BACK,
+                Sides::Backs => vk::CullModeFlags::FRONT,
             })
             .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
             .line_width(1.0);
@@ -106,7 +117,7 @@ impl GraphicsPipeline {
             .depth_test_enable(!matches!(state.blending, Blending::Sum | Blending::Over))
             .depth_write_enable(state.blending == Blending::Nearest)
             .depth_compare_op(match state.blending {
-                Blending::Add => vk::CompareOp::GREATER_OR_EQUAL,
+                Blending::Add | Blending::Glaze => vk::CompareOp::GREATER_OR_EQUAL,
                 Blending::Under => vk::CompareOp::LESS,
                 _ => vk::CompareOp::GREATER,
             });
@@ -176,7 +187,7 @@ impl GraphicsState<'_> {
 impl Blending {
     fn attachment(self) -> vk::PipelineColorBlendAttachmentState {
         let kept = match self {
-            Self::Over => vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
+            Self::Over | Self::Glaze => vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
             Self::Nearest | Self::Under | Self::Sum | Self::Add => vk::BlendFactor::ONE,
         };
         vk::PipelineColorBlendAttachmentState::default()

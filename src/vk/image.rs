@@ -16,8 +16,6 @@ pub enum ImageUse {
     ColourTarget,
     /// Drawn into only.
     DepthTarget,
-    /// Drawn into, then copied from.
-    CopiedDepth,
     /// Filled by a copy, read by shaders.
     Texture,
 }
@@ -176,7 +174,6 @@ impl ImageUse {
         match self {
             Self::ColourTarget => F::COLOR_ATTACHMENT | F::SAMPLED | F::TRANSFER_SRC,
             Self::DepthTarget => F::DEPTH_STENCIL_ATTACHMENT,
-            Self::CopiedDepth => F::DEPTH_STENCIL_ATTACHMENT | F::TRANSFER_SRC,
             Self::Texture => F::SAMPLED | F::TRANSFER_DST | F::TRANSFER_SRC,
         }
     }
@@ -184,7 +181,7 @@ impl ImageUse {
     fn aspect(self) -> vk::ImageAspectFlags {
         match self {
             Self::ColourTarget | Self::Texture => vk::ImageAspectFlags::COLOR,
-            Self::DepthTarget | Self::CopiedDepth => vk::ImageAspectFlags::DEPTH,
+            Self::DepthTarget => vk::ImageAspectFlags::DEPTH,
         }
     }
 }

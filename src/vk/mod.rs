@@ -37,10 +37,10 @@ pub use commands::Commands;
 pub use compute::{BoundCompute, ComputePipeline};
 pub use descriptors::{Bind, Binding, DescriptorSet, Sampled};
 pub use device::{Device, Left, Limits, PartTimes, left};
-pub use graphics::{Blending, GraphicsPipeline, GraphicsState, VertexAttribute};
+pub use graphics::{Blending, GraphicsPipeline, GraphicsState, Sides, VertexAttribute};
 pub use image::{Image, ImageUse};
 pub use instance::{Candidate, Instance, validation_log, validation_messages};
-pub use render_pass::{AfterPass, Attachment, Depths, Framebuffer, RenderPass};
+pub use render_pass::{AfterPass, Attachment, Framebuffer, RenderPass};
 pub use sampler::Sampler;
 pub use shader::{
     ComputeShader, GraphicsShaders, Interface, ShaderBinding, ShaderBindings, ShaderParameter,

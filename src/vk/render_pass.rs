@@ -27,12 +27,10 @@ pub enum AfterPass {
 
 /// What happens to the depths after a render pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Depths {
+enum Depths {
     Dropped,
     /// Another render pass goes on with them.
     Kept,
-    /// They are copied from.
-    Copied,
 }
 
 /// What of a target's content a render pass goes on with; the rest is cleared.
@@ -76,16 +74,11 @@ impl Attachment {
 }
 
 impl Depths {
-    fn final_layout(self) -> vk::ImageLayout {
-        match self {
-            Self::Copied => vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
-            Self::Kept | Self::Dropped => vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL,
-        }
-    }
+    const LAYOUT: vk::ImageLayout = vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL;
 
     fn store(self) -> vk::AttachmentStoreOp {
         match self {
-            Self::Copied | Self::Kept => vk::AttachmentStoreOp::STORE,
+            Self::Kept => vk::AttachmentStoreOp::STORE,
             Self::Dropped => vk::AttachmentStoreOp::DONT_CARE,
         }
     }
@@ -112,31 +105,23 @@ impl RenderPass {
     /// # Errors
     /// A device that fails.
     pub fn new(device: &Arc<Device>, name: &str, colour: Attachment) -> Result<Self> {
-        Self::with_depths(device, name, colour, Depths::Dropped)
+        Self::from_attachments(device, name, colour, Depths::Dropped, Before::Nothing)
     }
 
+    /// A render pass whose depths another one goes on with.
+    ///
     /// # Errors
     /// A device that fails.
-    pub fn with_depths(
-        device: &Arc<Device>,
-        name: &str,
-        colour: Attachment,
-        depths: Depths,
-    ) -> Result<Self> {
-        Self::from_attachments(device, name, colour, depths, Before::Nothing)
+    pub fn keeping_depths(device: &Arc<Device>, name: &str, colour: Attachment) -> Result<Self> {
+        Self::from_attachments(device, name, colour, Depths::Kept, Before::Nothing)
     }
 
     /// A render pass that goes on with the depths that another one kept.
     ///
     /// # Errors
     /// A device that fails.
-    pub fn over_depths(
-        device: &Arc<Device>,
-        name: &str,
-        colour: Attachment,
-        depths: Depths,
-    ) -> Result<Self> {
-        Self::from_attachments(device, name, colour, depths, Before::Depths)
+    pub fn over_depths(device: &Arc<Device>, name: &str, colour: Attachment) -> Result<Self> {
+        Self::from_attachments(device, name, colour, Depths::Dropped, Before::Depths)
     }
 
     /// Two render passes: the first clears the targets, the second adds to them and may be
@@ -206,15 +191,10 @@ fn descriptions(
     };
     let stored = vk::AttachmentStoreOp::STORE;
     let of_colour = (before == Before::All).then(|| colour.final_layout());
-    let of_depths = (before != Before::Nothing).then(|| Depths::Kept.final_layout());
+    let of_depths = (before != Before::Nothing).then_some(Depths::LAYOUT);
     [
         description(colour.format, of_colour, colour.final_layout(), stored),
-        description(
-            DEPTH_FORMAT,
-            of_depths,
-            depths.final_layout(),
-            depths.store(),
-        ),
+        description(DEPTH_FORMAT, of_depths, Depths::LAYOUT, depths.store()),
     ]
 }
 

@@ -54,7 +54,7 @@ fn settings(paths: u32, light: Light) -> Settings {
 
 fn draw(scene: &Scene, view: &View<'_>, settings: &Settings) -> Film {
     tracer(scene)
-        .render(view, settings, |_| true)
+        .render(view, settings, |_, _| true)
         .expect("a picture")
 }
 
@@ -135,11 +135,11 @@ fn stops_when_told_and_keeps_what_there_is() {
     let (view, tracer) = (view(&eye, 16, 16), tracer(&build.scene));
     let settings = settings(100, Light::Global);
     let whole = tracer
-        .render(&view, &settings, |_| true)
+        .render(&view, &settings, |_, _| true)
         .expect("a picture");
     assert!((100..=108).contains(&whole.paths) && whole.passes >= 8);
     let mut asked = 0;
-    let cut = |p: &mesolux::path_tracer::Progress| {
+    let cut = |p: &mesolux::path_tracer::Progress, _: &mesolux::path_tracer::Film| {
         asked += 1;
         assert_eq!(p.of, whole.paths);
         asked < 3
@@ -150,7 +150,7 @@ fn stops_when_told_and_keeps_what_there_is() {
         budget: Some(Duration::ZERO),
         ..settings
     };
-    let cut = tracer.render(&view, &none, |_| true).expect("a picture");
+    let cut = tracer.render(&view, &none, |_, _| true).expect("a picture");
     assert_eq!(cut.passes, 2);
     assert!(cut.relative_error().is_finite() && cut.relative_error() > whole.relative_error());
 }
@@ -164,7 +164,7 @@ fn refuses_what_cannot_be_traced() {
     let tracer = tracer(&build.scene);
     let eye = lit_room_camera();
     let go = |view: &View<'_>, paths| {
-        said(tracer.render(view, &settings(paths, Light::Global), |_| true))
+        said(tracer.render(view, &settings(paths, Light::Global), |_, _| true))
     };
     assert!(go(&view(&eye, 8, 8), 1).contains("paths 1"));
     assert!(go(&view(&eye, 8, 8), u32::MAX).contains("paths 4294967295"));

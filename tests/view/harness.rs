@@ -124,6 +124,20 @@ pub fn difference(a: &RgbImage, b: &RgbImage) -> f64 {
     sum as f64 / a.len() as f64
 }
 
+/// Mean LDR-FLIP of two pictures.
+pub fn flip(ours: &RgbImage, reference: &RgbImage) -> f64 {
+    let linear = |picture: &RgbImage| -> Vec<[f32; 3]> {
+        let pixels = picture.pixels();
+        let of = |code: u8| match f32::from(code) / 255.0 {
+            v if v <= 0.04045 => v / 12.92,
+            v => ((v + 0.055) / 1.055).powf(2.4),
+        };
+        pixels.map(|p| p.0.map(of)).collect()
+    };
+    let found = mesolux::render::ldr(&linear(ours), &linear(reference), ours.width());
+    found.iter().map(|&f| f64::from(f)).sum::<f64>() / found.len() as f64
+}
+
 /// Mean of the three colours.
 pub fn mean(picture: &RgbImage) -> [f64; 3] {
     let count = f64::from(picture.width() * picture.height());

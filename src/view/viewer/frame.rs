@@ -1,14 +1,21 @@
 //! A frame of the window: what it asks of the other threads, and what it draws.
 
+use std::ops::Range;
 use std::time::{Duration, Instant};
 
 use super::Viewer;
 use crate::error::Result;
 use crate::picture::{Light, write_png};
-use crate::view::panel_pass::Prepared;
+use crate::render::{ReliefShading, Show};
+use crate::view::backdrop;
+use crate::view::camera::Rows;
+use crate::view::compare::Left;
+use crate::view::panel_pass::{Layer, PanelPass, Prepared};
 use crate::view::screen::Captured;
-use crate::view::surface_pass::{self, Laid};
-use crate::vk::Shown;
+use crate::view::snapshot::Snapshot;
+use crate::view::surface_pass::{self, SurfacePass};
+use crate::view::switches::Switches;
+use crate::vk::{Commands, Shown};
 
 /// Times of one frame that is being drawn.
 struct Started {
@@ -19,6 +26,53 @@ struct Started {
     update: Duration,
     /// When all was ready to be recorded.
     prepared: Instant,
+}
+
+/// One side of the view, or all of it.
+struct Side {
+    /// Whether it is what is held.
+    held: bool,
+    shown: surface_pass::Shown,
+    /// Where its picture is, if there is one.
+    picture: Option<Layer>,
+    /// Whether the picture leaves nothing of the surfaces to be seen.
+    covered: bool,
+    /// Left, top, width, height, pixels.
+    clip: [u32; 4],
+}
+
+impl Side {
+    fn record(
+        &self,
+        cmd: &Commands,
+        rows: &Rows,
+        surfaces: &SurfacePass,
+        (panel_pass, panel): (&PanelPass, &Prepared),
+        sky: bool,
+        first: bool,
+    ) {
+        let [left, top, width, height] = self.clip;
+        if first {
+            // A software driver compiles a shader at its first draw: all are drawn in the first
+            // frame.
+            cmd.scissor(0, 0, 1, 1);
+            surfaces.record(cmd, rows, &self.shown);
+            surfaces.record_overlays(cmd, rows, &self.shown);
+        }
+        if sky && !self.covered {
+            panel_pass.record_layer(cmd, panel, Layer::Backdrop, self.clip);
+        }
+        cmd.scissor(left, top, width, height);
+        if !self.covered {
+            surfaces.record(cmd, rows, &self.shown);
+        }
+        if let Some(layer) = self.picture {
+            panel_pass.record_layer(cmd, panel, layer, self.clip);
+        }
+        if self.shown.has_overlays() {
+            surfaces.record_overlays(cmd, rows, &self.shown);
+        }
+    }
 }
 
 impl Viewer {
@@ -44,14 +98,14 @@ impl Viewer {
         let primitives = self.panel(size)?;
         self.want_detail(size);
         let panel = self.panel_pass.prepare(&primitives, size, self.scale)?;
-        let shown = self.shown();
+        self.set_backdrop(size)?;
         let started = Started {
             at: begin,
             unanswered,
             update,
             prepared: Instant::now(),
         };
-        let (answer, captured) = self.draw(size, &panel, &shown)?;
+        let (answer, captured) = self.draw(size, &panel)?;
         self.stale = answer != Shown::Yes;
         if !answer.is_seen() {
             self.unanswered = unanswered;
@@ -64,66 +118,96 @@ impl Viewer {
         Ok(true)
     }
 
-    /// What the surfaces show in this frame.
-    fn shown(&mut self) -> surface_pass::Shown {
-        let [all, direct, emission] = match self.switches.part {
+    /// Draws the sky of the view as it is, coarsely; nothing where pictures show none.
+    fn set_backdrop(&mut self, size: (u32, u32)) -> Result<()> {
+        let shows = self.switches.part != Light::Direct && self.switches.show == Show::Shaded;
+        let sky = self.scene.lights.sky.as_ref().filter(|_| shows);
+        let subject = sky.map(|_| backdrop::Subject {
+            camera: self.eye.camera.clone(),
+            size,
+            exposure: self.exposure(),
+        });
+        if let (Some(sky), Some(subject)) = (sky, &subject)
+            && self.backdrop.as_ref() != Some(subject)
+        {
+            let (size, codes) = subject.drawn(sky, &self.eye);
+            self.panel_pass.set_layer(Layer::Backdrop, size, &codes)?;
+        }
+        self.backdrop = subject;
+        Ok(())
+    }
+
+    /// What the surfaces show in this frame, by these switches.
+    fn shown(&self, snapshot: &Snapshot, switches: &Switches) -> surface_pass::Shown {
+        let [all, direct, emission] = match switches.part {
             Light::Global => [1.0, 0.0, 1.0],
             Light::Direct => [0.0, 1.0, 1.0],
             Light::Indirect => [1.0, -1.0, 0.0],
         };
-        let picture = match (self.shown_detail().is_some(), self.kept_detail()) {
-            (true, _) => Laid::Exactly,
-            (false, kept) if kept != [false; 2] => {
-                self.surfaces.lay(kept);
-                Laid::FromElsewhere
-            }
-            _ => Laid::No,
-        };
         surface_pass::Shown {
             exposure: self.exposure().exp2(),
-            ambient: self.ambient(),
+            ambient: self.ambient_of(snapshot, switches),
             parts: [all, direct, emission],
+            relief: switches.shading != ReliefShading::None,
             elements: self.switches.elements,
             sources: self.switches.sources,
-            picture,
             chosen: self.input.chosen.or(self.input.hovered),
+        }
+    }
+
+    /// What is drawn between these columns.
+    fn side(&self, columns: Range<u32>, height: u32, is_left: bool) -> Side {
+        let (snapshot, switches, held) = match (&self.left, is_left) {
+            (Some(Left::Held(held)), true) => (&held.snapshot, &held.switches, true),
+            _ => (&self.snapshot, &self.switches, false),
+        };
+        let (drawn, layer) = match is_left {
+            true => (self.shown_left(), Layer::Left),
+            false => (self.shown_detail(), Layer::Picture),
+        };
+        let shown = self.shown(snapshot, switches);
+        Side {
+            held,
+            picture: drawn.map(|_| layer),
+            covered: drawn.is_some_and(|drawn| drawn.is_whole) && !shown.has_overlays(),
+            shown,
+            clip: [columns.start, 0, columns.len() as u32, height],
         }
     }
 
     /// Records and shows the frame; what was read back of it, where that was asked for.
     fn draw(
         &mut self,
-        size: (u32, u32),
+        (width, height): (u32, u32),
         panel: &Prepared,
-        shown: &surface_pass::Shown,
     ) -> Result<(Shown, Option<Captured>)> {
-        let rows = self.eye.rows(&self.scene, size);
-        let (surfaces, panel_pass) = (&self.surfaces, &self.panel_pass);
-        // A software driver compiles a shader at its first draw: all are drawn in the first frame.
-        let unseen = [
-            (Laid::No, false),
-            (Laid::FromElsewhere, false),
-            (Laid::No, true),
-        ];
-        let unseen = unseen.map(|(picture, elements)| surface_pass::Shown {
-            picture,
-            elements,
-            ..*shown
-        });
+        let rows = self.eye.rows(&self.scene, (width, height));
+        let line = self.left.as_ref().map(|_| self.line.column(width));
+        let line = line.unwrap_or(0);
+        let sides = [(0..line, true), (line..width, false)];
+        let sides = sides.into_iter().filter(|(columns, _)| !columns.is_empty());
+        let sides: Vec<Side> = sides
+            .map(|(columns, is_left)| self.side(columns, height, is_left))
+            .collect();
+        let sky = self.backdrop.is_some();
         let first = !self.timing.has_begun();
-        self.screen.show(self.capture.is_some(), |cmd| {
-            if first {
-                cmd.scissor(0, 0, 1, 1);
-                for unseen in &unseen {
-                    surfaces.record(cmd, &rows, unseen);
-                }
-                cmd.scissor(0, 0, size.0, size.1);
+        let Self {
+            screen,
+            surfaces,
+            left,
+            panel_pass,
+            capture,
+            ..
+        } = self;
+        screen.show(capture.is_some(), |cmd| {
+            for side in &sides {
+                let surfaces = match left {
+                    Some(Left::Held(held)) if side.held => &held.surfaces,
+                    _ => &*surfaces,
+                };
+                side.record(cmd, &rows, surfaces, (&*panel_pass, panel), sky, first);
             }
-            if shown.picture == Laid::Exactly {
-                panel_pass.record_picture(cmd, panel);
-            }
-            // Over a picture that covers the frame, only the overlays.
-            surfaces.record(cmd, &rows, shown);
+            cmd.scissor(0, 0, width, height);
             panel_pass.record(cmd, panel);
         })
     }
@@ -151,6 +235,8 @@ impl Viewer {
             && self.snapshot.epoch >= epoch
         {
             self.timing.relit(since);
+            let seconds = since.elapsed().as_secs_f64();
+            self.say(format!("lit anew after {seconds:.2} s"));
             self.edited = None;
         }
         if self.is_lit() {

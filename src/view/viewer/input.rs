@@ -8,6 +8,7 @@ use egui::RawInput;
 use glam::DVec3;
 
 use super::Viewer;
+use super::moving::Grab;
 use crate::view::camera::Eye;
 use crate::view::event::{Event, Key, Modifiers, PointerButton};
 use crate::view::pick::first_hit;
@@ -22,8 +23,8 @@ pub struct Input {
     /// Pixels; None while the pointer is outside the window.
     pub pointer: Option<(f32, f32)>,
     drag: Option<Drag>,
-    /// A point light that follows the pointer, and its place before.
-    grabbed: Option<(usize, DVec3)>,
+    /// A light that follows the pointer.
+    pub(super) grabbed: Option<Grab>,
     /// Flying keys that are held down.
     held: Vec<Key>,
     /// The element under the cursor, while something needs it, and the one that was clicked.
@@ -39,6 +40,8 @@ enum Drag {
     Pan,
     Near,
     Look,
+    /// The line between two sides.
+    Line,
     /// A left button that has not moved yet: a click.
     Click,
 }
@@ -154,6 +157,7 @@ impl Viewer {
             Some(Drag::Pan) => self.eye.pan(across, down, height),
             Some(Drag::Near) => self.eye.near(-down / NEARING),
             Some(Drag::Look) => self.eye.look(across, down),
+            Some(Drag::Line) => self.line.move_to(x, self.size.0),
             Some(Drag::Click) | None => {}
         }
         self.hover();
@@ -176,8 +180,8 @@ impl Viewer {
         let Modifiers {
             alt, ctrl, shift, ..
         } = self.input.modifiers;
-        if self.input.grabbed.is_some() {
-            if pressed {
+        if let Some(grab) = &self.input.grabbed {
+            if pressed || grab.dragged {
                 self.let_go(button == PointerButton::Primary);
             }
             return;
@@ -198,9 +202,28 @@ impl Viewer {
             _ if middle && ctrl => Some(Drag::Near),
             _ if middle => Some(Drag::Orbit),
             PointerButton::Secondary => Some(Drag::Look),
+            PointerButton::Primary if self.is_on_line() => Some(Drag::Line),
+            PointerButton::Primary if self.press_lamp() => None,
             PointerButton::Primary => Some(Drag::Click),
             _ => None,
         };
+    }
+
+    fn is_on_line(&self) -> bool {
+        let pointer = self.input.pointer.filter(|_| self.left.is_some());
+        pointer.is_some_and(|(x, _)| self.line.is_at(x, self.size.0, self.scale))
+    }
+
+    /// Chooses the light whose mark is under the pointer, and moves it while the button is held.
+    fn press_lamp(&mut self) -> bool {
+        let marked = self.switches.panel;
+        let pointer = self.input.pointer.filter(|_| marked);
+        let Some(lamp) = pointer.and_then(|at| self.lamp_at(at)) else {
+            return false;
+        };
+        self.lamp = lamp;
+        self.grab(true);
+        true
     }
 
     /// Marks the element under the cursor, or unmarks it if it was marked.
@@ -215,15 +238,19 @@ impl Viewer {
             return;
         }
         if self.input.grabbed.is_some() {
-            match key {
-                Key::Enter => self.let_go(true),
-                Key::Escape => self.let_go(false),
-                _ => {}
-            }
+            self.key_while_moving(key);
             return;
         }
         if self.input.modifiers.command {
-            self.closing |= key == Key::Q;
+            match key {
+                Key::Q => self.closing = true,
+                Key::Z if self.input.modifiers.shift => self.redo(),
+                Key::Z => self.undo(),
+                Key::Y => self.redo(),
+                Key::O => self.browse(),
+                Key::S => self.ask_where_to_save(),
+                _ => {}
+            }
             return;
         }
         if WAYS.iter().any(|(way, _)| *way == key) {
@@ -258,7 +285,10 @@ impl Viewer {
             Key::L if !self.lamps.is_empty() => self.lamp = (self.lamp + 1) % self.lamps.len(),
             Key::Plus | Key::Equals => self.brighten(BRIGHTER),
             Key::Minus => self.brighten(1.0 / BRIGHTER),
-            Key::G => self.grab(),
+            Key::G => self.grab(false),
+            Key::M => self.meter(),
+            Key::V => self.hold(),
+            Key::F1 => switches.keys ^= true,
             Key::C => self.see_camera(self.next_camera),
             Key::Home => self.eye.see_all(),
             Key::F12 => self.save(None),
@@ -295,44 +325,6 @@ impl Viewer {
     fn brighten(&mut self, by: f32) {
         if let Some(lamp) = self.lamps.get_mut(self.lamp) {
             lamp.strength *= by;
-            self.relight();
-        }
-    }
-
-    /// Makes the chosen point light follow the pointer.
-    fn grab(&mut self) {
-        let position = self.lamps.get(self.lamp).and_then(|lamp| lamp.position);
-        if let (Some(position), Some(_)) = (position, self.input.pointer) {
-            self.input.grabbed = Some((self.lamp, position));
-        }
-    }
-
-    /// Moves the light under the pointer, in the plane through its place that faces the eye.
-    fn drag_lamp(&mut self) {
-        let (Some((i, before)), Some((x, y))) = (self.input.grabbed, self.input.pointer) else {
-            return;
-        };
-        let eye = self.eye.camera.position;
-        let forward = self.eye.ray(
-            (f64::from(self.size.0) / 2.0, f64::from(self.size.1) / 2.0),
-            self.size,
-        );
-        let ray = self.eye.ray((f64::from(x), f64::from(y)), self.size);
-        let depth = (before - eye).dot(forward);
-        let along = depth / ray.dot(forward);
-        if along.is_finite() && depth > 0.0 {
-            self.lamps[i].position = Some(eye + ray * along);
-            self.relight();
-        }
-    }
-
-    /// Ends the move: leaves the light where it is, or puts it back.
-    fn let_go(&mut self, stays: bool) {
-        let Some((i, before)) = self.input.grabbed.take() else {
-            return;
-        };
-        if !stays {
-            self.lamps[i].position = Some(before);
             self.relight();
         }
     }

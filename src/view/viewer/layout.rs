@@ -7,8 +7,11 @@ use egui::TextureHandle;
 use super::Viewer;
 use super::input::Input;
 use crate::error::Result;
+use crate::render::Show;
+use crate::view::compare::Left;
 use crate::view::overlay;
 use crate::view::panel::{self, Asked, Changed, Status};
+use crate::view::switches::Switches;
 
 /// What a picture over the view shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,6 +83,11 @@ impl Viewer {
             if self.switches.panel {
                 asked = self.controls(context);
             }
+            panel::show_keys(context, &mut self.switches.keys);
+            self.draw_dialog(context);
+            if self.switches.notes {
+                self.notes.show(context);
+            }
         });
         for asked in asked {
             match asked {
@@ -89,6 +97,15 @@ impl Viewer {
                 Asked::Bake => self.bake(),
                 Asked::Relight => self.relight(),
                 Asked::Open(i) => self.open(self.offered[i].clone()),
+                Asked::Recent(i) => self.open(self.files.recent[i].clone()),
+                Asked::Browse => self.browse(),
+                Asked::SaveBake => self.ask_where_to_save(),
+                Asked::Undo => self.undo(),
+                Asked::Redo => self.redo(),
+                Asked::Meter => self.meter(),
+                Asked::Hold => self.hold(),
+                Asked::Trace => self.trace(),
+                Asked::Part => self.part(),
             }
         }
         self.panel_pass.update(&output.textures_delta)?;
@@ -107,6 +124,7 @@ impl Viewer {
         let baking = self.is_baking();
         let marked = marked(&self.input);
         let device = self.screen.device().name().to_owned();
+        let left = self.left.as_ref();
         let status = Status {
             scene: &self.name,
             triangles: self.scene.triangles.len(),
@@ -118,20 +136,69 @@ impl Viewer {
             frame: self.timing.last(baking),
             detail: self.shown_detail().map(|drawn| drawn.seconds),
             has_relief: self.base.materials.iter().any(|m| m.has_relief()),
-            messages: &self.messages,
             offered: &self.offered,
             opening: self.opening.as_deref(),
             bounds: &self.bounds,
             element: marked.map(|e| self.describe(e)),
+            can_undo: self.history.can_undo(),
+            can_redo: self.history.can_redo(),
+            recent: &self.files.recent,
+            can_save_bake: self.why_no_bake().is_none(),
+            against: left.map(|left| (left.against(), left.name().to_owned())),
+            apart: &self.apart,
+            differences: match left {
+                Some(Left::Traced(traced)) => &traced.differences,
+                _ => &[],
+            },
         };
         let mut changed = Changed {
             switches: &mut self.switches,
             lamps: &mut self.lamps,
             lamp: &mut self.lamp,
             directions: &mut self.directions,
+            paper: &mut self.paper,
             relief_scale: &mut self.relief_scale,
         };
         panel::show(context, &status, &mut changed)
+    }
+
+    /// What is shown over the view means, or what is being done.
+    fn draw_legend(&self, painter: &egui::Painter, (_, height): (u32, u32)) {
+        let Switches {
+            elements,
+            sources,
+            slots,
+            items,
+            show,
+            ..
+        } = self.switches;
+        let moving = self.moving_line();
+        let lines = [
+            moving.as_deref(),
+            elements.then_some("lines: elements, each of one light between its corners"),
+            sources.then_some("colours: sources, groups of elements that shoot as one"),
+            slots.then_some(
+                "disc: light on the relief under the cursor; middle, its normal; rim, the horizon; \
+                 right, u; up, v",
+            ),
+            items.then_some(match self.input.chosen {
+                None => "item buffer: click on a surface",
+                Some(_) => {
+                    "cross: what the source sees; middle, along its normal; rim, the horizon"
+                }
+            }),
+            (show == Show::Slots).then_some(
+                "relief: hue, the direction of most light; bright, near the normal; grey, from \
+                 everywhere",
+            ),
+        ];
+        let lines: Vec<&str> = lines.into_iter().flatten().collect();
+        let left = match self.switches.panel {
+            true => panel::WIDTH + 14.0,
+            false => 14.0,
+        };
+        let corner = egui::pos2(left, height as f32 / self.scale - 10.0);
+        overlay::legend(painter, corner, &lines);
     }
 
     /// One line about an element.
@@ -156,6 +223,10 @@ impl Viewer {
                 let name = (i == self.lamp).then_some(lamp.name.as_str());
                 overlay::lamp(&painter, at, self.scale, lamp.colour, name);
             }
+        }
+        self.draw_line(&painter, size);
+        if self.switches.notes {
+            self.draw_legend(&painter, size);
         }
         let exposure = self.exposure().exp2();
         let screen = context.content_rect();

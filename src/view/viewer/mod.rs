@@ -1,24 +1,33 @@
 //! The window's state: what it shows, and how it changes.
 
+mod compare;
+mod files;
 mod frame;
 mod input;
 mod layout;
+mod lighting;
+mod moving;
 mod overlays;
 mod pictures;
 mod update;
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use glam::Vec3;
 use winit::window::Window;
 
-use super::baker::Baker;
+use super::backdrop::Subject;
+use super::baker::{Baker, Saves};
 use super::camera::Eye;
+use super::compare::{Left, Line};
 use super::detailer::{Detailer, PAUSE};
 use super::event::Event;
-use super::lamps::{Lamp, lamps, lit};
+use super::history::History;
+use super::lamps::{Lamp, lamps};
+use super::notes::Notes;
 use super::orders::{Given, Order, Stage};
 use super::panel_pass::PanelPass;
 use super::screen::Screen;
@@ -26,11 +35,13 @@ use super::snapshot::{Progress, Snapshot};
 use super::surface_pass::SurfacePass;
 use super::switches::Switches;
 use super::timing::Timing;
+use super::watch::{self, Watch};
 use super::{Opened, Session, Wake};
 use crate::error::Result;
 use crate::render::Light;
 use crate::scene::{Camera, Scene};
-use crate::solver::Settings;
+use crate::solver::{Estimator, Settings};
+use files::Files;
 use input::Input;
 use overlays::Overlays;
 use pictures::Pictures;
@@ -51,13 +62,17 @@ pub struct Viewer {
     base: Scene,
     /// The scene with the lights and the scale of relief as they are now.
     pub(super) scene: Arc<Scene>,
+    /// Of the bake as it is, and as it was asked for.
     settings: Settings,
+    first_settings: Settings,
     pub(super) eye: Eye,
     pub(super) next_camera: usize,
     pub(super) switches: Switches,
     pub(super) lamps: Vec<Lamp>,
     pub(super) lamp: usize,
     pub(super) directions: u32,
+    /// Whether the bake is by the paper's method.
+    pub(super) paper: bool,
     pub(super) relief_scale: f64,
 
     snapshot: Arc<Snapshot>,
@@ -71,9 +86,28 @@ pub struct Viewer {
     /// Number of lights shown so far.
     lights: u64,
     pictures: Pictures,
-    messages: Vec<String>,
+    /// What the view is compared to, and where the two meet.
+    left: Option<Left>,
+    pub(super) line: Line,
+    /// How far they are apart.
+    apart: Vec<String>,
+    /// What the sky behind the surfaces was drawn for.
+    backdrop: Option<Subject>,
+    notes: Notes,
+    history: History,
+    /// The lights as they were last lit, and as they were read.
+    lit_lamps: Vec<Lamp>,
+    first_lamps: Vec<Lamp>,
+    /// Whether the exposure follows the light: not while lights are edited.
+    metering: bool,
     /// The scene that is shown, as [`Session::open`] takes it.
-    name: String,
+    pub(super) name: String,
+    files: Files,
+    /// Looks at the files of the scene, and whether they have changed.
+    #[expect(dead_code, reason = "it works until it is dropped")]
+    watch: Option<Watch>,
+    watched: Arc<AtomicBool>,
+    wake: Wake,
     /// Scenes that the panel offers.
     offered: Arc<[String]>,
     /// The scene that is to replace this one.
@@ -100,8 +134,6 @@ pub struct Viewer {
 /// Shortest time between frames while there is no light to show: a software device draws them with
 /// the cores that the bake needs.
 const DARK: Duration = Duration::from_millis(300);
-/// Most messages that the panel keeps.
-const MOST_MESSAGES: usize = 4;
 /// Name of pictures that are saved by a key, in the working directory.
 const PICTURE: &str = "mesolux";
 
@@ -134,12 +166,17 @@ impl Viewer {
         } = session.clone();
         let screen = Screen::new(window, size, &device)?;
         let scene = Arc::new(base.clone());
+        let shown_lamps = lamps(&base);
         let surfaces = SurfacePass::new(screen.device(), screen.pass(), &scene)?;
         let given = Given {
             scene: Arc::clone(&scene),
             settings: settings.clone(),
         };
-        let baker = Baker::new(&device, given, kept, Arc::clone(&wake));
+        let saves = Saves {
+            name: name.clone(),
+            save: Arc::clone(&session.save),
+        };
+        let baker = Baker::new(&device, given, kept, saves, Arc::clone(&wake));
         let snapshot = Arc::new(match bake {
             Some(bake) => Snapshot::of_bake(&scene, bake),
             None => {
@@ -151,11 +188,19 @@ impl Viewer {
                 Snapshot::unlit(&scene)
             }
         });
+        let watched = Arc::new(AtomicBool::new(false));
+        let on_change: Wake = {
+            let (watched, wake) = (Arc::clone(&watched), Arc::clone(&wake));
+            Arc::new(move || {
+                watched.store(true, Ordering::SeqCst);
+                wake();
+            })
+        };
         let egui = egui::Context::default();
         egui.set_theme(egui::Theme::Dark);
         let mut viewer = Self {
             baker,
-            detailer: Detailer::new(&device, wake),
+            detailer: Detailer::new(&device, Arc::clone(&wake)),
             surfaces,
             panel_pass: PanelPass::new(screen.device(), screen.pass())?,
             screen,
@@ -165,10 +210,17 @@ impl Viewer {
             eye: Eye::new(&scene, &camera),
             next_camera: camera_after(&scene, &camera),
             switches: Switches::default(),
-            lamps: lamps(&base),
+            lamps: shown_lamps.clone(),
             lamp: 0,
             directions: settings.relief.directions.count() as u32,
+            paper: settings.estimator == Estimator::Paper,
             relief_scale: 1.0,
+            wake: Arc::clone(&wake),
+            watch: Watch::new(watch::files(&name, &base), on_change),
+            watched,
+            files: Files::default(),
+            first_lamps: shown_lamps.clone(),
+            first_settings: settings.clone(),
             base,
             scene,
             settings,
@@ -181,7 +233,14 @@ impl Viewer {
             lights: 0,
             snapshot,
             pictures: Pictures::default(),
-            messages: Vec::new(),
+            left: None,
+            line: Line::default(),
+            apart: Vec::new(),
+            backdrop: None,
+            notes: Notes::default(),
+            history: History::default(),
+            lit_lamps: shown_lamps.clone(),
+            metering: true,
             offered: Arc::clone(&session.offered),
             name,
             opening: None,
@@ -199,9 +258,8 @@ impl Viewer {
             closing: false,
         };
         let snapshot = &viewer.snapshot;
-        viewer
-            .surfaces
-            .set_light(&snapshot.corners, &snapshot.corners_direct);
+        viewer.surfaces.set_light(snapshot);
+        viewer.remember();
         Ok(viewer)
     }
 
@@ -225,7 +283,7 @@ impl Viewer {
         // With the switches as they are now, which may differ from the last frame's.
         let now = self.wanted_now(self.size);
         self.shown_detail().is_some_and(|drawn| {
-            drawn.is_whole()
+            drawn.is_whole
                 && drawn.of.looks_like(&now)
                 && Arc::ptr_eq(&drawn.of.snapshot, &self.snapshot)
         })
@@ -249,7 +307,8 @@ impl Viewer {
         let Pictures { seen, wanted, .. } = &self.pictures;
         let paused = seen.as_ref().map(|seen| seen.since + PAUSE);
         let paused = paused.filter(|_| self.switches.detail && wanted.is_none() && self.is_lit());
-        let next = [changed, self.repaint, paused].into_iter().flatten().min();
+        let next = [changed, self.repaint, paused, self.notes.next_end()];
+        let next = next.into_iter().flatten().min();
         match self.awaits_light() {
             true => next.map(|at| at.max(self.last_frame + DARK)),
             false => next,
@@ -285,44 +344,9 @@ impl Viewer {
         self.dirty = true;
     }
 
-    pub(super) fn say(&mut self, message: String) {
-        if self.messages.len() == MOST_MESSAGES {
-            self.messages.remove(0);
-        }
-        self.messages.push(message);
-    }
-
-    /// Starts a new bake with the chosen directions and relief.
-    pub(super) fn bake(&mut self) {
-        self.settings.relief.directions = crate::math::directions::Directions::new(self.directions)
-            .unwrap_or(self.settings.relief.directions);
-        for (material, before) in self
-            .base
-            .materials
-            .iter()
-            .zip(Arc::make_mut(&mut self.scene).materials.iter_mut())
-        {
-            before.height_scale = material.height_scale * self.relief_scale as f32;
-        }
-        self.surfaces.set_about(&self.scene);
-        self.start_epoch();
-        self.baker.order(Order::Bake {
-            scene: Arc::clone(&self.scene),
-            settings: Box::new(self.settings.clone()),
-            epoch: self.epoch,
-        });
-    }
-
-    /// Relights the scene by the lamps as they are now.
-    pub(super) fn relight(&mut self) {
-        self.scene = Arc::new(lit(&self.scene, &self.lamps));
-        self.surfaces.set_emission(&self.scene);
-        self.start_epoch();
-        self.edited = Some((self.epoch, Instant::now()));
-        self.baker.order(Order::Relight {
-            scene: Arc::clone(&self.scene),
-            epoch: self.epoch,
-        });
+    pub(super) fn say(&mut self, note: String) {
+        self.notes.say(note);
+        self.dirty = true;
     }
 
     /// Asks the window for another scene, by what [`Session::open`] takes.
@@ -354,8 +378,13 @@ impl Viewer {
     }
 
     fn ambient(&self) -> Vec3 {
-        match self.switches.ambient && self.switches.part != Light::Direct {
-            true => self.snapshot.ambient.irradiance,
+        self.ambient_of(&self.snapshot, &self.switches)
+    }
+
+    /// W·m⁻².
+    fn ambient_of(&self, snapshot: &Snapshot, switches: &Switches) -> Vec3 {
+        match switches.ambient && switches.part != Light::Direct {
+            true => snapshot.ambient.irradiance,
             false => Vec3::ZERO,
         }
     }

@@ -5,17 +5,19 @@ use std::time::Instant;
 
 use super::Viewer;
 use crate::error::Result;
-use crate::view::camera::Eye;
+use crate::view::compare::Left;
 use crate::view::detailer::{Drawn, PAUSE, Wanted};
+use crate::view::panel_pass::Layer;
+use crate::view::snapshot::Snapshot;
 
 /// Detailed pictures of the view.
 #[derive(Default)]
 pub(super) struct Pictures {
-    /// The last one.
+    /// The last one, or as much of it as there is.
     pub detail: Option<Drawn>,
-    /// What the last whole one is of.
-    pub whole: Option<Wanted>,
-    /// The whole one that was last ordered for the view as it is.
+    /// The same of the left side of a comparison.
+    pub left: Option<Drawn>,
+    /// The one that was last ordered for the view as it is.
     pub wanted: Option<Wanted>,
     /// The view as it is.
     pub seen: Option<Seen>,
@@ -26,6 +28,20 @@ pub(super) struct Seen {
     pub of: Wanted,
     /// When it became so.
     pub since: Instant,
+}
+
+/// A picture of a bake under way is shown until the light has come so much further: its unshot share
+/// over the present one.
+const FURTHER: f64 = 2.0;
+
+/// Whether a picture of light `of` may stand in place of the light `now`, of the same bake.
+pub(super) fn is_fresh(of: &Snapshot, now: &Snapshot) -> bool {
+    let unshot = |light: &Snapshot| match light.progress.done {
+        true => 0.0,
+        false => light.progress.update.unshot_share,
+    };
+    let (before, now) = (unshot(of), unshot(now));
+    before <= (FURTHER * now).max(0.05)
 }
 
 impl Viewer {
@@ -41,6 +57,7 @@ impl Viewer {
             show: self.switches.show,
             ambient: self.ambient(),
             exposure: self.exposure(),
+            left: false,
         }
     }
 
@@ -48,90 +65,61 @@ impl Viewer {
     pub(super) fn shown_detail(&self) -> Option<&Drawn> {
         let drawn = self.pictures.detail.as_ref()?;
         let now = &self.pictures.seen.as_ref()?.of;
-        (self.switches.detail && drawn.of.looks_like(now)).then_some(drawn)
+        let shown = self.switches.detail && drawn.of.looks_like(now);
+        (shown && is_fresh(&drawn.of.snapshot, &self.snapshot)).then_some(drawn)
     }
 
-    /// Whether the last whole picture, and a coarse one after it, colour surfaces as the window
-    /// does now.
-    pub(super) fn kept_detail(&self) -> [bool; 2] {
-        let seen = self.pictures.seen.as_ref();
-        let Some(Seen { of: now, .. }) = seen.filter(|_| self.switches.detail) else {
-            return [false; 2];
-        };
-        let whole = self
-            .pictures
-            .whole
-            .as_ref()
-            .is_some_and(|of| of.colours_like(now));
-        let coarse = self
-            .pictures
-            .detail
-            .as_ref()
-            .filter(|drawn| !drawn.is_whole());
-        [
-            whole,
-            coarse.is_some_and(|drawn| drawn.of.colours_like(now)),
-        ]
-    }
-
-    /// Takes a detailed picture, unless it is a coarse one of a view whose whole picture is shown.
+    /// Takes a detailed picture, or a part of one.
     pub(super) fn take_picture(&mut self, drawn: Drawn) -> Result<()> {
-        let last = self.pictures.detail.as_ref();
-        let whole = last.filter(|last| last.is_whole() && !drawn.is_whole());
-        // The coarse one would be of brighter light.
-        if whole.is_some_and(|whole| whole.of.looks_like(&drawn.of)) {
-            return Ok(());
-        }
-        let rows = Eye::new(&self.scene, &drawn.of.camera).rows(&self.scene, drawn.size);
-        let (picture, share) = self.surfaces.set_picture(&drawn, &rows)?;
-        self.panel_pass.set_picture(picture, share)?;
-        if drawn.is_whole() {
-            self.pictures.whole = Some(drawn.of.clone());
-        }
+        let size = drawn.of.size;
+        self.panel_pass
+            .set_layer(Layer::Picture, size, &drawn.codes)?;
         self.pictures.detail = Some(drawn);
+        self.compare();
         Ok(())
     }
 
-    /// Orders coarse pictures of a view that changes, and a whole one of a view that has stayed for
-    /// [`PAUSE`].
+    /// Orders a picture of a view that has stayed for [`PAUSE`].
     pub(super) fn want_detail(&mut self, size: (u32, u32)) {
         let now = self.wanted_now(size);
-        let drawn = self.switches.detail && self.is_lit();
-        match &self.pictures.seen {
-            Some(before) if before.of.looks_like(&now) => {}
-            _ => {
-                self.pictures.seen = Some(Seen {
-                    of: now.clone(),
-                    since: Instant::now(),
-                });
-                let before = self.pictures.wanted.take();
-                if drawn {
-                    self.detailer.want(Some(now), true);
-                } else if before.is_some() {
-                    self.detailer.want(None, false);
-                }
-                return;
-            }
-        }
         let seen = self.pictures.seen.as_ref();
-        let stays = seen.is_some_and(|seen| seen.since.elapsed() >= PAUSE);
-        if !(drawn && stays) {
+        let Some(seen) = seen.filter(|before| before.of.looks_like(&now)) else {
+            let since = Instant::now();
+            self.pictures.seen = Some(Seen { of: now, since });
+            if self.pictures.wanted.take().is_some() {
+                self.detailer.want(Vec::new());
+            }
+            self.want_traced(size, false);
+            return;
+        };
+        let stays = seen.since.elapsed() >= PAUSE;
+        self.want_traced(size, stays);
+        if !(self.switches.detail && self.is_lit() && stays) {
             return;
         }
         // During a bake, a picture is finished before the next stage's is begun.
-        let same = |wanted: &Wanted| Arc::ptr_eq(&wanted.snapshot, &now.snapshot);
-        let finished = self
-            .pictures
-            .detail
-            .as_ref()
-            .is_some_and(|drawn| drawn.size == size && drawn.of.looks_like(&now));
         let ask = match &self.pictures.wanted {
             None => true,
-            Some(wanted) => !same(wanted) && (finished || now.snapshot.progress.done),
+            Some(wanted) => {
+                let drawn = self.pictures.detail.as_ref();
+                let finished = drawn.is_some_and(|drawn| {
+                    drawn.is_whole && Arc::ptr_eq(&drawn.of.snapshot, &wanted.snapshot)
+                });
+                !Arc::ptr_eq(&wanted.snapshot, &now.snapshot)
+                    && (finished || now.snapshot.progress.done)
+            }
         };
         if ask {
             self.pictures.wanted = Some(now.clone());
-            self.detailer.want(Some(now), false);
+            let held = matches!(self.left, Some(Left::Held(_)));
+            let left = self.left_wanted(size).filter(|_| held);
+            // One that is there already stays.
+            let left = left.filter(|left| {
+                let drawn = self.shown_left();
+                !drawn.is_some_and(|drawn| drawn.is_whole && drawn.of.looks_like(left))
+            });
+            self.detailer
+                .want([Some(now), left].into_iter().flatten().collect());
         }
     }
 }

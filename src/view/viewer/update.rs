@@ -1,8 +1,11 @@
 //! Results of the baker and the detailer, taken once a frame.
 
+use std::sync::atomic::Ordering;
+
 use super::Viewer;
 use crate::error::{Error, Result};
 use crate::solver::Update;
+use crate::view::compare::Left;
 
 /// Largest error of the exposure of a bake under way, stops.
 const MOST_CHANGE: f32 = 0.2;
@@ -24,6 +27,10 @@ impl Viewer {
         if let Some((epoch, progress)) = latest.progress
             && epoch == self.epoch
         {
+            if progress.done && !self.progress.done {
+                let seconds = progress.update.elapsed.as_secs_f64();
+                self.say(format!("baked in {seconds:.1} s"));
+            }
             self.progress = progress;
             let Update {
                 error_bound,
@@ -38,12 +45,11 @@ impl Viewer {
             self.overlays.items = Some(items);
         }
         if let Some(snapshot) = latest.snapshot {
-            self.surfaces
-                .set_light(&snapshot.corners, &snapshot.corners_direct);
+            self.surfaces.set_light(&snapshot);
             // Stages of one bake have one exposure: else a picture of one would not fit the next.
             let change = (snapshot.exposure - self.metered).abs();
             let same = snapshot.epoch == self.snapshot.epoch && self.is_lit();
-            if snapshot.progress.done || !same || change > MOST_CHANGE {
+            if self.metering && (snapshot.progress.done || !same || change > MOST_CHANGE) {
                 self.metered = snapshot.exposure;
             }
             self.snapshot = snapshot;
@@ -55,8 +61,31 @@ impl Viewer {
             self.stage = stage;
         }
         self.ask_sources();
-        if let Some(drawn) = self.detailer.take() {
+        let [left, drawn] = self.detailer.take();
+        if let Some(left) = left.filter(|_| matches!(self.left, Some(Left::Held(_)))) {
+            self.take_left(left)?;
+        }
+        if let Some(drawn) = drawn {
             self.take_picture(drawn)?;
+        }
+        self.take_traced()?;
+        for (path, saved) in self.baker.saved() {
+            match saved {
+                Ok(()) => {
+                    tracing::info!("saved {}", path.display());
+                    self.say(format!("saved {}", path.display()));
+                    self.saving.retain(|under_way| *under_way != path);
+                }
+                Err(error) => {
+                    self.saving.retain(|under_way| *under_way != path);
+                    self.fail(error)?;
+                }
+            }
+        }
+        if self.watched.swap(false, Ordering::SeqCst) {
+            let name = self.name.clone();
+            self.say(format!("{name} has changed: it is read again"));
+            self.open(name);
         }
         for (path, saved) in self.detailer.saved() {
             self.saving.retain(|under_way| *under_way != path);
@@ -80,7 +109,7 @@ impl Viewer {
             true => Err(error),
             false => {
                 tracing::error!("{error}");
-                self.say(error.to_string());
+                self.notes.warn(error.to_string());
                 Ok(())
             }
         }

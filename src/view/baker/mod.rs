@@ -4,6 +4,10 @@
 //! window ── Order ─► thread: Solver ── Snapshot ─► Latest ─► window
 //! ```
 
+mod first_light;
+mod saves;
+
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -14,13 +18,13 @@ use super::orders::{Given, Latest, Order, Stage};
 use super::snapshot::{Progress, Snapshot, is_done};
 use super::{DeviceChoice, Wake};
 use crate::bake;
-use crate::bake::quality::Quality;
 use crate::error::{Error, Result};
 use crate::mesh::elements::Elements;
-use crate::mesh::near::Nearness;
-use crate::meso::Transport;
-use crate::scene::{Material, Scene};
-use crate::solver::{Estimator, Settings, Solver, Update, Visibility};
+use crate::scene::Scene;
+use crate::solver::{Settings, Solver, Update, Visibility};
+use first_light::{first_light, first_stage, flat, raises};
+pub use saves::Saves;
+use saves::Saving;
 
 /// The window's end of the thread.
 pub struct Baker {
@@ -31,6 +35,7 @@ pub struct Baker {
 
 struct Shared {
     latest: Mutex<Latest>,
+    saving: Saving,
     /// Orders wait, or the window closes: stop at the next batch.
     interrupt: AtomicBool,
 }
@@ -44,10 +49,17 @@ impl Shared {
 impl Baker {
     /// Starts the thread, which opens its device with the first order.
     /// `given` is what a relighting without a bake before it is of; `kept` are its rows.
-    pub fn new(choice: &DeviceChoice, given: Given, kept: Option<Visibility>, wake: Wake) -> Self {
+    pub fn new(
+        choice: &DeviceChoice,
+        given: Given,
+        kept: Option<Visibility>,
+        saves: Saves,
+        wake: Wake,
+    ) -> Self {
         let (orders, received) = channel();
         let shared = Arc::new(Shared {
             latest: Mutex::default(),
+            saving: Saving::default(),
             interrupt: AtomicBool::new(false),
         });
         let work = Work {
@@ -56,6 +68,7 @@ impl Baker {
             wake,
             kept,
             given,
+            saves,
             solving: None,
             looked_at: None,
         };
@@ -72,6 +85,22 @@ impl Baker {
             // A thread that has failed has said so.
             let _ = orders.send(order);
         }
+    }
+
+    /// Saves the bake as it is.
+    pub fn save(&self, path: PathBuf) {
+        self.shared.saving.ask(path);
+        self.order(Order::Save);
+    }
+
+    /// Bakes that were saved, or not, since the last call.
+    pub fn saved(&self) -> Vec<(PathBuf, Result<()>)> {
+        self.shared.saving.done()
+    }
+
+    /// Whether there is a solution that can be saved.
+    pub fn has_solved(&self) -> bool {
+        self.shared.saving.is_possible()
     }
 
     /// Whether there is a snapshot that has not been taken.
@@ -105,9 +134,6 @@ const SHARE: u32 = 8;
 /// was asked for begins.
 const FIRST: Duration = Duration::from_secs(2);
 
-/// Triangles of a scene from which on a coarse bake comes first.
-const MANY: usize = 1 << 13;
-
 /// Between two frames that show nothing new but how far the bake is.
 const TELLING: Duration = Duration::from_millis(100);
 
@@ -119,6 +145,7 @@ struct Work {
     kept: Option<Visibility>,
     /// The bake that was asked for last.
     given: Given,
+    saves: Saves,
     solving: Option<Solving>,
     /// Of a bake from a file: its sources, which nobody solves.
     looked_at: Option<Solver>,
@@ -148,6 +175,7 @@ impl Solving {
 impl Work {
     fn run(mut self, orders: &Receiver<Order>) {
         loop {
+            self.save();
             let busy = self.solving.as_ref().is_some_and(Solving::is_busy);
             // An order that comes from here on sets it again.
             self.shared.interrupt.store(false, Ordering::SeqCst);
@@ -185,6 +213,8 @@ impl Work {
                 self.bake(scene, &settings, epoch)
             }
             Order::Relight { scene, epoch } => self.relight(scene, epoch),
+            // At the next turn.
+            Order::Save => Ok(()),
             Order::Sources => self.sources().map(|_| ()),
             Order::Items { source } => {
                 let picture = self.sources()?.item_picture(source)?;
@@ -357,6 +387,7 @@ impl Work {
         let stop = solving.solver.report().stop;
         solving.done = is_done(stop) || start.elapsed() >= budget;
         let report = solving.solver.report();
+        shared.saving.allow(!solving.first);
         let progress = Progress {
             update: Update {
                 shots: report.shots,
@@ -393,46 +424,6 @@ impl Work {
     }
 }
 
-/// Whether a scene has relief that takes part.
-fn raises(scene: &Scene, settings: &Settings) -> bool {
-    let raised = settings.relief.transport != Transport::Lambert;
-    raised && scene.materials.iter().any(Material::has_relief)
-}
-
-fn first_stage(scene: &Scene, settings: &Settings) -> Stage {
-    match raises(scene, settings) {
-        true => Stage::Flat,
-        false => Stage::First,
-    }
-}
-
-/// What a scene is lit by first; none where the bake itself is as quick.
-fn first_light(scene: &Scene, settings: &Settings) -> Option<Settings> {
-    let preview = Quality::Preview.settings();
-    let coarser = preview.grouping.max_area > settings.grouping.max_area
-        && settings.estimator == Estimator::Receiver
-        && scene.triangles.len() >= MANY;
-    if coarser {
-        return Some(Settings {
-            residual: preview.residual.max(settings.residual),
-            budget: settings.budget,
-            shots: settings.shots,
-            seed: settings.seed,
-            // Near sources take a third of the time before the first picture.
-            nearness: Nearness::NONE,
-            ..flat(&preview)
-        });
-    }
-    raises(scene, settings).then(|| flat(settings))
-}
-
-/// The same without relief.
-fn flat(settings: &Settings) -> Settings {
-    let mut settings = settings.clone();
-    settings.relief.transport = Transport::Lambert;
-    settings
-}
-
 /// Of orders to light or to bake that wait, the last: a light that is dragged leaves many behind.
 fn latest(first: Order, orders: &Receiver<Order>) -> Order {
     let mut wanted = first;
@@ -449,6 +440,7 @@ fn latest(first: Order, orders: &Receiver<Order>) -> Order {
                 wanted @ (Order::Bake { .. } | Order::Relight { .. }),
                 Order::Items { .. } | Order::Sources,
             ) => wanted,
+            (wanted, Order::Save) => wanted,
             (_, next) => next,
         };
     }

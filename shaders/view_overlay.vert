@@ -1,7 +1,6 @@
-// As view_mesh_laid.vert, with what tells where in its triangle a fragment is.
+// A corner of a triangle, with what tells where in its triangle a fragment is.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
-#define LAID
-#define OVERLAID
+#define OVERLAY
 #include "shared/view_corner.glsl"

@@ -1,7 +1,6 @@
-// As view_mesh.vert, with where pictures drawn before show the corner: by the fragment that would
-// be many loads.
+// A corner of a triangle with relief in a window.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
-#define LAID
+#define RELIEF
 #include "shared/view_corner.glsl"

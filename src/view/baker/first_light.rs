@@ -1,0 +1,51 @@
+//! What a scene is lit by before the bake that was asked for.
+
+use crate::bake::quality::Quality;
+use crate::mesh::near::Nearness;
+use crate::meso::Transport;
+use crate::scene::{Material, Scene};
+use crate::solver::{Estimator, Settings};
+use crate::view::orders::Stage;
+
+/// Triangles of a scene from which on a coarse bake comes first.
+const MANY: usize = 1 << 13;
+
+/// Whether a scene has relief that takes part.
+pub(super) fn raises(scene: &Scene, settings: &Settings) -> bool {
+    let raised = settings.relief.transport != Transport::Lambert;
+    raised && scene.materials.iter().any(Material::has_relief)
+}
+
+pub(super) fn first_stage(scene: &Scene, settings: &Settings) -> Stage {
+    match raises(scene, settings) {
+        true => Stage::Flat,
+        false => Stage::First,
+    }
+}
+
+/// What a scene is lit by first; none where the bake itself is as quick.
+pub(super) fn first_light(scene: &Scene, settings: &Settings) -> Option<Settings> {
+    let preview = Quality::Preview.settings();
+    let coarser = preview.grouping.max_area > settings.grouping.max_area
+        && settings.estimator == Estimator::Receiver
+        && scene.triangles.len() >= MANY;
+    if coarser {
+        return Some(Settings {
+            residual: preview.residual.max(settings.residual),
+            budget: settings.budget,
+            shots: settings.shots,
+            seed: settings.seed,
+            // Near sources take a third of the time before the first picture.
+            nearness: Nearness::NONE,
+            ..flat(&preview)
+        });
+    }
+    raises(scene, settings).then(|| flat(settings))
+}
+
+/// The same without relief.
+pub(super) fn flat(settings: &Settings) -> Settings {
+    let mut settings = settings.clone();
+    settings.relief.transport = Transport::Lambert;
+    settings
+}

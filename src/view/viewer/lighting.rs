@@ -1,0 +1,110 @@
+//! What the user changes of the light: lamps, their history, the exposure, and how a scene is baked.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::Viewer;
+use crate::bake::quality::{self, Quality};
+use crate::error::Result;
+use crate::math::directions::Directions;
+use crate::solver::{Estimator, Settings};
+use crate::view::lamps::{Lamp, lit};
+use crate::view::orders::Order;
+
+impl Viewer {
+    /// Starts a new bake with the chosen directions and relief.
+    pub(in crate::view) fn bake(&mut self) {
+        self.settings = match self.wanted_settings() {
+            Ok(settings) => settings,
+            Err(error) => {
+                self.notes.warn(error.to_string());
+                return;
+            }
+        };
+        for (material, before) in self
+            .base
+            .materials
+            .iter()
+            .zip(Arc::make_mut(&mut self.scene).materials.iter_mut())
+        {
+            before.height_scale = material.height_scale * self.relief_scale as f32;
+        }
+        self.surfaces.set_about(&self.scene);
+        self.metering = true;
+        self.start_epoch();
+        self.baker.order(Order::Bake {
+            scene: Arc::clone(&self.scene),
+            settings: Box::new(self.settings.clone()),
+            epoch: self.epoch,
+        });
+    }
+
+    /// Relights the scene by the lamps as they are now, which can be undone.
+    pub(in crate::view) fn relight(&mut self) {
+        // What is moved is one edit, at its end.
+        if self.input.grabbed.is_none() && self.lamps != self.lit_lamps {
+            let before = self.lit_lamps.clone();
+            self.history.edited(before, Instant::now());
+        }
+        self.light_anew();
+    }
+
+    pub(super) fn undo(&mut self) {
+        match self.history.undo(&self.lamps) {
+            Some(before) => self.set_lamps(before),
+            None => self.say("nothing to undo".into()),
+        }
+    }
+
+    pub(super) fn redo(&mut self) {
+        match self.history.redo(&self.lamps) {
+            Some(after) => self.set_lamps(after),
+            None => self.say("nothing to redo".into()),
+        }
+    }
+
+    fn set_lamps(&mut self, lamps: Vec<Lamp>) {
+        self.lamps = lamps;
+        self.light_anew();
+    }
+
+    /// Exposes by the light as it is.
+    pub(super) fn meter(&mut self) {
+        self.metering = true;
+        self.metered = self.snapshot.exposure;
+        self.dirty = true;
+    }
+
+    pub(super) fn light_anew(&mut self) {
+        self.lit_lamps = self.lamps.clone();
+        self.metering = false;
+        self.scene = Arc::new(lit(&self.scene, &self.lamps));
+        self.surfaces.set_emission(&self.scene);
+        self.start_epoch();
+        self.edited = Some((self.epoch, Instant::now()));
+        self.baker.order(Order::Relight {
+            scene: Arc::clone(&self.scene),
+            epoch: self.epoch,
+        });
+    }
+
+    /// Those that were asked for, with what the panel has changed since.
+    fn wanted_settings(&self) -> Result<Settings> {
+        let first = &self.first_settings;
+        if self.paper && first.estimator != Estimator::Paper {
+            let paper = quality::paper(self.directions)?;
+            return Ok(Settings {
+                budget: first.budget,
+                shots: first.shots,
+                seed: first.seed,
+                ..paper
+            });
+        }
+        let mut settings = first.clone();
+        if !self.paper && first.estimator == Estimator::Paper {
+            settings = Quality::Normal.settings();
+        }
+        settings.relief.directions = Directions::new(self.directions)?;
+        Ok(settings)
+    }
+}
