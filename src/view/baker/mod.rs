@@ -186,7 +186,16 @@ impl Work {
             let done = match next {
                 Err(TryRecvError::Disconnected) => return,
                 Err(TryRecvError::Empty) => self.go_on(),
-                Ok(order) => self.obey(latest(order, orders)),
+                Ok(order) => {
+                    let order = latest(order, orders);
+                    // A light that is dragged is shown on its way, however fast orders come.
+                    let lights = matches!(order, Order::Relight { .. });
+                    let done = self.obey(order);
+                    match lights {
+                        true => done.and_then(|()| self.go_on()),
+                        false => done,
+                    }
+                }
             };
             if let Err(error) = done {
                 self.solving = None;
