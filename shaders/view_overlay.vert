@@ -1,4 +1,4 @@
-// A corner of a triangle, with what tells where in its triangle a fragment is.
+// A corner of a triangle, with barycentric coordinates for its fragments.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

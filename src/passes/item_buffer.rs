@@ -29,7 +29,7 @@ pub struct ItemBuffer {
 /// Distance of the near plane, internal units: nearer than any two surfaces that are not one.
 const NEAR: f32 = 1e-6;
 
-/// Pixels and occluders of a part of a submission, at most: some 0.1 s by lavapipe's two cores.
+/// Pixels and occluders of a part of a submission, at most: 0.1 to 0.3 s by lavapipe's two cores.
 const PART: u32 = 1 << 19;
 
 impl ItemBuffer {

@@ -1,6 +1,5 @@
 //! Views by the path tracer, on threads of the CPU, pass by pass for as long as a view stays.
 
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -35,13 +34,13 @@ pub struct Tracer {
 struct Shared {
     state: Mutex<State>,
     changed: Condvar,
-    /// Another picture is wanted, or none.
-    overtaken: AtomicBool,
 }
 
 #[derive(Default)]
 struct State {
     wanted: Option<Wanted>,
+    /// Number of requests so far: a new one stops the picture in progress.
+    asked: u64,
     traced: Option<Traced>,
     error: Option<Error>,
     closing: bool,
@@ -50,6 +49,11 @@ struct State {
 impl Shared {
     fn state(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
+    fn is_overtaken(&self, asked: u64) -> bool {
+        let state = self.state();
+        state.closing || state.asked != asked
     }
 }
 
@@ -66,8 +70,11 @@ impl Tracer {
 
     /// Replaces the wanted picture; None wants none.
     pub fn want(&self, wanted: Option<Wanted>) {
-        self.shared.state().wanted = wanted;
-        self.shared.overtaken.store(true, Ordering::SeqCst);
+        {
+            let mut state = self.shared.state();
+            state.asked += 1;
+            state.wanted = wanted;
+        }
         self.shared.changed.notify_all();
     }
 
@@ -85,7 +92,6 @@ impl Tracer {
 impl Drop for Tracer {
     fn drop(&mut self) {
         self.shared.state().closing = true;
-        self.shared.overtaken.store(true, Ordering::SeqCst);
         self.shared.changed.notify_all();
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
@@ -97,15 +103,14 @@ fn run(shared: &Shared, wake: &Wake) {
     // The scene with its relief as geometry.
     let mut ready: Option<(Arc<Scene>, Scene)> = None;
     loop {
-        let wanted = {
+        let (wanted, asked) = {
             let mut state = shared.state();
             loop {
                 if state.closing {
                     return;
                 }
                 if let Some(wanted) = state.wanted.take() {
-                    shared.overtaken.store(false, Ordering::SeqCst);
-                    break wanted;
+                    break (wanted, state.asked);
                 }
                 state = (shared.changed.wait(state)).unwrap_or_else(|e| e.into_inner());
             }
@@ -117,7 +122,7 @@ fn run(shared: &Shared, wake: &Wake) {
             false => geometry(scene).map(|fine| ready = Some((Arc::clone(scene), fine))),
         };
         let done = done.and_then(|()| match &ready {
-            Some((_, fine)) => trace(fine, &wanted, shared, wake),
+            Some((_, fine)) => trace(fine, (&wanted, asked), shared, wake),
             None => Ok(()),
         });
         if let Err(error) = done {
@@ -134,7 +139,12 @@ fn geometry(scene: &Scene) -> Result<Scene> {
     }
 }
 
-fn trace(scene: &Scene, wanted: &Wanted, shared: &Shared, wake: &Wake) -> Result<()> {
+fn trace(
+    scene: &Scene,
+    (wanted, asked): (&Wanted, u64),
+    shared: &Shared,
+    wake: &Wake,
+) -> Result<()> {
     let tracer = PathTracer::new(scene)?;
     let view = View {
         camera: &wanted.camera,
@@ -147,8 +157,7 @@ fn trace(scene: &Scene, wanted: &Wanted, shared: &Shared, wake: &Wake) -> Result
         ..Settings::default()
     };
     tracer.render(&view, &settings, |progress, film| {
-        let overtaken = || shared.overtaken.load(Ordering::SeqCst);
-        if overtaken() {
+        if shared.is_overtaken(asked) {
             return false;
         }
         let picture = film.picture();
@@ -165,7 +174,7 @@ fn trace(scene: &Scene, wanted: &Wanted, shared: &Shared, wake: &Wake) -> Result
             noise: film.relative_error(),
         });
         wake();
-        !overtaken()
+        !shared.is_overtaken(asked)
     })?;
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! Tells when the files of a scene have changed.
+//! Watches the files of a scene for changes.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -25,22 +25,22 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Calls `changed`, once, when one of the files has changed and stays so. None where there is no
-    /// file.
+    /// Calls `changed` each time that a file has changed and its new content is complete. None where
+    /// there is no file.
     pub fn new(files: Vec<PathBuf>, changed: Wake) -> Option<Self> {
         if files.is_empty() {
             return None;
         }
         let (stop, stopped) = channel();
         let thread = background("files", move || {
-            let first = times(&files);
-            let mut last = first.clone();
+            let mut known = times(&files);
+            let mut last = known.clone();
             while stopped.recv_timeout(EVERY) == Err(RecvTimeoutError::Timeout) {
                 let now = times(&files);
                 // Until it is written in full.
-                if now != first && now == last {
+                if now != known && now == last {
                     changed();
-                    return;
+                    known = now.clone();
                 }
                 last = now;
             }
@@ -119,10 +119,13 @@ mod tests {
             telling.recv_timeout(3 * EVERY).is_err(),
             "nothing has changed"
         );
-        std::fs::write(&path, "two").expect("written");
-        telling
-            .recv_timeout(Duration::from_secs(30))
-            .expect("it has changed");
+        // Also after a change that nobody could read.
+        for text in ["two", "three"] {
+            std::fs::write(&path, text).expect("written");
+            telling
+                .recv_timeout(Duration::from_secs(30))
+                .expect("it has changed");
+        }
         drop(watch);
     }
 

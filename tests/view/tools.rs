@@ -90,7 +90,7 @@ fn the_view_is_compared_to_itself() {
     }
 }
 
-/// The path tracer draws the same room, and the panel tells how far it is.
+/// The path tracer draws nearly the same picture.
 #[test]
 fn the_view_is_compared_to_the_path_tracer() {
     let room = Room::baked("relief");

@@ -81,7 +81,7 @@ impl Viewer {
     fn set_left(&mut self, left: Left) {
         self.part();
         self.left = Some(left);
-        // Both sides are drawn anew.
+        // Both sides are drawn again.
         self.pictures.wanted = None;
     }
 
