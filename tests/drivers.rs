@@ -2,7 +2,8 @@
 //! small texel buffers, no geometry shaders and no 64-bit atomics; and lavapipe of Debian 13.
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
+use std::time::Duration;
 
 use safetensors::SafeTensors;
 
@@ -92,8 +93,8 @@ impl Driver {
     }
 }
 
-/// Runs the program under the validation layer.
-fn run(folder: &Path, driver: Option<&Driver>, arguments: &str) -> String {
+/// The program under the validation layer.
+fn command(folder: &Path, driver: Option<&Driver>, arguments: &str) -> Command {
     let mut command = driver.map_or_else(
         || Command::new(env!("CARGO_BIN_EXE_mesolux")),
         Driver::command,
@@ -108,10 +109,22 @@ fn run(folder: &Path, driver: Option<&Driver>, arguments: &str) -> String {
         }
         _ => {}
     }
+    command
+}
+
+/// What the program says.
+fn run(folder: &Path, driver: Option<&Driver>, arguments: &str) -> String {
+    let told = told(command(folder, driver, arguments));
+    assert!(!told.contains("WARN"), "{told}");
+    told
+}
+
+/// What the program says, and of what it warns.
+fn told(mut command: Command) -> String {
     let done = command.output().expect("the program starts");
     let told = String::from_utf8_lossy(&done.stderr).into_owned();
     // A message of the validation layer ends it with an error.
-    assert!(done.status.success() && !told.contains("WARN"), "{told}");
+    assert!(done.status.success(), "{told}");
     told + &String::from_utf8_lossy(&done.stdout)
 }
 
@@ -191,4 +204,46 @@ fn other_drivers_give_the_same_light() {
 #[ignore = "long: runs by scripts/test --all"]
 fn other_drivers_give_the_same_light_on_relief() {
     same_light("cornell-relief", "--patches 8000 --source-area 0.05", true);
+}
+
+/// Rows of one driver are nothing to go on from for another.
+#[test]
+#[ignore = "long: runs by scripts/test --all"]
+fn a_checkpoint_of_another_driver_is_not_used() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let bake = "bake cornell --patches 2000 --hemicube 64 --no-cache";
+    let killed = || {
+        let begun = format!("{bake} --checkpoint 0.05 -o killed.safetensors");
+        let mut begun = command(folder, None, &begun);
+        let begun = begun.stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+        let mut begun = begun.expect("the program starts");
+        while !folder.join("killed.checkpoint/0000.rows").is_file() {
+            let ended = begun.try_wait().expect("it runs");
+            assert!(ended.is_none(), "it ends before its first checkpoint");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let _ = begun.kill();
+        let _ = begun.wait();
+    };
+    let goes_on = |driver: Option<&Driver>| {
+        let same = format!("{bake} -o killed.safetensors");
+        let told = told(command(folder, driver, &same));
+        assert!(!folder.join("killed.checkpoint").exists());
+        told
+    };
+
+    killed();
+    let ours = goes_on(None);
+    assert!(ours.contains("goes on from killed.checkpoint"), "{ours}");
+    killed();
+    let swiftshader = swiftshader();
+    let theirs = goes_on(Some(&swiftshader));
+    assert!(theirs.contains("another device"), "{theirs}");
+    assert!(!theirs.contains("goes on from"), "{theirs}");
+    let anew = format!("{bake} --checkpoint 0 -o anew.safetensors");
+    run(folder, Some(&swiftshader), &anew);
+    let lights =
+        ["killed", "anew"].map(|name| light(&folder.join(name).with_extension("safetensors")));
+    assert!(lights[0].irradiance == lights[1].irradiance);
 }

@@ -7,6 +7,7 @@
 //! The form factors here have their own visibility, by rays to each part.
 
 mod emitters;
+mod far;
 mod lists;
 mod pair;
 mod parts;

@@ -156,7 +156,7 @@ impl Journal {
         let part = Part::read(path, size)?;
         let header = &part.header;
         if header.key != self.key {
-            let what = "of another scene, other settings or another program";
+            let what = "of another scene, other settings, another device or another program";
             return Err(bad(what));
         }
         let fits = header.chunk_words == kept.chunk_words && header.chunks == kept.chunk_count();
