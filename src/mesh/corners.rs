@@ -106,81 +106,90 @@ pub enum Joined {
     Plane,
 }
 
-/// Means at each corner of what triangles of its smooth surface have, `[triangle][corner]`, by their
-/// angles there.
-pub fn corner_means<const N: usize>(scene: &Scene, values: &[[Vec3; N]]) -> Vec<[[Vec3; N]; 3]> {
-    let corners = Corners::new(scene);
-    let triangles = scene.triangles.par_iter().enumerate();
-    let mean = |e: usize, vertex: u32| {
-        let (mut sum, mut weight) = ([DVec3::ZERO; N], 0.0);
-        for (other, angle) in corners.smooth(e, vertex) {
-            for (sum, value) in sum.iter_mut().zip(values[other]) {
-                *sum += value.as_dvec3() * angle;
-            }
-            weight += angle;
-        }
-        match weight > 0.0 {
-            true => sum.map(|sum| (sum / weight).as_vec3()),
-            false => values[e],
-        }
-    };
-    triangles
-        .map(|(e, triangle)| triangle.vertices.map(|v| mean(e, v)))
-        .collect()
-}
-
-/// Irradiance at each corner, `[triangle][corner]`, W·m⁻², RGB. Linear between the corners and
-/// continuous where triangles are joined, it has nearly the means of the triangles: the mean of the
-/// triangles about a corner, and of what that mean leaves of theirs (one step of Landweber's
-/// iteration), no brighter or darker than they are.
-pub fn corner_irradiance(scene: &Scene, irradiance: &[Vec3], joined: Joined) -> Vec<[Vec3; 3]> {
-    let corners = Corners::new(scene);
-    let cosine = match joined {
-        Joined::Smooth => CREASE_COS,
-        Joined::Plane => PLANE_COS,
-    };
-    let each = |find: &(dyn Fn(usize, u32) -> Vec3 + Sync)| -> Vec<[Vec3; 3]> {
+impl Corners {
+    /// Means at each corner of what triangles of its smooth surface have, `[triangle][corner]`, by their
+    /// angles there.
+    pub fn means<const N: usize>(
+        &self,
+        scene: &Scene,
+        values: &[[Vec3; N]],
+    ) -> Vec<[[Vec3; N]; 3]> {
         let triangles = scene.triangles.par_iter().enumerate();
-        triangles
-            .map(|(e, triangle)| triangle.vertices.map(|v| find(e, v)))
-            .collect()
-    };
-    let brightness = |e: usize| irradiance[e].max_element();
-    // What is covered is no part of the surface beside it.
-    let about = |e: usize, vertex: u32| {
-        let all = || corners.within(e, vertex, cosine);
-        let brightest = all()
-            .map(|(other, _)| brightness(other))
-            .fold(0.0, f32::max);
-        let alike = move |&(other, _): &(usize, f64)| match joined {
-            Joined::Smooth => brightness(other) >= LEAST_OPEN * brightest,
-            Joined::Plane => {
-                let (one, other) = (brightness(e), brightness(other));
-                one.min(other) >= LEAST_ALIKE * one.max(other)
+        let mean = |e: usize, vertex: u32| {
+            let (mut sum, mut weight) = ([DVec3::ZERO; N], 0.0);
+            for (other, angle) in self.smooth(e, vertex) {
+                for (sum, value) in sum.iter_mut().zip(values[other]) {
+                    *sum += value.as_dvec3() * angle;
+                }
+                weight += angle;
+            }
+            match weight > 0.0 {
+                true => sum.map(|sum| (sum / weight).as_vec3()),
+                false => values[e],
             }
         };
-        all().filter(alike)
-    };
-    let mean = |values: &[Vec3], e: usize, vertex: u32| -> Vec3 {
-        let (mut sum, mut weight) = (DVec3::ZERO, 0.0);
-        for (other, angle) in about(e, vertex) {
-            sum += values[other].as_dvec3() * angle;
-            weight += angle;
-        }
-        match weight > 0.0 {
-            true => (sum / weight).as_vec3(),
-            false => values[e],
-        }
-    };
-    let means = each(&|e, vertex| mean(irradiance, e, vertex));
-    let left: Vec<Vec3> = (irradiance.iter().zip(&means))
-        .map(|(whole, [a, b, c])| whole - (a + b + c) / 3.0)
-        .collect();
-    each(&|e, vertex| {
-        let values = || about(e, vertex).map(|(other, _)| irradiance[other]);
-        let low = values().fold(Vec3::INFINITY, Vec3::min);
-        let high = values().fold(Vec3::NEG_INFINITY, Vec3::max);
-        let found = mean(irradiance, e, vertex) + mean(&left, e, vertex);
-        found.clamp(low, high)
-    })
+        triangles
+            .map(|(e, triangle)| triangle.vertices.map(|v| mean(e, v)))
+            .collect()
+    }
+
+    /// Irradiance at each corner, `[triangle][corner]`, W·m⁻², RGB. Linear between the corners and
+    /// continuous where triangles are joined, it has nearly the means of the triangles: the mean of the
+    /// triangles about a corner, and of what that mean leaves of theirs (one step of Landweber's
+    /// iteration), no brighter or darker than they are.
+    pub fn irradiance(&self, scene: &Scene, irradiance: &[Vec3], joined: Joined) -> Vec<[Vec3; 3]> {
+        let cosine = match joined {
+            Joined::Smooth => CREASE_COS,
+            Joined::Plane => PLANE_COS,
+        };
+        let each = |find: &(dyn Fn(usize, u32) -> Vec3 + Sync)| -> Vec<[Vec3; 3]> {
+            let triangles = scene.triangles.par_iter().enumerate();
+            triangles
+                .map(|(e, triangle)| triangle.vertices.map(|v| find(e, v)))
+                .collect()
+        };
+        let brightness = |e: usize| irradiance[e].max_element();
+        // What is covered is no part of the surface beside it.
+        let about = |e: usize, vertex: u32| {
+            let all = || self.within(e, vertex, cosine);
+            let brightest = all()
+                .map(|(other, _)| brightness(other))
+                .fold(0.0, f32::max);
+            let alike = move |&(other, _): &(usize, f64)| match joined {
+                Joined::Smooth => brightness(other) >= LEAST_OPEN * brightest,
+                Joined::Plane => {
+                    let (one, other) = (brightness(e), brightness(other));
+                    one.min(other) >= LEAST_ALIKE * one.max(other)
+                }
+            };
+            all().filter(alike)
+        };
+        let mean = |values: &[Vec3], e: usize, vertex: u32| -> Vec3 {
+            let (mut sum, mut weight) = (DVec3::ZERO, 0.0);
+            for (other, angle) in about(e, vertex) {
+                sum += values[other].as_dvec3() * angle;
+                weight += angle;
+            }
+            match weight > 0.0 {
+                true => (sum / weight).as_vec3(),
+                false => values[e],
+            }
+        };
+        let means = each(&|e, vertex| mean(irradiance, e, vertex));
+        let left: Vec<Vec3> = (irradiance.iter().zip(&means))
+            .map(|(whole, [a, b, c])| whole - (a + b + c) / 3.0)
+            .collect();
+        each(&|e, vertex| {
+            let values = || about(e, vertex).map(|(other, _)| irradiance[other]);
+            let low = values().fold(Vec3::INFINITY, Vec3::min);
+            let high = values().fold(Vec3::NEG_INFINITY, Vec3::max);
+            let found = mean(irradiance, e, vertex) + mean(&left, e, vertex);
+            found.clamp(low, high)
+        })
+    }
+}
+
+/// [`Corners::irradiance`] of a scene's own corners.
+pub fn corner_irradiance(scene: &Scene, irradiance: &[Vec3], joined: Joined) -> Vec<[Vec3; 3]> {
+    Corners::new(scene).irradiance(scene, irradiance, joined)
 }

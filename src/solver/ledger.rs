@@ -345,6 +345,31 @@ impl Ledger {
         })
     }
 
+    /// Whether a source emits that is neither drawn nor under way.
+    pub fn lacks_emitters(&self) -> bool {
+        let waits = |(s, drawn): (usize, &Drawn)| {
+            !self.system.is_drawn(s) && !drawn.under_way && self.system.unshot_power(s).1 > 0.0
+        };
+        self.sources.iter().enumerate().any(waits)
+    }
+
+    /// As [`Self::send`], but only what a source emits as direct light.
+    pub fn send_emitted(&mut self, s: usize, row: KeptRow) -> Option<LitRow> {
+        let (emitted, _) = self.owed(s);
+        let drawn = &mut self.sources[s];
+        if emitted == Vec3::ZERO || drawn.is_sky {
+            return None;
+        }
+        drawn.scale = Some(row.scale);
+        drawn.emission_gathered = true;
+        Some(LitRow {
+            row,
+            source: s as u32,
+            emitted,
+            reflected: Vec3::ZERO,
+        })
+    }
+
     /// What sources without rows owe to the elements, by source and colour, with its first bounce:
     /// it is in no element's light yet, though the system takes it for shot.
     fn owed_by_loose(&self) -> impl Iterator<Item = (usize, DVec3)> {

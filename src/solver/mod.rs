@@ -212,6 +212,40 @@ impl Solver {
         self.gather()
     }
 
+    /// Brings to the elements the direct light alone, but for the sky's: much sooner than
+    /// [`Self::turn`] solves all of it after [`Self::relight`]. Parts of near emitters count evenly
+    /// until then. The paper's method brings nothing.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn gather_emitted(&mut self) -> Result<()> {
+        let start = Instant::now();
+        if let Method::Rows(spine) = &mut self.method {
+            spine.bring_emitted(&self.problem, &mut self.report)?;
+            self.report.unshot_share = self.bound.share(spine.ledger.unshot());
+            self.report.error_bound = self.bound.of(spine.ledger.missing());
+        }
+        self.report.seconds.solve_wall += start.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    /// Brings to the elements what coupling makes of the light of the sources that are drawn: nearly
+    /// all of it after [`Self::relight`], sooner than [`Self::turn`] draws and measures what is left.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn gather_coupled(&mut self) -> Result<()> {
+        let start = Instant::now();
+        if let Method::Rows(spine) = &mut self.method {
+            spine.carry(&self.problem, &mut self.report);
+            let _moved = spine.bring(&self.problem, false, &mut self.report)?;
+            self.report.unshot_share = self.bound.share(spine.ledger.unshot());
+            self.report.error_bound = self.bound.of(spine.ledger.missing());
+        }
+        self.report.seconds.solve_wall += start.elapsed().as_secs_f64();
+        Ok(())
+    }
+
     /// Brings to the elements what has been solved by [`Self::turn`].
     pub fn gather(&mut self) -> Result<()> {
         let start = Instant::now();

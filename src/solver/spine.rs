@@ -266,16 +266,7 @@ impl Spine {
         }
         loop {
             while let Some(batch) = self.choose(on, phase, report)? {
-                for &source in &batch.sources {
-                    self.ledger.sources[source as usize].under_way = true;
-                }
-                let recorded = match &mut self.journal {
-                    Some(journal) => journal.next(&batch)?,
-                    None => None,
-                };
-                if let Some(team) = &mut self.team {
-                    team.submit(batch, recorded, &self.kept)?;
-                }
+                self.submit(batch)?;
             }
             if !self.take(on, phase, report)? {
                 return Ok(watch.stop.is_none());
@@ -287,6 +278,20 @@ impl Spine {
                 self.write_checkpoint(watch.stop == Some(StopReason::Interrupted))?;
                 return Ok(false);
             }
+        }
+    }
+
+    fn submit(&mut self, batch: Batch) -> Result<()> {
+        for &source in &batch.sources {
+            self.ledger.sources[source as usize].under_way = true;
+        }
+        let recorded = match &mut self.journal {
+            Some(journal) => journal.next(&batch)?,
+            None => None,
+        };
+        match &mut self.team {
+            Some(team) => team.submit(batch, recorded, &self.kept),
+            None => Ok(()),
         }
     }
 
@@ -408,8 +413,8 @@ impl Spine {
         report.seconds.solve += start.elapsed().as_secs_f64();
     }
 
-    /// Lets rows carry what undrawn sources send, and solves.
-    fn carry(&mut self, on: &Problem, report: &mut Report) {
+    /// Lets rows carry what undrawn sources send, and solves by coupling.
+    pub fn carry(&mut self, on: &Problem, report: &mut Report) {
         let start = Instant::now();
         if on.settings.carries {
             self.ledger.carry(on);

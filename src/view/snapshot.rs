@@ -3,12 +3,13 @@
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use crate::bake::solution::{Bake, DirectionalLight, Solution};
 use crate::error::Result;
-use crate::mesh::corners::corner_means;
+use crate::mesh::corners::Corners;
 use crate::picture::exposure_by_area;
-use crate::render::{Joined, Lighting, corner_irradiance, tone};
+use crate::render::{Joined, Lighting, tone};
 use crate::scene::{Scene, Triangle};
 use crate::solver::{Ambient, Solver, StopReason, Update};
 
@@ -36,13 +37,15 @@ pub struct Snapshot {
     pub slanted: Option<Slanted>,
     /// What has not been shot, spread evenly.
     pub ambient: Ambient,
+    /// What surfaces reflect is still of the light before.
+    pub lags: bool,
     /// Stops by which the light is exposed if nobody asks otherwise.
     pub exposure: f32,
     pub progress: Progress,
 }
 
 /// How light on relief depends on its slope, at the corners, `[triangle][corner]`, smoothed as
-/// [`corner_means`] does; zero on triangles without relief.
+/// [`Corners::means`] does; zero on triangles without relief.
 ///
 /// On a normal n that is no unit vector, F(n) = Σ max(0, n · m) over the moments m of the slots; a
 /// normal tilted by a slope s along the surface is n = N + s, and its irradiance F(n) / |n|.
@@ -59,15 +62,17 @@ pub type Slant = [Vec3; 4];
 const TILT: f32 = 0.7;
 
 impl Slanted {
-    fn new(scene: &Scene, light: &DirectionalLight) -> Self {
+    fn new(scene: &Scene, about: &Corners, light: &DirectionalLight) -> Self {
         let slots = light.directions.len();
         let corners = |moments: &[[Vec3; 3]]| {
+            let found: Vec<Slant> = (moments.par_chunks_exact(slots).zip(&light.frames))
+                .map(|(moments, frame)| slant(moments, frame))
+                .collect();
             let mut slants = vec![[Vec3::ZERO; 4]; scene.triangles.len()];
-            let of_elements = moments.chunks_exact(slots).zip(&light.frames);
-            for ((moments, frame), &e) in of_elements.zip(&light.elements) {
-                slants[e as usize] = slant(moments, frame);
+            for (found, &e) in found.into_iter().zip(&light.elements) {
+                slants[e as usize] = found;
             }
-            corner_means(scene, &slants)
+            about.means(scene, &slants)
         };
         Self {
             all: corners(&light.incident_moment),
@@ -99,6 +104,7 @@ impl Snapshot {
     fn new(
         epoch: u64,
         scene: &Arc<Scene>,
+        about: &Corners,
         (irradiance, direct): (Vec<Vec3>, Vec<Vec3>),
         relief: Option<DirectionalLight>,
         ambient: Ambient,
@@ -106,26 +112,30 @@ impl Snapshot {
     ) -> Self {
         Self {
             epoch,
-            corners: corner_irradiance(scene, &irradiance, Joined::Smooth),
-            corners_direct: corner_irradiance(scene, &direct, Joined::Smooth),
+            corners: about.irradiance(scene, &irradiance, Joined::Smooth),
+            corners_direct: about.irradiance(scene, &direct, Joined::Smooth),
             exposure: exposure(scene, &irradiance, ambient.irradiance),
-            slanted: relief.as_ref().map(|light| Slanted::new(scene, light)),
+            slanted: relief
+                .as_ref()
+                .map(|light| Slanted::new(scene, about, light)),
             scene: Arc::clone(scene),
             irradiance,
             direct,
             relief,
             ambient,
+            lags: false,
             progress,
         }
     }
 
-    /// What a solver has found.
+    /// What a solver has found. `about` are the corners of the scene.
     ///
     /// # Errors
     /// A device that fails.
     pub fn of_solver(
         epoch: u64,
         scene: &Arc<Scene>,
+        about: &Corners,
         solver: &Solver,
         progress: Progress,
     ) -> Result<Self> {
@@ -138,7 +148,60 @@ impl Snapshot {
             ..
         } = Solution::new(scene, &solver.problem.elements, &solver.light()?, report);
         let light = (irradiance, irradiance_direct);
-        Ok(Self::new(epoch, scene, light, relief, ambient, progress))
+        Ok(Self::new(
+            epoch, scene, about, light, relief, ambient, progress,
+        ))
+    }
+
+    /// The direct light that a solver has brought, with what surfaces reflected `before`; none where
+    /// that was of other elements.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn of_emitted(
+        (epoch, scene, progress): (u64, &Arc<Scene>, Progress),
+        about: &Corners,
+        solver: &Solver,
+        before: &Self,
+    ) -> Result<Option<Self>> {
+        let report = solver.report().clone();
+        let Solution {
+            irradiance_direct: direct,
+            relief,
+            ..
+        } = Solution::new(scene, &solver.problem.elements, &solver.light()?, report);
+        let [of, of_before] = [&relief, &before.relief].map(|relief| {
+            let relief = relief.as_ref();
+            relief.map(|relief| (&relief.elements, relief.directions.len()))
+        });
+        if of != of_before || direct.len() != before.direct.len() {
+            return Ok(None);
+        }
+        let and_reflected = |direct: Vec3, all: Vec3, direct_before: Vec3| {
+            // What rounding leaves below none is none.
+            direct + (all - direct_before).max(Vec3::ZERO)
+        };
+        let irradiance = (direct.iter().zip(&before.irradiance).zip(&before.direct))
+            .map(|((&direct, &all), &of_it)| and_reflected(direct, all, of_it))
+            .collect();
+        let relief = relief.zip(before.relief.as_ref()).map(|(now, before)| {
+            let moments = (now.incident_moment_direct.par_iter())
+                .zip(&before.incident_moment)
+                .zip(&before.incident_moment_direct)
+                .map(|((direct, all), of_it)| {
+                    std::array::from_fn(|colour| direct[colour] + all[colour] - of_it[colour])
+                });
+            DirectionalLight {
+                incident_moment: moments.collect(),
+                ..now
+            }
+        });
+        let light = (irradiance, direct);
+        let ambient = before.ambient;
+        Ok(Some(Self {
+            lags: true,
+            ..Self::new(epoch, scene, about, light, relief, ambient, progress)
+        }))
     }
 
     /// What a bake holds.
@@ -148,7 +211,9 @@ impl Snapshot {
             ..Progress::default()
         };
         let light = (bake.irradiance, bake.irradiance_direct);
-        Self::new(0, scene, light, bake.relief, Ambient::default(), progress)
+        let about = Corners::new(scene);
+        let ambient = Ambient::default();
+        Self::new(0, scene, &about, light, bake.relief, ambient, progress)
     }
 
     /// What is shown before any light is known: shapes and colours, as on a drawing table, brighter
@@ -163,7 +228,8 @@ impl Snapshot {
         let even: Vec<_> = scene.triangles.iter().map(shade).collect();
         let progress = Progress::default();
         let light = (even.clone(), even);
-        Self::new(0, scene, light, None, Ambient::default(), progress)
+        let about = Corners::new(scene);
+        Self::new(0, scene, &about, light, None, Ambient::default(), progress)
     }
 
     /// The light as pictures show it; `irradiance` stands in place of this one's own.

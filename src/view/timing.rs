@@ -11,7 +11,9 @@ pub struct Timing {
     idle: Vec<f64>,
     /// From an input to the end of the first frame that could show its effect.
     answers: Vec<f64>,
-    /// From a change of the lights to the end of the first frame that shows its light.
+    /// From a change of the lights to the end of the first frame that shows what they emit, and of
+    /// the first that shows all of their light.
+    relit_direct: Vec<f64>,
     relit: Vec<f64>,
     /// From the start of the program to the end of the first frame that shows light.
     first_light: Option<f64>,
@@ -34,6 +36,10 @@ impl Timing {
 
     pub fn answer(&mut self, since: Instant) {
         self.answers.push(since.elapsed().as_secs_f64());
+    }
+
+    pub fn relit_direct(&mut self, since: Instant) {
+        self.relit_direct.push(since.elapsed().as_secs_f64());
     }
 
     pub fn relit(&mut self, since: Instant) {
@@ -78,8 +84,12 @@ impl Timing {
                 self.answers.len()
             ));
         }
-        for seconds in &self.relit {
-            lines.push(format!("lights changed on the screen after {seconds:.2} s"));
+        for (what, times) in [
+            ("direct light of changed lights", &self.relit_direct),
+            ("all light of changed lights", &self.relit),
+        ] {
+            let line = |seconds: &f64| format!("{what} on the screen after {seconds:.2} s");
+            lines.extend(times.iter().map(line));
         }
         lines
     }

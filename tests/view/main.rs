@@ -434,7 +434,8 @@ fn relights_what_was_baked() {
     );
     let text = view(room.path(), "room.safetensors", &script);
     assert_eq!(
-        text.matches("lights changed on the screen after").count(),
+        text.matches("all light of changed lights on the screen after")
+            .count(),
         3,
         "{text}"
     );

@@ -80,6 +80,13 @@ impl DirectionalLight {
         let input = |m: usize| elements.input_index[light.elements[m] as usize];
         order.sort_by_key(|&m| input(m));
         let slots = |m: usize| m * k..(m + 1) * k;
+        let moments = |of: &[[Vec3; 3]]| {
+            let mut ordered = Vec::with_capacity(of.len());
+            order
+                .iter()
+                .for_each(|&m| ordered.extend_from_slice(&of[slots(m)]));
+            ordered
+        };
         Self {
             elements: order.iter().map(|&m| input(m)).collect(),
             directions: (0..k).map(|slot| kept.centre(slot)).collect(),
@@ -94,14 +101,8 @@ impl DirectionalLight {
                     ]
                 })
                 .collect(),
-            incident_moment: order
-                .iter()
-                .flat_map(|&m| light.moments[slots(m)].to_vec())
-                .collect(),
-            incident_moment_direct: order
-                .iter()
-                .flat_map(|&m| light.moments_direct[slots(m)].to_vec())
-                .collect(),
+            incident_moment: moments(&light.moments),
+            incident_moment_direct: moments(&light.moments_direct),
             exitant: order
                 .iter()
                 .flat_map(|&m| in_slots(relief, &kept, light.sent(relief, m)))

@@ -4,9 +4,10 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use super::{MOST_SWEEPS, Spine, UNSOLVED};
+use super::{MOST_SWEEPS, Phase, Spine, UNSOLVED};
 use crate::error::Result;
 use crate::mesh::sources::Source;
+use crate::solver::gather::LitRow;
 use crate::solver::{Problem, Report};
 
 /// What a last sweep over near sources may change of an element's light, over the mean of all, as a
@@ -39,6 +40,30 @@ impl Spine {
         report.seconds.near += start.elapsed().as_secs_f64();
         report.near.sweeps = self.near.sweeps;
         Ok(moved)
+    }
+
+    /// Brings the elements what sources emit, after drawing those that were not, and nothing of what
+    /// surfaces reflect. A near source sends evenly until its parts are solved.
+    pub fn bring_emitted(&mut self, on: &Problem, report: &mut Report) -> Result<()> {
+        self.ledger.system.release();
+        loop {
+            while self.ledger.lacks_emitters() {
+                let Some(batch) = self.choose(on, Phase::First, report)? else {
+                    break;
+                };
+                self.submit(batch)?;
+            }
+            if !self.take(on, Phase::First, report)? {
+                break;
+            }
+        }
+        let rows: Vec<LitRow> = (0..self.ledger.sources.len())
+            .filter_map(|s| {
+                let row = self.ledger.sources[s].row?;
+                self.ledger.send_emitted(s, row)
+            })
+            .collect();
+        self.gather(&rows, report)
     }
 
     /// What the sources reflect of light from near ones, `[source]`.

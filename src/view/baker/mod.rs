@@ -5,6 +5,7 @@
 //! ```
 
 mod first_light;
+mod relighting;
 mod saves;
 
 use std::path::PathBuf;
@@ -18,11 +19,13 @@ use super::orders::{Given, Latest, Order, Stage};
 use super::snapshot::{Progress, Snapshot, is_done};
 use super::{DeviceChoice, Wake};
 use crate::bake;
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::mesh::corners::Corners;
 use crate::mesh::elements::Elements;
 use crate::scene::Scene;
 use crate::solver::{Settings, Solver, Update, Visibility};
 use first_light::{first_light, first_stage, flat, raises};
+use relighting::Relit;
 pub use saves::Saves;
 use saves::Saving;
 
@@ -71,6 +74,7 @@ impl Baker {
             saves,
             solving: None,
             looked_at: None,
+            shown: None,
         };
         Self {
             orders: Some(orders),
@@ -149,11 +153,15 @@ struct Work {
     solving: Option<Solving>,
     /// Of a bake from a file: its sources, which nobody solves.
     looked_at: Option<Solver>,
+    /// The last light that was found.
+    shown: Option<Arc<Snapshot>>,
 }
 
 /// A bake under way or done.
 struct Solving {
     scene: Arc<Scene>,
+    /// Of the scene.
+    corners: Arc<Corners>,
     solver: Solver,
     epoch: u64,
     start: Instant,
@@ -162,6 +170,8 @@ struct Solving {
     done: bool,
     /// A first light, after which the bake begins that was asked for.
     first: bool,
+    /// After its lights were changed: what is shown next.
+    relit: Option<Relit>,
     /// Share of unshot light from which on there is more to be seen than before this was begun.
     shown_from: f64,
 }
@@ -213,7 +223,7 @@ impl Work {
                 epoch,
             } => {
                 // Frees its memory before the new one asks for more.
-                (self.solving, self.looked_at) = (None, None);
+                (self.solving, self.looked_at, self.shown) = (None, None, None);
                 self.given = Given {
                     scene: Arc::clone(&scene),
                     settings: (*settings).clone(),
@@ -274,7 +284,7 @@ impl Work {
             let elements = Elements::new(&scene);
             let solver = Solver::new(&device, elements, lights, &quick)?;
             let stage = first_stage(&scene, settings);
-            self.start(scene, solver, epoch);
+            self.start(scene, solver, epoch, None);
             if let Some(solving) = &mut self.solving {
                 solving.first = true;
             }
@@ -283,7 +293,7 @@ impl Work {
         }
         let elements = bake::elements(&device, &scene, settings)?;
         let solver = Solver::new(&device, elements, lights, settings)?;
-        self.start(scene, solver, epoch);
+        self.start(scene, solver, epoch, None);
         Ok(())
     }
 
@@ -293,7 +303,12 @@ impl Work {
             return Ok(());
         };
         let unshot = first.solver.report().unshot_share;
-        let Solving { scene, epoch, .. } = first;
+        let Solving {
+            scene,
+            corners,
+            epoch,
+            ..
+        } = first;
         let settings = self.given.settings.clone();
         self.tell(
             epoch,
@@ -306,20 +321,29 @@ impl Work {
         let elements = bake::elements(&device, &scene, &settings)?;
         let lights = &scene.lights;
         let solver = Solver::new(&device, elements, lights, &settings)?;
-        self.start(scene, solver, epoch);
+        self.start(scene, solver, epoch, Some(corners));
         if let Some(solving) = &mut self.solving {
             solving.shown_from = unshot;
         }
         Ok(())
     }
 
-    fn start(&mut self, scene: Arc<Scene>, solver: Solver, epoch: u64) {
+    /// `corners` are those of the scene, where they are known.
+    fn start(
+        &mut self,
+        scene: Arc<Scene>,
+        solver: Solver,
+        epoch: u64,
+        corners: Option<Arc<Corners>>,
+    ) {
         self.shared.latest().sources = Some(solver.source_of_triangles());
         self.tell(epoch, None);
         self.looked_at = None;
         self.solving = Some(Solving {
             budget: self.given.settings.budget.unwrap_or(Duration::MAX),
             first: false,
+            relit: None,
+            corners: corners.unwrap_or_else(|| Arc::new(Corners::new(&scene))),
             shown_from: f64::INFINITY,
             scene,
             solver,
@@ -330,42 +354,22 @@ impl Work {
         });
     }
 
-    /// By what has been drawn, or what a file has kept; where there is nothing, or another source
-    /// emits than did, from nothing.
-    fn relight(&mut self, scene: Arc<Scene>, epoch: u64) -> Result<()> {
-        if let Some(mut before) = self.solving.take() {
-            match before.solver.relight(&scene) {
-                Ok(()) => {
-                    let stage = first_stage(&scene, &self.given.settings);
-                    self.start(scene, before.solver, epoch);
-                    if let Some(solving) = self.solving.as_mut().filter(|_| before.first) {
-                        solving.first = true;
-                        self.tell(epoch, Some(stage));
-                    }
-                    return Ok(());
-                }
-                // What was black and now emits has no source.
-                Err(Error::Usage(_)) => {}
-                Err(error) => return Err(error),
-            }
+    fn show(&mut self, epoch: u64, progress: Progress, snapshot: Snapshot) {
+        let snapshot = Arc::new(snapshot);
+        self.shown = Some(Arc::clone(&snapshot));
+        {
+            let mut latest = self.shared.latest();
+            latest.progress = Some((epoch, progress));
+            latest.snapshot = Some(snapshot);
         }
-        let settings = self.given.settings.clone();
-        let kept = self.kept.as_ref();
-        let Some(kept) = kept.filter(|kept| kept.check(&scene, &settings).is_ok()) else {
-            return self.bake(scene, &settings, epoch);
-        };
-        let device = self.choice.open_baking()?;
-        let elements = bake::elements(&device, &scene, &settings)?;
-        match Solver::relit(&device, elements, &scene.lights, &settings, kept) {
-            Ok(solver) => self.start(scene, solver, epoch),
-            Err(Error::Usage(_)) => return self.bake(scene, &settings, epoch),
-            Err(error) => return Err(error),
-        }
-        Ok(())
+        (self.wake)();
     }
 
     /// Solves until the next snapshot is due, and makes it.
     fn go_on(&mut self) -> Result<()> {
+        if self.show_relit()? {
+            return Ok(());
+        }
         let Some(solving) = &mut self.solving else {
             return Ok(());
         };
@@ -417,18 +421,13 @@ impl Work {
         let solved = Instant::now();
         solving.solver.gather()?;
         let (scene, solver) = (&solving.scene, &solving.solver);
-        let snapshot = Snapshot::of_solver(epoch, scene, solver, progress)?;
+        let snapshot = Snapshot::of_solver(epoch, scene, &solving.corners, solver, progress)?;
         let cost = solved.elapsed();
         // The first snapshot is there after one batch; later ones come less and less often.
         let [shortest, longest] = SLICES;
         let fair = (cost * SHARE).max(2 * slice).clamp(shortest, longest);
         solving.slice = fair.max(cost);
-        {
-            let mut latest = shared.latest();
-            latest.progress = Some((epoch, progress));
-            latest.snapshot = Some(Arc::new(snapshot));
-        }
-        (self.wake)();
+        self.show(epoch, progress, snapshot);
         Ok(())
     }
 }

@@ -231,14 +231,7 @@ impl Viewer {
         if let Some(since) = unanswered {
             self.timing.answer(since);
         }
-        if let Some((epoch, since)) = self.edited
-            && self.snapshot.epoch >= epoch
-        {
-            self.timing.relit(since);
-            let seconds = since.elapsed().as_secs_f64();
-            self.say(format!("lit anew after {seconds:.2} s"));
-            self.edited = None;
-        }
+        self.note_edited();
         if self.is_lit() {
             self.timing.first_light(self.start);
         }

@@ -11,6 +11,14 @@ use crate::solver::{Estimator, Settings};
 use crate::view::lamps::{Lamp, lit};
 use crate::view::orders::Order;
 
+/// Changed lights that are not all shown yet.
+pub(in crate::view) struct Edited {
+    epoch: u64,
+    since: Instant,
+    /// Whether what they emit is shown.
+    shown_direct: bool,
+}
+
 impl Viewer {
     /// Starts a new bake with the chosen directions and relief.
     pub(in crate::view) fn bake(&mut self) {
@@ -81,11 +89,33 @@ impl Viewer {
         self.scene = Arc::new(lit(&self.scene, &self.lamps));
         self.surfaces.set_emission(&self.scene);
         self.start_epoch();
-        self.edited = Some((self.epoch, Instant::now()));
+        self.edited = Some(Edited {
+            epoch: self.epoch,
+            since: Instant::now(),
+            shown_direct: false,
+        });
         self.baker.order(Order::Relight {
             scene: Arc::clone(&self.scene),
             epoch: self.epoch,
         });
+    }
+
+    /// Notes when changed lights are on the screen.
+    pub(super) fn note_edited(&mut self) {
+        let shown = |edited: &&mut Edited| self.snapshot.epoch >= edited.epoch;
+        let Some(edited) = self.edited.as_mut().filter(shown) else {
+            return;
+        };
+        let since = edited.since;
+        if !std::mem::replace(&mut edited.shown_direct, true) {
+            self.timing.relit_direct(since);
+        }
+        if !self.snapshot.lags {
+            self.timing.relit(since);
+            let seconds = since.elapsed().as_secs_f64();
+            self.say(format!("lit anew after {seconds:.2} s"));
+            self.edited = None;
+        }
     }
 
     /// Those that were asked for, with what the panel has changed since.

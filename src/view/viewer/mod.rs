@@ -43,6 +43,7 @@ use crate::scene::{Camera, Scene};
 use crate::solver::{Estimator, Settings};
 use files::Files;
 use input::Input;
+use lighting::Edited;
 use overlays::Overlays;
 use pictures::Pictures;
 
@@ -120,8 +121,7 @@ pub struct Viewer {
     /// When the panel asks to be redrawn.
     repaint: Option<Instant>,
     pub(super) dirty: bool,
-    /// Epoch of changed lights that are not shown yet, and when they were changed.
-    pub(super) edited: Option<(u64, Instant)>,
+    pub(super) edited: Option<Edited>,
     /// Time of the first input that no frame has answered yet.
     pub(super) unanswered: Option<Instant>,
     last_frame: Instant,
@@ -275,7 +275,8 @@ impl Viewer {
 
     /// Whether there is any light to show.
     fn is_lit(&self) -> bool {
-        self.snapshot.progress.done || self.snapshot.progress.update.shots > 0
+        let progress = &self.snapshot.progress;
+        self.snapshot.lags || progress.done || progress.update.shots > 0
     }
 
     /// Whether the detailed picture of the view is shown, with all its pixels and the last light.

@@ -1,0 +1,103 @@
+//! Changed lights: shown by what they emit first, then by what coupling makes of it, then solved.
+
+use std::sync::Arc;
+
+use super::first_light::first_stage;
+use super::{Progress, Snapshot, Work};
+use crate::bake;
+use crate::error::{Error, Result};
+use crate::scene::Scene;
+use crate::solver::{Solver, Update};
+
+/// What is shown of changed lights before they are solved.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Relit {
+    /// What they emit.
+    Emitted,
+    /// What coupling makes of it.
+    Coupled,
+}
+
+impl Work {
+    /// By what has been drawn, or what a file has kept; where there is nothing, or another source
+    /// emits than did, from nothing.
+    pub(super) fn relight(&mut self, scene: Arc<Scene>, epoch: u64) -> Result<()> {
+        if let Some(mut before) = self.solving.take() {
+            match before.solver.relight(&scene) {
+                Ok(()) => {
+                    let stage = first_stage(&scene, &self.given.settings);
+                    self.start(scene, before.solver, epoch, Some(before.corners));
+                    if let Some(solving) = &mut self.solving {
+                        (solving.first, solving.relit) = (before.first, Some(Relit::Emitted));
+                    }
+                    if before.first {
+                        self.tell(epoch, Some(stage));
+                    }
+                    return Ok(());
+                }
+                // What was black and now emits has no source.
+                Err(Error::Usage(_)) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        let settings = self.given.settings.clone();
+        let kept = self.kept.as_ref();
+        let Some(kept) = kept.filter(|kept| kept.check(&scene, &settings).is_ok()) else {
+            return self.bake(scene, &settings, epoch);
+        };
+        let device = self.choice.open_baking()?;
+        let elements = bake::elements(&device, &scene, &settings)?;
+        match Solver::relit(&device, elements, &scene.lights, &settings, kept) {
+            Ok(solver) => self.start(scene, solver, epoch, None),
+            Err(Error::Usage(_)) => return self.bake(scene, &settings, epoch),
+            Err(error) => return Err(error),
+        }
+        Ok(())
+    }
+
+    /// Shows the next step of a relighting. Whether there was one.
+    pub(super) fn show_relit(&mut self) -> Result<bool> {
+        let Some(solving) = &mut self.solving else {
+            return Ok(false);
+        };
+        let Some(step) = solving.relit else {
+            return Ok(false);
+        };
+        let (scene, corners) = (&solving.scene, &solving.corners);
+        let (epoch, solver) = (solving.epoch, &mut solving.solver);
+        match step {
+            Relit::Emitted => solver.gather_emitted()?,
+            Relit::Coupled => solver.gather_coupled()?,
+        }
+        let report = solver.report();
+        let progress = Progress {
+            update: Update {
+                shots: report.shots,
+                sources: report.sources as u32,
+                unshot_share: report.unshot_share,
+                error_bound: report.error_bound,
+                elapsed: solving.start.elapsed(),
+                ..Update::default()
+            },
+            done: false,
+        };
+        let snapshot = match (step, &self.shown) {
+            (Relit::Emitted, Some(before)) => {
+                let of = (epoch, scene, progress);
+                Snapshot::of_emitted(of, corners, solver, before)?
+            }
+            (Relit::Emitted, None) => None,
+            (Relit::Coupled, _) => Some(Snapshot::of_solver(
+                epoch, scene, corners, solver, progress,
+            )?),
+        };
+        solving.relit = match step {
+            Relit::Emitted => Some(Relit::Coupled),
+            Relit::Coupled => None,
+        };
+        if let Some(snapshot) = snapshot {
+            self.show(epoch, progress, snapshot);
+        }
+        Ok(true)
+    }
+}
