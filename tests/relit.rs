@@ -18,8 +18,8 @@ fn light(solver: &Solver) -> Light {
     solver.light().expect("the light comes back")
 }
 
-/// Of direct light rounding is apart, and of all light what neither coupling nor the shares of near
-/// sources tell.
+/// Direct light is the same but for rounding. Coupling alone leaves out what is solved later: light
+/// by direction, and the parts of near sources.
 #[test]
 fn emitted_light_comes_first_then_what_coupling_makes_of_it() {
     for (relief, coupling) in [(false, COUPLED), (true, COUPLED_RELIEF)] {
@@ -49,7 +49,7 @@ fn emitted_light_comes_first_then_what_coupling_makes_of_it() {
         let whole = apart(&coupled.irradiance, &all.irradiance);
         println!("relief {relief}: direct light {direct:.1e}, all of it {whole:.1e} apart");
         assert!(direct <= DIRECT && whole <= 2.0 * coupling);
-        // Light is there to be told apart.
+        // Reflected light is no small part.
         assert!(apart(&emitted.irradiance, &all.irradiance) > 5.0 * coupling);
     }
     assert_silent();

@@ -107,8 +107,8 @@ pub enum Joined {
 }
 
 impl Corners {
-    /// Means at each corner of what triangles of its smooth surface have, `[triangle][corner]`, by their
-    /// angles there.
+    /// Means at each corner of what triangles of its smooth surface have, `[triangle][corner]`, by
+    /// their angles there.
     pub fn means<const N: usize>(
         &self,
         scene: &Scene,
@@ -134,9 +134,9 @@ impl Corners {
     }
 
     /// Irradiance at each corner, `[triangle][corner]`, W·m⁻², RGB. Linear between the corners and
-    /// continuous where triangles are joined, it has nearly the means of the triangles: the mean of the
-    /// triangles about a corner, and of what that mean leaves of theirs (one step of Landweber's
-    /// iteration), no brighter or darker than they are.
+    /// continuous where triangles are joined, it has nearly the means of the triangles: the mean of
+    /// the triangles about a corner, and of what that mean leaves of theirs (one step of
+    /// Landweber's iteration), no brighter or darker than they are.
     pub fn irradiance(&self, scene: &Scene, irradiance: &[Vec3], joined: Joined) -> Vec<[Vec3; 3]> {
         let cosine = match joined {
             Joined::Smooth => CREASE_COS,

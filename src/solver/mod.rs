@@ -222,9 +222,8 @@ impl Solver {
         let start = Instant::now();
         if let Method::Rows(spine) = &mut self.method {
             spine.bring_emitted(&self.problem, &mut self.report)?;
-            self.report.unshot_share = self.bound.share(spine.ledger.unshot());
-            self.report.error_bound = self.bound.of(spine.ledger.missing());
         }
+        self.note_left();
         self.report.seconds.solve_wall += start.elapsed().as_secs_f64();
         Ok(())
     }
@@ -239,9 +238,8 @@ impl Solver {
         if let Method::Rows(spine) = &mut self.method {
             spine.carry(&self.problem, &mut self.report);
             let _moved = spine.bring(&self.problem, false, &mut self.report)?;
-            self.report.unshot_share = self.bound.share(spine.ledger.unshot());
-            self.report.error_bound = self.bound.of(spine.ledger.missing());
         }
+        self.note_left();
         self.report.seconds.solve_wall += start.elapsed().as_secs_f64();
         Ok(())
     }
@@ -263,21 +261,24 @@ impl Solver {
         let on = &self.problem;
         let mut watch = Watch::new(on, self.bound, &mut go_on);
         let report = &mut self.report;
-        let (unshot, missing) = match &mut self.method {
-            Method::Rows(spine) => {
-                spine.run(on, report, &mut watch)?;
-                (spine.ledger.unshot(), spine.ledger.missing())
-            }
-            Method::Shots(shots) => {
-                shots.run(on, report, &mut watch)?;
-                (shots.left(), self.bound.importance() * shots.left())
-            }
-        };
+        match &mut self.method {
+            Method::Rows(spine) => spine.run(on, report, &mut watch)?,
+            Method::Shots(shots) => shots.run(on, report, &mut watch)?,
+        }
         report.stop = watch.stop.unwrap_or(StopReason::Residual);
-        report.unshot_share = self.bound.share(unshot);
-        report.error_bound = self.bound.of(missing);
         report.seconds.solve_wall += start.elapsed().as_secs_f64();
+        self.note_left();
         Ok(())
+    }
+
+    /// Reports what has not been shot.
+    fn note_left(&mut self) {
+        let (unshot, missing) = match &self.method {
+            Method::Rows(spine) => (spine.ledger.unshot(), spine.ledger.missing()),
+            Method::Shots(shots) => (shots.left(), self.bound.importance() * shots.left()),
+        };
+        self.report.unshot_share = self.bound.share(unshot);
+        self.report.error_bound = self.bound.of(missing);
     }
 
     /// What has been solved so far.

@@ -176,7 +176,7 @@ impl Far {
         if is_plane && facing <= ABOVE * self.area {
             return Some(View::Nothing);
         }
-        // The ball tells of most parts.
+        // The box is read only where the plane of the horizon cuts the ball.
         let height = way.dot(n);
         let crosses = height.abs() < self.radius;
         if height <= -self.radius || crosses && is_above(bounds, p, -n) {

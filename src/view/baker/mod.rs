@@ -180,6 +180,22 @@ impl Solving {
     fn is_busy(&self) -> bool {
         self.first || !self.done
     }
+
+    /// What the solver reports; the rest is of its `last` update.
+    fn progress(&self, last: Update, done: bool) -> Progress {
+        let report = self.solver.report();
+        Progress {
+            update: Update {
+                shots: report.shots,
+                sources: report.sources as u32,
+                unshot_share: report.unshot_share,
+                error_bound: report.error_bound,
+                elapsed: self.start.elapsed(),
+                ..last
+            },
+            done,
+        }
+    }
 }
 
 impl Work {
@@ -399,20 +415,9 @@ impl Work {
         // The budget is that of the bake, not of a slice.
         let stop = solving.solver.report().stop;
         solving.done = is_done(stop) || start.elapsed() >= budget;
-        let report = solving.solver.report();
         shared.saving.allow(!solving.first);
-        let progress = Progress {
-            update: Update {
-                shots: report.shots,
-                sources: report.sources as u32,
-                unshot_share: report.unshot_share,
-                error_bound: report.error_bound,
-                elapsed: start.elapsed(),
-                ..last
-            },
-            done: solving.done && !solving.first,
-        };
-        if !solving.done && report.unshot_share > solving.shown_from {
+        let progress = solving.progress(last, solving.done && !solving.first);
+        if !solving.done && progress.update.unshot_share > solving.shown_from {
             solving.slice = SLICES[0];
             shared.latest().progress = Some((epoch, progress));
             (self.wake)();

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::first_light::first_stage;
-use super::{Progress, Snapshot, Work};
+use super::{Snapshot, Work};
 use crate::bake;
 use crate::error::{Error, Result};
 use crate::scene::Scene;
@@ -63,24 +63,13 @@ impl Work {
         let Some(step) = solving.relit else {
             return Ok(false);
         };
-        let (scene, corners) = (&solving.scene, &solving.corners);
-        let (epoch, solver) = (solving.epoch, &mut solving.solver);
         match step {
-            Relit::Emitted => solver.gather_emitted()?,
-            Relit::Coupled => solver.gather_coupled()?,
+            Relit::Emitted => solving.solver.gather_emitted()?,
+            Relit::Coupled => solving.solver.gather_coupled()?,
         }
-        let report = solver.report();
-        let progress = Progress {
-            update: Update {
-                shots: report.shots,
-                sources: report.sources as u32,
-                unshot_share: report.unshot_share,
-                error_bound: report.error_bound,
-                elapsed: solving.start.elapsed(),
-                ..Update::default()
-            },
-            done: false,
-        };
+        let progress = solving.progress(Update::default(), false);
+        let (scene, corners) = (&solving.scene, &solving.corners);
+        let (epoch, solver) = (solving.epoch, &solving.solver);
         let snapshot = match (step, &self.shown) {
             (Relit::Emitted, Some(before)) => {
                 let of = (epoch, scene, progress);

@@ -71,7 +71,11 @@ impl Work {
             let what = "the bake has not come so far that it can be saved";
             return Err(Error::Usage(what.into()));
         };
-        solving.solver.gather()?;
+        match solving.relit {
+            // No more than what lights emit may have been brought.
+            Some(_) => solving.solver.gather_coupled()?,
+            None => solving.solver.gather()?,
+        }
         let solution = bake::solution(&solving.scene, &solving.solver)?;
         let Saves { name, save } = &self.saves;
         save(path, name, &solving.scene, &solution, &self.given.settings)

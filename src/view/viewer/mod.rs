@@ -279,6 +279,11 @@ impl Viewer {
         self.snapshot.lags || progress.done || progress.update.shots > 0
     }
 
+    /// Whether a view that stays is refined: not while more of the light is about to come.
+    fn refines(&self) -> bool {
+        self.switches.detail && self.is_lit() && !self.snapshot.lags
+    }
+
     /// Whether the detailed picture of the view is shown, with all its pixels and the last light.
     pub fn is_detailed(&self) -> bool {
         // With the switches as they are now, which may differ from the last frame's.
@@ -307,7 +312,7 @@ impl Viewer {
         let changed = (self.dirty || self.stale || self.input.flies()).then_some(now);
         let Pictures { seen, wanted, .. } = &self.pictures;
         let paused = seen.as_ref().map(|seen| seen.since + PAUSE);
-        let paused = paused.filter(|_| self.switches.detail && wanted.is_none() && self.is_lit());
+        let paused = paused.filter(|_| self.refines() && wanted.is_none());
         let next = [changed, self.repaint, paused, self.notes.next_end()];
         let next = next.into_iter().flatten().min();
         match self.awaits_light() {

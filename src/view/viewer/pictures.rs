@@ -94,7 +94,7 @@ impl Viewer {
         };
         let stays = seen.since.elapsed() >= PAUSE;
         self.want_traced(size, stays);
-        if !(self.switches.detail && self.is_lit() && !self.snapshot.lags && stays) {
+        if !(self.refines() && stays) {
             return;
         }
         // During a bake, a picture is finished before the next stage's is begun.
