@@ -212,9 +212,9 @@ fn other_drivers_give_the_same_light_on_relief() {
 fn a_checkpoint_of_another_driver_is_not_used() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
-    let bake = "bake cornell --patches 2000 --hemicube 64 --no-cache";
+    let bake = "bake cornell --patches 4000 --hemicube 64 --no-cache";
     let killed = || {
-        let begun = format!("{bake} --checkpoint 0.05 -o killed.safetensors");
+        let begun = format!("{bake} --checkpoint 0.001 -o killed.safetensors");
         let mut begun = command(folder, None, &begun);
         let begun = begun.stdout(Stdio::null()).stderr(Stdio::null()).spawn();
         let mut begun = begun.expect("the program starts");

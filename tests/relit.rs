@@ -40,7 +40,8 @@ fn emitted_light_comes_first_then_what_coupling_makes_of_it() {
         assert_eq!(emitted.irradiance, emitted.irradiance_direct);
         // The two halves of the point light.
         assert_eq!(solver.report().shots, 2);
-        solver.gather_coupled().expect("reflected light arrives");
+        let brought = solver.gather_coupled(|| true);
+        assert!(brought.expect("reflected light arrives"));
         let coupled = light(&solver);
         solver.run(|_| true).expect("it is solved");
         let all = light(&solver);

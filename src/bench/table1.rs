@@ -229,7 +229,8 @@ fn in_turns(mut under: Vec<Under>, scene: &Scene, go_on: &impl Fn() -> bool) -> 
     while under.iter().any(|u| !u.done) && go_on() {
         for bake in under.iter_mut().filter(|u| !u.done) {
             let turn = Instant::now();
-            bake.solver.turn(|_| turn.elapsed() < TURN)?;
+            let in_time = || turn.elapsed() < TURN;
+            bake.solver.turn(|update| !update.draws || in_time())?;
             let report = bake.solver.report();
             bake.done = report.stop != StopReason::Interrupted;
             bake.row.seconds += turn.elapsed().as_secs_f64();

@@ -88,12 +88,16 @@ impl Gathering {
         })
     }
 
-    /// Adds what these rows bring.
-    pub fn run(&self, rows: &[LitRow]) -> Result<()> {
+    /// Adds what these rows bring, part by part: after each part `go_on` is passed its rows. Whether
+    /// it never said no.
+    pub fn run(
+        &self,
+        mut rows: Vec<LitRow>,
+        mut go_on: impl FnMut(&[LitRow]) -> bool,
+    ) -> Result<bool> {
         if rows.is_empty() {
-            return Ok(());
+            return Ok(true);
         }
-        let mut rows = rows.to_vec();
         rows.sort_by_key(|row| row.row.chunk);
         let slot = |row: &LitRow| Slot {
             emitted: row.emitted,
@@ -104,22 +108,25 @@ impl Gathering {
         let slots: Vec<Slot> = rows.iter().map(slot).collect();
         let places: Vec<KeptRow> = rows.iter().map(|row| row.row).collect();
         self.list.write(&slots, &places)?;
-        Commands::run(&self.device, "gather", |cmd| {
-            cmd.barrier(&[Stage::Compute, Stage::Transfer], &[Stage::Compute]);
-            let of_chunks = rows.chunk_by(|a, b| a.row.chunk == b.row.chunk);
-            let mut first = 0;
-            for some in of_chunks.flat_map(|rows| rows.chunks(self.most)) {
-                cmd.part();
-                let end = first + some.len() as u32;
-                let of = ChunkSlots {
-                    chunk: some[0].row.chunk,
-                    slots: first..end,
-                };
+        let of_chunks = rows.chunk_by(|a, b| a.row.chunk == b.row.chunk);
+        let mut first = 0;
+        for some in of_chunks.flat_map(|rows| rows.chunks(self.most)) {
+            let end = first + some.len() as u32;
+            let of = ChunkSlots {
+                chunk: some[0].row.chunk,
+                slots: first..end,
+            };
+            Commands::run(&self.device, "gather", |cmd| {
+                cmd.barrier(&[Stage::Compute, Stage::Transfer], &[Stage::Compute]);
                 self.record(cmd, some, &of);
-                first = end;
+                Ok(())
+            })?;
+            if !go_on(some) {
+                return Ok(false);
             }
-            Ok(())
-        })
+            first = end;
+        }
+        Ok(true)
     }
 
     /// Finds what those of the rows with a relief send by direction, and gathers.

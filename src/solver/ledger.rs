@@ -318,24 +318,19 @@ impl Ledger {
         self.sources.iter().enumerate().map(sent).collect()
     }
 
-    /// What a source has to send through its row, which counts as sent from now on.
-    pub fn send(&mut self, s: usize, row: KeptRow, by_direction: bool) -> Option<LitRow> {
+    /// What a source has to send through its row.
+    pub fn to_send(&self, s: usize, row: KeptRow, by_direction: bool) -> Option<LitRow> {
         let (emitted, reflected) = self.owed(s);
-        let sent = reflected.as_vec3();
-        let drawn = &mut self.sources[s];
+        let reflected = reflected.as_vec3();
+        let drawn = &self.sources[s];
         let turns = drawn.relief && by_direction;
-        if emitted == Vec3::ZERO && sent == Vec3::ZERO && !turns {
+        if emitted == Vec3::ZERO && reflected == Vec3::ZERO && !turns {
             return None;
         }
-        // As it was rounded, so that nothing is lost.
-        drawn.gathered += sent.as_dvec3();
-        drawn.scale = Some(row.scale);
-        drawn.emission_gathered |= self.system.emission_is_shot(s);
-        drawn.directed |= drawn.relief && drawn.times > 1;
-        // Light of the sky counts as indirect.
+        // Light of the sky, which reflects none, counts as indirect.
         let (emitted, reflected) = match drawn.is_sky {
-            true => (Vec3::ZERO, emitted + sent),
-            false => (emitted, sent),
+            true => (Vec3::ZERO, emitted),
+            false => (emitted, reflected),
         };
         Some(LitRow {
             row,
@@ -343,6 +338,19 @@ impl Ledger {
             emitted,
             reflected,
         })
+    }
+
+    /// Notes that the elements have what a row has sent.
+    pub fn sent_by(&mut self, lit: &LitRow) {
+        let s = lit.source as usize;
+        let drawn = &mut self.sources[s];
+        // As it was rounded, so that nothing is lost.
+        if !drawn.is_sky {
+            drawn.gathered += lit.reflected.as_dvec3();
+        }
+        drawn.scale = Some(lit.row.scale);
+        drawn.emission_gathered |= self.system.emission_is_shot(s);
+        drawn.directed |= drawn.relief && drawn.times > 1;
     }
 
     /// Whether a source emits that is neither drawn nor under way.
@@ -353,15 +361,12 @@ impl Ledger {
         self.sources.iter().enumerate().any(waits)
     }
 
-    /// As [`Self::send`], but only what a source emits as direct light.
-    pub fn send_emitted(&mut self, s: usize, row: KeptRow) -> Option<LitRow> {
+    /// As [`Self::to_send`], but only what a source emits as direct light.
+    pub fn emitted_to_send(&self, s: usize, row: KeptRow) -> Option<LitRow> {
         let (emitted, _) = self.owed(s);
-        let drawn = &mut self.sources[s];
-        if emitted == Vec3::ZERO || drawn.is_sky {
+        if emitted == Vec3::ZERO || self.sources[s].is_sky {
             return None;
         }
-        drawn.scale = Some(row.scale);
-        drawn.emission_gathered = true;
         Some(LitRow {
             row,
             source: s as u32,

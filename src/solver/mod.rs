@@ -230,25 +230,28 @@ impl Solver {
 
     /// Brings to the elements what coupling makes of the light of the sources that are drawn: nearly
     /// all of it after [`Self::relight`], sooner than [`Self::turn`] draws and measures what is left.
+    /// Whether all was brought, since `go_on` did not say no.
     ///
     /// # Errors
     /// A device that fails.
-    pub fn gather_coupled(&mut self) -> Result<()> {
+    pub fn gather_coupled(&mut self, mut go_on: impl FnMut() -> bool) -> Result<bool> {
         let start = Instant::now();
+        let mut whole = true;
         if let Method::Rows(spine) = &mut self.method {
-            spine.carry(&self.problem, &mut self.report);
-            let _moved = spine.bring(&self.problem, false, &mut self.report)?;
+            let (on, report) = (&self.problem, &mut self.report);
+            spine.carry(on, report);
+            whole = spine.bring(on, false, report, &mut go_on)?.is_some();
         }
         self.note_left();
         self.report.seconds.solve_wall += start.elapsed().as_secs_f64();
-        Ok(())
+        Ok(whole)
     }
 
     /// Brings to the elements what has been solved by [`Self::turn`].
     pub fn gather(&mut self) -> Result<()> {
         let start = Instant::now();
         if let Method::Rows(spine) = &mut self.method {
-            let _moved = spine.bring(&self.problem, false, &mut self.report)?;
+            let _moved = spine.bring(&self.problem, false, &mut self.report, &mut || true)?;
         }
         self.report.seconds.solve_wall += start.elapsed().as_secs_f64();
         Ok(())

@@ -16,6 +16,9 @@ pub struct Update {
     /// Power that can still be missing, as a share of all that was emitted; none where a
     /// reflectance is 1.
     pub error_bound: Option<f64>,
+    /// Sources are drawn. Otherwise their light is brought to the elements: who stops there lets
+    /// that begin again.
+    pub draws: bool,
     /// Since the start of the solution.
     pub elapsed: Duration,
     /// An estimate, from how fast the bound has fallen lately.
@@ -119,17 +122,30 @@ impl<'a> Watch<'a> {
     /// Whether to go on with so many sources drawn and so much power unshot and missing, internal
     /// units.
     pub fn look(&mut self, shots: u32, unshot: f64, missing: f64) -> bool {
+        let now = (
+            self.start.elapsed().as_secs_f64(),
+            self.bound.share(missing),
+        );
+        self.history.push(now);
+        self.ask(shots, unshot, missing, true)
+    }
+
+    /// As [`Self::look`], again and again during work that draws nothing.
+    pub fn looks(&mut self, shots: u32, unshot: f64, missing: f64) -> impl FnMut() -> bool {
+        move || self.ask(shots, unshot, missing, false)
+    }
+
+    fn ask(&mut self, shots: u32, unshot: f64, missing: f64, draws: bool) -> bool {
         if self.stop.is_some() {
             return false;
         }
         let elapsed = self.start.elapsed();
-        let share = self.bound.share(missing);
-        self.history.push((elapsed.as_secs_f64(), share));
         let update = Update {
             shots,
             sources: self.sources,
             unshot_share: self.bound.share(unshot),
             error_bound: self.bound.of(missing),
+            draws,
             elapsed,
             left: time_left(&self.history, self.bound.residual),
         };

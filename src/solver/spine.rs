@@ -192,8 +192,11 @@ impl Spine {
             // With relief the first light is measured next, which tells more than another turn.
             let first = on.relief.is_some() && corrections == 0;
             match first {
-                true => drop(self.bring(on, false, report)?),
-                false => self.settle(on, corrections > 0, report)?,
+                true => drop(self.bring(on, false, report, &mut self.looks(report, watch))?),
+                false => self.settle(on, corrections > 0, report, watch)?,
+            }
+            if watch.stop.is_some() {
+                break;
             }
             // Without what is carried less may be unshot, so that nothing more is drawn.
             let drew = drawn_before.replace(report.shots) != Some(report.shots);
@@ -204,7 +207,11 @@ impl Spine {
                 break;
             }
             // What rows without room have brought moves near light once more.
-            if !first && !self.is_settled(on, false, report)? && turns < MOST_TURNS {
+            let settled = first || self.is_settled(on, false, report, watch)?;
+            if watch.stop.is_some() {
+                break;
+            }
+            if !settled && turns < MOST_TURNS {
                 turns += 1;
                 continue;
             }
@@ -295,6 +302,16 @@ impl Spine {
         }
     }
 
+    /// Asks the watch during work that draws nothing.
+    fn looks<'w, 'a>(
+        &self,
+        report: &Report,
+        watch: &'w mut Watch<'a>,
+    ) -> impl FnMut() -> bool + use<'w, 'a> {
+        let (unshot, missing) = (self.ledger.unshot(), self.ledger.missing());
+        watch.looks(report.shots, unshot, missing)
+    }
+
     /// If it is time for one, or `now`, if the bake is long.
     fn write_checkpoint(&mut self, now: bool) -> Result<()> {
         match &mut self.journal {
@@ -380,31 +397,37 @@ impl Spine {
             }
             match place.chunk < self.kept.chunk_count() {
                 true => self.ledger.sources[s].row = Some(place),
-                false => loose.extend(self.ledger.send(s, place, true)),
+                false => loose.extend(self.ledger.to_send(s, place, true)),
             }
         }
-        self.gather(&loose, report)
+        self.gather(loose, report, &mut || true)?;
+        Ok(())
     }
 
-    /// Sends what all sources owe through the rows that are kept; of those with a relief,
-    /// `by_direction`, also what changes its direction alone.
-    pub fn gather_kept(&mut self, by_direction: bool, report: &mut Report) -> Result<()> {
-        let rows: Vec<LitRow> = (0..self.ledger.sources.len())
-            .filter_map(|s| {
-                let row = self.ledger.sources[s].row?;
-                self.ledger.send(s, row, by_direction)
-            })
-            .collect();
-        self.gather(&rows, report)
+    /// What `lit` has of the sources whose rows are kept.
+    fn kept_rows(&self, lit: impl Fn(&Ledger, usize, KeptRow) -> Option<LitRow>) -> Vec<LitRow> {
+        let sources = self.ledger.sources.iter().enumerate();
+        sources
+            .filter_map(|(s, drawn)| lit(&self.ledger, s, drawn.row?))
+            .collect()
     }
 
-    fn gather(&mut self, rows: &[LitRow], report: &mut Report) -> Result<()> {
+    /// Sends through rows what they have to send. Whether `go_on` never said no.
+    fn gather(
+        &mut self,
+        rows: Vec<LitRow>,
+        report: &mut Report,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<bool> {
         let start = Instant::now();
         self.brought |= !rows.is_empty();
-        self.gathering.run(rows)?;
-        report.gathered_rows += rows.len() as u64;
+        let whole = self.gathering.run(rows, |some| {
+            some.iter().for_each(|lit| self.ledger.sent_by(lit));
+            report.gathered_rows += some.len() as u64;
+            go_on()
+        })?;
         report.seconds.gather += start.elapsed().as_secs_f64();
-        Ok(())
+        Ok(whole)
     }
 
     fn solve(&mut self, most: f64, sweeps: usize, report: &mut Report) {

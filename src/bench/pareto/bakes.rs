@@ -150,7 +150,8 @@ impl Try {
         loop {
             let until = look.min(grid.limit.max(taken));
             let (turn, before) = (Instant::now(), taken);
-            solver.run(|_| before + turn.elapsed() < until && go_on())?;
+            let in_time = || before + turn.elapsed() < until;
+            solver.run(|update| (!update.draws || in_time()) && go_on())?;
             taken += turn.elapsed();
             let report = solver.report();
             let finished = report.stop != StopReason::Interrupted;

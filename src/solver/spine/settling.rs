@@ -7,7 +7,8 @@ use glam::DVec3;
 use super::{MOST_SWEEPS, Phase, Spine, UNSOLVED};
 use crate::error::Result;
 use crate::mesh::sources::Source;
-use crate::solver::gather::LitRow;
+use crate::solver::ledger::Ledger;
+use crate::solver::progress::Watch;
 use crate::solver::{Problem, Report};
 
 /// What a last sweep over near sources may change of an element's light, over the mean of all, as a
@@ -21,12 +22,22 @@ const UNMOVED: f64 = 0.2;
 pub(super) const MOST_TURNS: usize = 24;
 
 impl Spine {
-    /// Brings the elements what all kept rows send, and what near sources send beyond their means.
-    /// The power that the sources reflect more or less for it, internal units.
-    pub fn bring(&mut self, on: &Problem, by_direction: bool, report: &mut Report) -> Result<f64> {
-        self.gather_kept(by_direction, report)?;
+    /// Brings the elements what all kept rows send, of those with a relief, `by_direction`, also
+    /// what changes its direction alone, and what near sources send beyond their means. The power
+    /// that the sources reflect more or less for it, internal units; none once `go_on` says no.
+    pub fn bring(
+        &mut self,
+        on: &Problem,
+        by_direction: bool,
+        report: &mut Report,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<Option<f64>> {
+        let rows = self.kept_rows(|ledger, s, row| ledger.to_send(s, row, by_direction));
+        if !self.gather(rows, report, go_on)? {
+            return Ok(None);
+        }
         if self.near.is_empty() || !std::mem::replace(&mut self.brought, false) {
-            return Ok(0.0);
+            return Ok(Some(0.0));
         }
         let start = Instant::now();
         let brought = self.gathering.irradiance(on)?;
@@ -39,7 +50,7 @@ impl Spine {
         let moved = self.turn_near(on);
         report.seconds.near += start.elapsed().as_secs_f64();
         report.near.sweeps = self.near.sweeps;
-        Ok(moved)
+        Ok(Some(moved))
     }
 
     /// Brings the elements what sources emit, after drawing those that were not, and nothing of what
@@ -57,13 +68,9 @@ impl Spine {
                 break;
             }
         }
-        let rows: Vec<LitRow> = (0..self.ledger.sources.len())
-            .filter_map(|s| {
-                let row = self.ledger.sources[s].row?;
-                self.ledger.send_emitted(s, row)
-            })
-            .collect();
-        self.gather(&rows, report)
+        let rows = self.kept_rows(Ledger::emitted_to_send);
+        self.gather(rows, report, &mut || true)?;
+        Ok(())
     }
 
     /// What the sources reflect of light from near ones, `[source]`.
@@ -97,16 +104,18 @@ impl Spine {
         moved <= UNMOVED * self.ledger.bound.stop_power()
     }
 
-    /// Brings light and solves by turns, until what near sources send fits the rest.
+    /// Brings light and solves by turns, until what near sources send fits the rest, or the watch
+    /// says stop.
     pub(super) fn settle(
         &mut self,
         on: &Problem,
         by_direction: bool,
         report: &mut Report,
+        watch: &mut Watch<'_>,
     ) -> Result<()> {
         let mut turns = 0;
         self.turns.forget();
-        while !self.is_settled(on, by_direction, report)? {
+        while !self.is_settled(on, by_direction, report, watch)? && watch.stop.is_none() {
             turns += 1;
             if turns == MOST_TURNS {
                 tracing::warn!("light between close surfaces does not settle");
@@ -123,9 +132,11 @@ impl Spine {
         on: &Problem,
         by_direction: bool,
         report: &mut Report,
+        watch: &mut Watch<'_>,
     ) -> Result<bool> {
-        let moved = self.bring(on, by_direction, report)?;
-        let settled = self.is_still(moved);
+        let mut go_on = self.looks(report, watch);
+        let moved = self.bring(on, by_direction, report, &mut go_on)?;
+        let settled = moved.is_some_and(|moved| self.is_still(moved));
         if !settled {
             let most = UNSOLVED * self.ledger.bound.stop_power();
             self.solve(most, MOST_SWEEPS, report);

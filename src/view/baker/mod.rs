@@ -85,9 +85,10 @@ impl Baker {
 
     pub fn order(&self, order: Order) {
         if let Some(orders) = &self.orders {
-            self.shared.interrupt.store(true, Ordering::SeqCst);
             // A thread that has failed has said so.
             let _ = orders.send(order);
+            // Earlier, the thread might clear it before the order is there.
+            self.shared.interrupt.store(true, Ordering::SeqCst);
         }
     }
 
@@ -409,7 +410,8 @@ impl Work {
                 told = Instant::now();
                 (self.wake)();
             }
-            begin.elapsed() < slice.min(budget.saturating_sub(start.elapsed()))
+            (!update.draws || begin.elapsed() < slice)
+                && start.elapsed() < budget
                 && !shared.interrupt.load(Ordering::SeqCst)
         })?;
         // The budget is that of the bake, not of a slice.

@@ -1,6 +1,7 @@
 //! Changed lights: shown by what they emit first, then by what coupling makes of it, then solved.
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use super::first_light::first_stage;
 use super::{Snapshot, Work};
@@ -65,7 +66,13 @@ impl Work {
         };
         match step {
             Relit::Emitted => solving.solver.gather_emitted()?,
-            Relit::Coupled => solving.solver.gather_coupled()?,
+            Relit::Coupled => {
+                let interrupt = &self.shared.interrupt;
+                let go_on = || !interrupt.load(Ordering::SeqCst);
+                if !solving.solver.gather_coupled(go_on)? {
+                    return Ok(true);
+                }
+            }
         }
         let progress = solving.progress(Update::default(), false);
         let (scene, corners) = (&solving.scene, &solving.corners);

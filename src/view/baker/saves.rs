@@ -73,7 +73,7 @@ impl Work {
         };
         match solving.relit {
             // No more than what lights emit may have been brought.
-            Some(_) => solving.solver.gather_coupled()?,
+            Some(_) => drop(solving.solver.gather_coupled(|| true)?),
             None => solving.solver.gather()?,
         }
         let solution = bake::solution(&solving.scene, &solving.solver)?;
