@@ -4,7 +4,7 @@ mod common;
 
 use std::sync::Arc;
 
-use common::{Build, assert_silent, device};
+use common::{Build, assert_silent, device, own_device};
 use glam::{DVec3, Vec3};
 use mesolux::bake;
 use mesolux::math::directions::Directions;
@@ -13,9 +13,10 @@ use mesolux::scene::Scene;
 use mesolux::solver::{Estimator, Report, Settings, Solver, StopReason, Visibility, open_devices};
 use mesolux::vk::Device;
 
-/// Devices of one kind, each with threads of its own.
+/// Devices of one kind, each with threads of its own; the same for all of a test.
 fn devices(count: usize) -> Vec<Arc<Device>> {
-    (0..count).map(|_| device()).collect()
+    thread_local!(static ALL: [Arc<Device>; 3] = std::array::from_fn(|_| own_device()));
+    ALL.with(|all| all[..count].to_vec())
 }
 
 /// A room, or a floor below the open sky, with a lamp, a ball and a point light; floor and ball may

@@ -217,7 +217,7 @@ fn tilted_normals_are_lit_as_the_path_tracer_has_them() {
     let build = room();
     let scene = lit(&build.scene, Quality::default());
     let lit = scene.look();
-    let surface = Surface::new(&build.scene, Texels::Page(192), || true).expect("it is laid out");
+    let surface = Surface::new(&build.scene, Texels::Page(128), || true).expect("it is laid out");
     let map = LightMap::new(&surface, &lit, &|_| true).expect("a light map");
     let tracer = PathTracer::new(&build.scene).expect("it is traced");
 

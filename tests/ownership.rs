@@ -5,7 +5,7 @@ mod common;
 
 use std::sync::{Arc, Mutex};
 
-use common::{assert_silent, device};
+use common::{assert_silent, own_device};
 use mesolux::vk::{
     Attachment, Bind, Binding, Buffer, BufferUse, Commands, ComputePipeline, ComputeShader, Device,
     Format, Framebuffer, Image, ImageUse, Interface, RenderPass, Sampled, Sampler, ShaderBinding,
@@ -66,7 +66,7 @@ fn on_a_device(test: impl FnOnce(&Arc<Device>)) {
     // `left` counts the devices of the whole process: one test at a time.
     static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
     let _one = ONE_AT_A_TIME.lock().unwrap_or_else(|e| e.into_inner());
-    let device = device();
+    let device = own_device();
     test(&device);
     assert_eq!(
         device.allocated_bytes(),
@@ -224,5 +224,26 @@ fn a_table_keeps_the_buffers_it_refers_to() {
         drop(chunk);
         assert!(device.allocated_bytes() >= BYTES);
         drop(table);
+    });
+}
+
+/// Who makes a pipeline that the device has gets that one; other constants make another.
+#[test]
+fn a_pipeline_is_made_once() {
+    on_a_device(|device| {
+        let spirv = doubling();
+        let shader = ComputeShader {
+            spirv: &spirv,
+            interface: Interface::of::<Doubling<'_>, ()>(),
+        };
+        let before = device.pipelines();
+        let make = |constants: &[u32]| {
+            let made = ComputePipeline::with_constants(device, "doubling", &shader, constants);
+            drop(made.expect("a pipeline"));
+            device.pipelines() - before
+        };
+        assert_eq!([make(&[]), make(&[]), make(&[1]), make(&[])], [1, 1, 2, 2]);
+        let (_commands, _result) = doubled(device, 1);
+        assert_eq!(device.pipelines() - before, 2);
     });
 }

@@ -154,11 +154,10 @@ impl Surface {
 /// Normals at the corners, `[triangle][corner]`.
 pub(super) fn smooth_normals(scene: &Scene) -> Vec<[DVec3; 3]> {
     let corners = Corners::new(scene);
-    let triangles = scene.triangles.iter().enumerate();
-    triangles
-        .map(|(e, triangle)| {
-            triangle.vertices.map(|vertex| {
-                let about = corners.smooth(e, vertex);
+    (0..scene.triangles.len())
+        .map(|e| {
+            [0, 1, 2].map(|corner| {
+                let about = corners.smooth(e, corner);
                 let sum: DVec3 = about.map(|(t, angle)| angle * corners.normals[t]).sum();
                 sum.try_normalize().unwrap_or(corners.normals[e])
             })

@@ -1,5 +1,7 @@
 //! Corners of a mesh's triangles that share a vertex of a smooth surface, and their weights there.
 
+use std::sync::OnceLock;
+
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -25,6 +27,41 @@ pub struct Corners {
     first: Vec<u32>,
     /// 3 · triangle + corner.
     corners: Vec<u32>,
+    /// `[triangle][corner]`
+    vertices: Vec<[u32; 3]>,
+    /// Of smooth surfaces, once it is asked for.
+    smooth: OnceLock<Around>,
+}
+
+/// The corners at each corner's vertex that continue its triangle's surface.
+struct Around {
+    /// `[3 · triangle + corner]`, where they start; one more at the end.
+    first: Vec<u32>,
+    /// 3 · triangle + corner, ascending.
+    corners: Vec<u32>,
+}
+
+impl Around {
+    /// Of triangles whose normals have this cosine at least.
+    fn new(of: &Corners, cosine: f64) -> Self {
+        let found: Vec<[Vec<u32>; 3]> = (of.vertices.par_iter().enumerate())
+            .map(|(e, vertices)| vertices.map(|v| of.within(e, v, cosine).collect()))
+            .collect();
+        let mut around = Self {
+            first: vec![0],
+            corners: Vec::new(),
+        };
+        for corners in found.iter().flatten() {
+            around.corners.extend(corners);
+            around.first.push(around.corners.len() as u32);
+        }
+        around
+    }
+
+    fn of(&self, corner: usize) -> &[u32] {
+        let [from, to] = [corner, corner + 1].map(|c| self.first[c] as usize);
+        &self.corners[from..to]
+    }
 }
 
 impl Corners {
@@ -58,28 +95,35 @@ impl Corners {
             angles,
             first,
             corners,
+            vertices: scene.triangles.iter().map(|t| t.vertices).collect(),
+            smooth: OnceLock::new(),
         }
     }
 
-    /// The triangles about a vertex of triangle `e` that continue its surface there, itself among
-    /// them, each with its angle at the vertex: with these weights the diagonals of a fan do not
-    /// matter.
-    pub fn smooth(&self, e: usize, vertex: u32) -> impl Iterator<Item = (usize, f64)> {
-        self.within(e, vertex, CREASE_COS)
+    fn smooth_around(&self) -> &Around {
+        self.smooth.get_or_init(|| Around::new(self, CREASE_COS))
     }
 
-    /// The same of triangles whose normals have this cosine at least with that of `e`.
-    fn within(&self, e: usize, vertex: u32, cosine: f64) -> impl Iterator<Item = (usize, f64)> {
+    /// The triangles about a corner of triangle `e` that continue its surface there, itself among
+    /// them, each with its angle at the vertex: with these weights the diagonals of a fan do not
+    /// matter.
+    pub fn smooth(&self, e: usize, corner: usize) -> impl Iterator<Item = (usize, f64)> {
+        let around = self.smooth_around().of(3 * e + corner).iter();
+        let around = around.map(|&c| (c as usize / 3, c as usize % 3));
+        around.map(|(other, k)| (other, self.angles[other][k]))
+    }
+
+    /// The corners at a vertex of triangle `e` of triangles whose normals have this cosine at least
+    /// with its own.
+    fn within(&self, e: usize, vertex: u32, cosine: f64) -> impl Iterator<Item = u32> {
         let [from, to] = [vertex, vertex + 1].map(|v| self.first[v as usize] as usize);
         let crowded = to - from > MOST_AROUND;
-        self.corners[from..to]
-            .iter()
-            .map(|&corner| (corner as usize / 3, corner as usize % 3))
-            .filter(move |&(other, _)| {
-                let even = || self.normals[e].dot(self.normals[other]) >= cosine;
-                other == e || (!crowded && even())
-            })
-            .map(|(other, k)| (other, self.angles[other][k]))
+        let corners = self.corners[from..to].iter().copied();
+        corners.filter(move |&corner| {
+            let other = corner as usize / 3;
+            let even = || self.normals[e].dot(self.normals[other]) >= cosine;
+            other == e || (!crowded && even())
+        })
     }
 }
 
@@ -109,15 +153,10 @@ pub enum Joined {
 impl Corners {
     /// Means at each corner of what triangles of its smooth surface have, `[triangle][corner]`, by
     /// their angles there.
-    pub fn means<const N: usize>(
-        &self,
-        scene: &Scene,
-        values: &[[Vec3; N]],
-    ) -> Vec<[[Vec3; N]; 3]> {
-        let triangles = scene.triangles.par_iter().enumerate();
-        let mean = |e: usize, vertex: u32| {
+    pub fn means<const N: usize>(&self, values: &[[Vec3; N]]) -> Vec<[[Vec3; N]; 3]> {
+        let mean = |e: usize, corner: usize| {
             let (mut sum, mut weight) = ([DVec3::ZERO; N], 0.0);
-            for (other, angle) in self.smooth(e, vertex) {
+            for (other, angle) in self.smooth(e, corner) {
                 for (sum, value) in sum.iter_mut().zip(values[other]) {
                     *sum += value.as_dvec3() * angle;
                 }
@@ -128,8 +167,9 @@ impl Corners {
                 false => values[e],
             }
         };
-        triangles
-            .map(|(e, triangle)| triangle.vertices.map(|v| mean(e, v)))
+        (0..values.len())
+            .into_par_iter()
+            .map(|e| [0, 1, 2].map(|corner| mean(e, corner)))
             .collect()
     }
 
@@ -137,59 +177,71 @@ impl Corners {
     /// continuous where triangles are joined, it has nearly the means of the triangles: the mean of
     /// the triangles about a corner, and of what that mean leaves of theirs (one step of
     /// Landweber's iteration), no brighter or darker than they are.
-    pub fn irradiance(&self, scene: &Scene, irradiance: &[Vec3], joined: Joined) -> Vec<[Vec3; 3]> {
-        let cosine = match joined {
-            Joined::Smooth => CREASE_COS,
-            Joined::Plane => PLANE_COS,
+    pub fn irradiance(&self, irradiance: &[Vec3], joined: Joined) -> Vec<[Vec3; 3]> {
+        let of_planes;
+        let around = match joined {
+            Joined::Smooth => self.smooth_around(),
+            Joined::Plane => {
+                of_planes = Around::new(self, PLANE_COS);
+                &of_planes
+            }
         };
-        let each = |find: &(dyn Fn(usize, u32) -> Vec3 + Sync)| -> Vec<[Vec3; 3]> {
-            let triangles = scene.triangles.par_iter().enumerate();
-            triangles
-                .map(|(e, triangle)| triangle.vertices.map(|v| find(e, v)))
-                .collect()
-        };
-        let brightness = |e: usize| irradiance[e].max_element();
+        let brightness: Vec<f32> = irradiance.iter().map(|e| e.max_element()).collect();
         // What is covered is no part of the surface beside it.
-        let about = |e: usize, vertex: u32| {
-            let all = || self.within(e, vertex, cosine);
-            let brightest = all()
-                .map(|(other, _)| brightness(other))
-                .fold(0.0, f32::max);
-            let alike = move |&(other, _): &(usize, f64)| match joined {
-                Joined::Smooth => brightness(other) >= LEAST_OPEN * brightest,
+        let alike = |e: usize, corner: usize| {
+            let all = around.of(3 * e + corner);
+            let brightest = all.iter().map(|&c| brightness[c as usize / 3]);
+            let brightest = brightest.fold(0.0, f32::max);
+            let brightness = &brightness;
+            let alike = move |other: usize| match joined {
+                Joined::Smooth => brightness[other] >= LEAST_OPEN * brightest,
                 Joined::Plane => {
-                    let (one, other) = (brightness(e), brightness(other));
+                    let (one, other) = (brightness[e], brightness[other]);
                     one.min(other) >= LEAST_ALIKE * one.max(other)
                 }
             };
-            all().filter(alike)
+            let found = all.iter().map(|&c| (c as usize / 3, c as usize % 3));
+            found.filter(move |&(other, _)| alike(other))
         };
-        let mean = |values: &[Vec3], e: usize, vertex: u32| -> Vec3 {
-            let (mut sum, mut weight) = (DVec3::ZERO, 0.0);
-            for (other, angle) in about(e, vertex) {
-                sum += values[other].as_dvec3() * angle;
-                weight += angle;
-            }
-            match weight > 0.0 {
-                true => (sum / weight).as_vec3(),
-                false => values[e],
-            }
+        let mean = |sum: DVec3, weight: f64, own: Vec3| match weight > 0.0 {
+            true => (sum / weight).as_vec3(),
+            false => own,
         };
-        let means = each(&|e, vertex| mean(irradiance, e, vertex));
-        let left: Vec<Vec3> = (irradiance.iter().zip(&means))
-            .map(|(whole, [a, b, c])| whole - (a + b + c) / 3.0)
+        let triangles = || (0..irradiance.len()).into_par_iter();
+        let left: Vec<Vec3> = triangles()
+            .map(|e| {
+                let [a, b, c] = [0, 1, 2].map(|corner| {
+                    let (mut sum, mut weight) = (DVec3::ZERO, 0.0);
+                    for (other, k) in alike(e, corner) {
+                        let angle = self.angles[other][k];
+                        sum += irradiance[other].as_dvec3() * angle;
+                        weight += angle;
+                    }
+                    mean(sum, weight, irradiance[e])
+                });
+                irradiance[e] - (a + b + c) / 3.0
+            })
             .collect();
-        each(&|e, vertex| {
-            let values = || about(e, vertex).map(|(other, _)| irradiance[other]);
-            let low = values().fold(Vec3::INFINITY, Vec3::min);
-            let high = values().fold(Vec3::NEG_INFINITY, Vec3::max);
-            let found = mean(irradiance, e, vertex) + mean(&left, e, vertex);
+        let find = |e: usize, corner: usize| {
+            let [mut sum, mut sum_left] = [DVec3::ZERO; 2];
+            let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+            let mut weight = 0.0;
+            for (other, k) in alike(e, corner) {
+                let angle = self.angles[other][k];
+                sum += irradiance[other].as_dvec3() * angle;
+                sum_left += left[other].as_dvec3() * angle;
+                weight += angle;
+                (low, high) = (low.min(irradiance[other]), high.max(irradiance[other]));
+            }
+            let found = mean(sum, weight, irradiance[e]) + mean(sum_left, weight, left[e]);
             found.clamp(low, high)
-        })
+        };
+        let each = triangles().map(|e| [0, 1, 2].map(|corner| find(e, corner)));
+        each.collect()
     }
 }
 
 /// [`Corners::irradiance`] of a scene's own corners.
 pub fn corner_irradiance(scene: &Scene, irradiance: &[Vec3], joined: Joined) -> Vec<[Vec3; 3]> {
-    Corners::new(scene).irradiance(scene, irradiance, joined)
+    Corners::new(scene).irradiance(irradiance, joined)
 }

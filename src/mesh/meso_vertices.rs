@@ -43,9 +43,10 @@ impl MesoVertices {
         for (m, &e) in (0_u32..).zip(elements) {
             let triangle = &scene.triangles[e as usize];
             let own = frame(m);
-            let corners = triangle.vertices.map(|vertex| {
+            let corners = [0, 1, 2].map(|corner| {
+                let vertex = triangle.vertices[corner];
                 let around: Vec<(u32, f64)> = neighbours
-                    .smooth(e as usize, vertex)
+                    .smooth(e as usize, corner)
                     .filter_map(|(other, angle)| Some((*meso.get(&other)?, other, angle)))
                     .filter(|&(n, other, _)| {
                         let theirs = frame(n);

@@ -98,7 +98,7 @@ impl Mesh {
             Show::Normal => {
                 let neighbours = Corners::new(scene);
                 let coded = |n: DVec3| (PI * 0.5) * (n.as_vec3() + 1.0);
-                let of = |e| smooth_normals(scene, &neighbours, e).map(coded);
+                let of = |e| smooth_normals(&neighbours, e).map(coded);
                 (0..scene.triangles.len()).into_par_iter().map(of).collect()
             }
             _ => corner_irradiance(scene, &lighting.baked(), Joined::Smooth),
@@ -329,7 +329,7 @@ fn lit_triangles(scene: &Scene, order: &[Drawn], vertices: &[Vertex]) -> Vec<Lit
         .zip(vertices.par_chunks(3))
         .map(|(&Drawn { triangle: e, .. }, drawn)| {
             let plane = neighbours.normals[e];
-            let normals = smooth_normals(scene, &neighbours, e);
+            let normals = smooth_normals(&neighbours, e);
             let [normal_a, normal_b, normal_c] = normals.map(|normal| normal.as_vec3());
             let [a, b, c] = [0, 1, 2].map(|k| drawn[k].position);
             let furthest = a.abs().max(b.abs()).max(c.abs()).max_element();
@@ -349,9 +349,9 @@ fn lit_triangles(scene: &Scene, order: &[Drawn], vertices: &[Vertex]) -> Vec<Lit
 }
 
 /// Of a triangle's corners, unit.
-fn smooth_normals(scene: &Scene, neighbours: &Corners, e: usize) -> [DVec3; 3] {
-    scene.triangles[e].vertices.map(|vertex| {
-        let about = neighbours.smooth(e, vertex);
+fn smooth_normals(neighbours: &Corners, e: usize) -> [DVec3; 3] {
+    [0, 1, 2].map(|corner| {
+        let about = neighbours.smooth(e, corner);
         let sum: DVec3 = about.map(|(t, angle)| neighbours.normals[t] * angle).sum();
         sum.try_normalize().unwrap_or(neighbours.normals[e])
     })

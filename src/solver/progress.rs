@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use super::makers::RowKind;
 use super::{Problem, StopReason};
 use crate::mesh::sources::Source;
 
@@ -94,6 +95,53 @@ impl Bound {
     }
 }
 
+/// How long sources take to be drawn, so that no more are begun than a budget has time for.
+#[derive(Debug, Default)]
+pub(super) struct Pace {
+    /// When the oldest batch under way was the only one.
+    since: Option<Instant>,
+    /// Seconds a source, of the kind that was drawn last.
+    source: Option<(RowKind, f64)>,
+}
+
+/// Sources times elements that are begun before it is known how long they take, at most.
+const UNKNOWN_PAIRS: usize = 1 << 21;
+
+impl Pace {
+    /// A batch has begun.
+    pub fn begin(&mut self) {
+        self.since.get_or_insert_with(Instant::now);
+    }
+
+    /// The oldest batch has ended, of so many sources, and others are `under_way` or not.
+    pub fn end(&mut self, kind: RowKind, sources: usize, under_way: bool) {
+        let Some(since) = self.since.take() else {
+            return;
+        };
+        let seconds = since.elapsed().as_secs_f64();
+        self.source = Some((kind, seconds / sources.max(1) as f64));
+        self.since = under_way.then(Instant::now);
+    }
+
+    /// Sources that can begin and end in the time that is left, beside those `under_way`; one at
+    /// least where there are none.
+    pub fn fitting(
+        &self,
+        kind: RowKind,
+        left: Duration,
+        under_way: usize,
+        elements: usize,
+    ) -> usize {
+        let known = self.source.filter(|(of, _)| *of == kind);
+        let most = match known {
+            Some((_, seconds)) => (left.as_secs_f64() / seconds) as usize,
+            None => UNKNOWN_PAIRS / elements.max(1),
+        };
+        let least = usize::from(under_way == 0);
+        most.saturating_sub(under_way).max(least)
+    }
+}
+
 /// Asks after every batch whether to go on.
 pub(super) struct Watch<'a> {
     start: Instant,
@@ -128,6 +176,11 @@ impl<'a> Watch<'a> {
         );
         self.history.push(now);
         self.ask(shots, unshot, missing, true)
+    }
+
+    /// Of the budget; none without one.
+    pub fn left(&self) -> Option<Duration> {
+        (self.budget != Duration::MAX).then(|| self.budget.saturating_sub(self.start.elapsed()))
     }
 
     /// As [`Self::look`], again and again during work that draws nothing.

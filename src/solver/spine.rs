@@ -7,7 +7,7 @@
 mod settling;
 
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use glam::DVec3;
 use settling::MOST_TURNS;
@@ -18,7 +18,7 @@ use super::ledger::{Candidates, Drawn, Ledger, strongest_first};
 use super::makers::{Batch, RowKind, TeamParts};
 use super::near::NearLight;
 use super::problem::Relit;
-use super::progress::{Bound, Watch};
+use super::progress::{Bound, Pace, Watch};
 use super::rows::{Factors, Made};
 use super::team::{Taken, Team};
 use super::turns::Turns;
@@ -39,6 +39,7 @@ pub(super) struct Spine {
     pub ledger: Ledger,
     pub kept: KeptRows,
     journal: Option<Journal>,
+    pace: Pace,
     gathering: Gathering,
     pub near: NearLight,
     /// Of what sources reflect of near light.
@@ -110,6 +111,7 @@ impl Spine {
             devices: devices.to_vec(),
             team: None,
             journal: None,
+            pace: Pace::default(),
             ledger: Ledger::new(device, on, bound, rows, coupling),
             kept,
         })
@@ -272,7 +274,7 @@ impl Spine {
             self.ledger.system.release();
         }
         loop {
-            while let Some(batch) = self.choose(on, phase, report)? {
+            while let Some(batch) = self.choose(on, phase, report, watch.left())? {
                 self.submit(batch)?;
             }
             if !self.take(on, phase, report)? {
@@ -296,6 +298,7 @@ impl Spine {
             Some(journal) => journal.next(&batch)?,
             None => None,
         };
+        self.pace.begin();
         match &mut self.team {
             Some(team) => team.submit(batch, recorded, &self.kept),
             None => Ok(()),
@@ -333,6 +336,7 @@ impl Spine {
         else {
             return Ok(false);
         };
+        self.pace.end(kind, made.rows.len(), team.is_drawing());
         if let Some(journal) = self.journal.as_mut().filter(|_| !recorded) {
             journal.add(kind, &made, &self.kept);
         }
@@ -349,8 +353,14 @@ impl Spine {
         Ok(true)
     }
 
-    /// The sources of the next batch, if one is to be drawn and can begin.
-    fn choose(&mut self, on: &Problem, phase: Phase, report: &Report) -> Result<Option<Batch>> {
+    /// The sources of the next batch, if one is to be drawn, and can begin and end in this time.
+    fn choose(
+        &mut self,
+        on: &Problem,
+        phase: Phase,
+        report: &Report,
+        time: Option<Duration>,
+    ) -> Result<Option<Batch>> {
         let under_way = self.ledger.sources.iter().filter(|d| d.under_way).count() as u32;
         let limit = on.settings.shots.unwrap_or(u32::MAX);
         let chosen = report.shots + under_way;
@@ -364,12 +374,18 @@ impl Spine {
             return Ok(None);
         };
         let mut candidates = powers;
+        let recorded = self.journal.as_ref().and_then(Journal::next_size);
+        let fitting = |left| {
+            let (under_way, elements) = (under_way as usize, on.elements.len());
+            self.pace.fitting(kind, left, under_way, elements)
+        };
+        let in_time = recorded.or(time.map(fitting)).unwrap_or(usize::MAX);
         let team = self.team(on)?;
-        if !team.has_room(kind) {
+        if !team.has_room(kind) || in_time == 0 {
             return Ok(None);
         }
         candidates.sort_by(strongest_first);
-        candidates.truncate(team.slots(kind).min(left).min(worth));
+        candidates.truncate(team.slots(kind).min(left).min(worth).min(in_time));
         let sources = candidates.into_iter().map(|(s, _)| s).collect();
         Ok(Some(Batch { sources, kind }))
     }

@@ -81,6 +81,11 @@ impl Team {
         under_way.len() < SCRATCH as usize && under_way.iter().all(|batch| batch.kind == kind)
     }
 
+    /// Whether a batch is under way.
+    pub fn is_drawing(&self) -> bool {
+        !self.under_way.is_empty()
+    }
+
     /// Begins a batch, of which rows may be `recorded`.
     pub fn submit(
         &mut self,

@@ -72,7 +72,7 @@ impl Slanted {
             for (found, &e) in found.into_iter().zip(&light.elements) {
                 slants[e as usize] = found;
             }
-            about.means(scene, &slants)
+            about.means(&slants)
         };
         Self {
             all: corners(&light.incident_moment),
@@ -112,8 +112,8 @@ impl Snapshot {
     ) -> Self {
         Self {
             epoch,
-            corners: about.irradiance(scene, &irradiance, Joined::Smooth),
-            corners_direct: about.irradiance(scene, &direct, Joined::Smooth),
+            corners: about.irradiance(&irradiance, Joined::Smooth),
+            corners_direct: about.irradiance(&direct, Joined::Smooth),
             exposure: exposure(scene, &irradiance, ambient.irradiance),
             slanted: relief
                 .as_ref()

@@ -4,17 +4,16 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::pipeline::{Module, PipelineOwner, constant_entries};
+use super::pipeline::{Module, PipelineOwner, constant_entries, recipe};
 use super::{ComputeShader, DescriptorSet, Device, ShaderBindings};
 use crate::error::Result;
 
 /// A compute shader with its specialisation constants 0, 1, …. A clone is another handle to the
-/// same pipeline.
-///
-/// Commands that record it keep it alive.
+/// same pipeline, and so is one of the same shader and constants: the device makes it once.
 #[derive(Clone)]
 pub struct ComputePipeline {
     pub(super) owner: Arc<PipelineOwner>,
+    device: Arc<Device>,
 }
 
 impl ComputePipeline {
@@ -58,9 +57,30 @@ impl ComputePipeline {
         constants: &[u32],
         subgroups: bool,
     ) -> Result<Self> {
-        let stages = vk::ShaderStageFlags::COMPUTE;
-        let mut owner = PipelineOwner::with_layouts(device, name, shader.interface, stages)?;
-        let module = Module::new(device, shader.spirv)?;
+        let of = recipe(
+            &[shader.spirv],
+            format_args!("{constants:?} {subgroups} {:?}", shader.interface),
+        );
+        let make = || {
+            let stages = vk::ShaderStageFlags::COMPUTE;
+            PipelineOwner::new(device, name, shader.interface, stages, |layout| {
+                Self::make(device, shader.spirv, constants, subgroups, layout)
+            })
+        };
+        Ok(Self {
+            owner: device.pipelines.find_or_make(of, make)?,
+            device: Arc::clone(device),
+        })
+    }
+
+    fn make(
+        device: &Device,
+        spirv: &[u32],
+        constants: &[u32],
+        subgroups: bool,
+        layout: vk::PipelineLayout,
+    ) -> Result<vk::Pipeline> {
+        let module = Module::new(device, spirv)?;
         let entries = constant_entries(constants);
         let specialisation = vk::SpecializationInfo::default()
             .map_entries(&entries)
@@ -68,7 +88,7 @@ impl ComputePipeline {
         let mut size = vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo::default()
             .required_subgroup_size(device.limits().subgroup_size);
         let mut stage = vk::PipelineShaderStageCreateInfo::default()
-            .stage(stages)
+            .stage(vk::ShaderStageFlags::COMPUTE)
             .module(module.raw)
             .name(c"main")
             .specialization_info(&specialisation);
@@ -79,18 +99,15 @@ impl ComputePipeline {
         }
         let info = vk::ComputePipelineCreateInfo::default()
             .stage(stage)
-            .layout(owner.layout);
+            .layout(layout);
         // SAFETY: module, layout and constants outlive the call.
-        owner.raw = unsafe {
+        let made = unsafe {
             device
                 .raw
                 .create_compute_pipelines(vk::PipelineCache::null(), &[info], None)
-        }
-        .map_err(|(_, e)| device.error("creating a compute pipeline")(e))?[0];
-        device.set_name(owner.raw, name);
-        Ok(Self {
-            owner: Arc::new(owner),
-        })
+        };
+        let made = made.map_err(|(_, e)| device.error("creating a compute pipeline")(e))?;
+        Ok(made[0])
     }
 
     /// The pipeline with a descriptor set of its own.
@@ -99,7 +116,7 @@ impl ComputePipeline {
     /// A device that fails.
     pub fn bind(&self, bindings: &impl ShaderBindings) -> Result<BoundCompute> {
         Ok(BoundCompute {
-            set: (self.owner.descriptors).bind(&self.owner.name, bindings)?,
+            set: (self.owner.descriptors).bind(&self.device, &self.owner.name, bindings)?,
             pipeline: self.clone(),
         })
     }

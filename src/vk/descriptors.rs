@@ -34,11 +34,10 @@ pub enum Bind<'a> {
     Texels(&'a Buffer),
 }
 
-/// The bindings of a pipeline.
+/// The bindings of a pipeline, which destroys it.
 pub(super) struct DescriptorLayout {
     pub(super) raw: vk::DescriptorSetLayout,
     pub(super) bindings: &'static [ShaderBinding],
-    device: Arc<Device>,
 }
 
 /// A descriptor set with its own pool. A clone is another handle to the same set.
@@ -61,7 +60,7 @@ impl DescriptorLayout {
     /// # Errors
     /// A device that fails.
     pub(super) fn new(
-        device: &Arc<Device>,
+        device: &Device,
         name: &str,
         bindings: &'static [ShaderBinding],
     ) -> Result<Self> {
@@ -84,11 +83,7 @@ impl DescriptorLayout {
         let raw = unsafe { device.raw.create_descriptor_set_layout(&info, None) }
             .map_err(device.error("creating a descriptor layout"))?;
         device.set_name(raw, name);
-        Ok(Self {
-            raw,
-            bindings,
-            device: Arc::clone(device),
-        })
+        Ok(Self { raw, bindings })
     }
 
     /// A set with everything bound.
@@ -97,6 +92,7 @@ impl DescriptorLayout {
     /// A device that fails.
     pub(super) fn bind<B: ShaderBindings>(
         &self,
+        device: &Arc<Device>,
         name: &str,
         bindings: &B,
     ) -> Result<DescriptorSet> {
@@ -105,7 +101,7 @@ impl DescriptorLayout {
             B::BINDINGS,
             "{name}: the bindings of the pipeline"
         );
-        let mut set = self.allocate(name)?;
+        let mut set = self.allocate(device, name)?;
         for (number, bind) in (0..).zip(&bindings.binds()) {
             set.write(number, bind);
         }
@@ -115,8 +111,7 @@ impl DescriptorLayout {
     }
 
     /// A set without content, in a pool that has room for this set alone.
-    fn allocate(&self, name: &str) -> Result<DescriptorSetOwner> {
-        let device = &self.device;
+    fn allocate(&self, device: &Arc<Device>, name: &str) -> Result<DescriptorSetOwner> {
         let sizes: Vec<_> = [Binding::Storage, Binding::Sampled, Binding::Texels]
             .into_iter()
             .filter_map(|kind| {
@@ -207,17 +202,6 @@ impl Binding {
             Self::Texels if device.limits().stored_texels => vk::DescriptorType::STORAGE_BUFFER,
             Self::Sampled => vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
             Self::Texels => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
-        }
-    }
-}
-
-impl Drop for DescriptorLayout {
-    fn drop(&mut self) {
-        // SAFETY: a layout may be destroyed before the sets and pipelines made with it.
-        unsafe {
-            self.device
-                .raw
-                .destroy_descriptor_set_layout(self.raw, None);
         }
     }
 }

@@ -14,6 +14,7 @@ use gpu_allocator::vulkan::{
 use gpu_allocator::{AllocationSizes, MemoryLocation};
 
 use super::instance::{Candidate, Instance, graphics_family};
+use super::pipeline::Pipelines;
 use super::uploads::Uploads;
 use super::{TEXEL_BYTES, change_lists, lock, walk_lists};
 use crate::error::{Error, Result};
@@ -28,6 +29,7 @@ pub struct Device {
     candidate: Candidate,
     limits: Limits,
     pub(super) uploads: Mutex<Uploads>,
+    pub(super) pipelines: Pipelines,
     /// Submissions so far.
     pub(super) submissions: AtomicU64,
     part_times: Mutex<Option<PartTimes>>,
@@ -128,6 +130,7 @@ impl Device {
             candidate: candidate.clone(),
             part_times: Mutex::default(),
             uploads: Mutex::default(),
+            pipelines: Pipelines::default(),
             submissions: AtomicU64::new(0),
             instance: Arc::clone(instance),
         }))
@@ -163,6 +166,11 @@ impl Device {
             *count += 1;
             *longest = time.max(*longest);
         }
+    }
+
+    /// Pipelines that were made; what is made of the same shaders and state is one.
+    pub fn pipelines(&self) -> usize {
+        self.pipelines.count()
     }
 
     /// Submissions to the queue since the device was made.
@@ -354,6 +362,7 @@ impl Drop for Device {
         // dropped before the device.
         unsafe {
             let _ = self.raw.device_wait_idle();
+            self.pipelines.destroy(&self.raw);
             ManuallyDrop::drop(self.allocator.get_mut().unwrap_or_else(|e| e.into_inner()));
             self.raw.destroy_device(None);
         }

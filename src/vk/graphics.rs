@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::pipeline::{Module, PipelineOwner, constant_entries};
+use super::pipeline::{Module, PipelineOwner, constant_entries, recipe};
 use super::{DescriptorSet, Device, GraphicsShaders, RenderPass, ShaderBindings};
 use crate::error::Result;
 
@@ -38,12 +38,12 @@ pub enum Sides {
     Backs,
 }
 
-/// A graphics pipeline. A clone is another handle to the same pipeline.
-///
-/// Commands that record it keep it alive.
+/// A graphics pipeline. A clone is another handle to the same pipeline, and so is one of the same
+/// state: the device makes it once.
 #[derive(Clone)]
 pub struct GraphicsPipeline {
     pub(super) owner: Arc<PipelineOwner>,
+    device: Arc<Device>,
 }
 
 pub(super) const GRAPHICS_STAGES: vk::ShaderStageFlags = vk::ShaderStageFlags::from_raw(
@@ -72,12 +72,29 @@ impl GraphicsPipeline {
     /// # Errors
     /// A device that fails.
     pub fn new(device: &Arc<Device>, pass: &RenderPass, state: &GraphicsState<'_>) -> Result<Self> {
-        let mut owner = PipelineOwner::with_layouts(
-            device,
-            state.name,
-            state.shaders.interface,
-            GRAPHICS_STAGES,
-        )?;
+        let shaders = [state.shaders.vertex, state.shaders.fragment];
+        let of = recipe(
+            &shaders,
+            format_args!("{:?} {:?}", pass.owner.colour, state.fixed()),
+        );
+        let make = || {
+            let interface = state.shaders.interface;
+            PipelineOwner::new(device, state.name, interface, GRAPHICS_STAGES, |layout| {
+                Self::make(device, pass, state, layout)
+            })
+        };
+        Ok(Self {
+            owner: device.pipelines.find_or_make(of, make)?,
+            device: Arc::clone(device),
+        })
+    }
+
+    fn make(
+        device: &Device,
+        pass: &RenderPass,
+        state: &GraphicsState<'_>,
+        layout: vk::PipelineLayout,
+    ) -> Result<vk::Pipeline> {
         let vertex = Module::new(device, state.shaders.vertex)?;
         let fragment = Module::new(device, state.shaders.fragment)?;
         let entries = constant_entries(state.constants);
@@ -135,19 +152,16 @@ impl GraphicsPipeline {
             .depth_stencil_state(&depth)
             .color_blend_state(&blend)
             .dynamic_state(&dynamic)
-            .layout(owner.layout)
+            .layout(layout)
             .render_pass(pass.owner.raw);
         // SAFETY: everything that `info` points to outlives the call.
-        owner.raw = unsafe {
+        let made = unsafe {
             device
                 .raw
                 .create_graphics_pipelines(vk::PipelineCache::null(), &[info], None)
-        }
-        .map_err(|(_, e)| device.error("creating a graphics pipeline")(e))?[0];
-        device.set_name(owner.raw, state.name);
-        Ok(Self {
-            owner: Arc::new(owner),
-        })
+        };
+        let made = made.map_err(|(_, e)| device.error("creating a graphics pipeline")(e))?;
+        Ok(made[0])
     }
 
     /// A descriptor set for this pipeline.
@@ -155,7 +169,7 @@ impl GraphicsPipeline {
     /// # Errors
     /// A device that fails.
     pub fn bind(&self, name: &str, bindings: &impl ShaderBindings) -> Result<DescriptorSet> {
-        self.owner.descriptors.bind(name, bindings)
+        (self.owner.descriptors).bind(&self.device, name, bindings)
     }
 }
 
@@ -170,6 +184,19 @@ fn stage<'a>(
 }
 
 impl GraphicsState<'_> {
+    /// All that does not come from shaders.
+    fn fixed(&self) -> impl std::fmt::Debug {
+        let vertices = (self.vertex_stride, self.attributes);
+        let interface = self.shaders.interface;
+        (
+            interface,
+            self.constants,
+            vertices,
+            self.blending,
+            self.sides,
+        )
+    }
+
     fn attribute_descriptions(&self) -> Vec<vk::VertexInputAttributeDescription> {
         (0..)
             .zip(self.attributes)

@@ -96,6 +96,8 @@ pub struct RenderPass {
 
 pub(super) struct RenderPassOwner {
     pub(super) raw: vk::RenderPass,
+    /// Render passes of equal ones are compatible.
+    pub(super) colour: Attachment,
     device: Arc<Device>,
 }
 
@@ -163,7 +165,11 @@ impl RenderPass {
         device.set_name(raw, name);
         let device = Arc::clone(device);
         Ok(Self {
-            owner: Arc::new(RenderPassOwner { raw, device }),
+            owner: Arc::new(RenderPassOwner {
+                raw,
+                colour,
+                device,
+            }),
         })
     }
 }

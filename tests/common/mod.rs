@@ -23,9 +23,15 @@ use mesolux::solver::ReliefLight;
 use mesolux::solver::{Light, Report, Settings, Solver, open_device};
 use mesolux::vk::{Device, validation_log};
 
-/// The device that the program itself would take, watched by the validation layer. No device is a
-/// failure.
+/// The device that the program itself would take, watched by the validation layer, one for each
+/// test: its pipelines are made once. No device is a failure.
 pub fn device() -> Arc<Device> {
+    thread_local!(static DEVICE: Arc<Device> = own_device());
+    DEVICE.with(Arc::clone)
+}
+
+/// A device that nobody else has.
+pub fn own_device() -> Arc<Device> {
     open_device(std::env::var("MESOLUX_TEST_DEVICE").ok().as_deref(), true).expect(
         "the tests need a Vulkan device (Debian: mesa-vulkan-drivers, vulkan-validationlayers)",
     )

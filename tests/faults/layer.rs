@@ -3,8 +3,8 @@
 //!
 //! `MESOLUX_FAULT="vkCreateBuffer 3 -2"`: the third call of vkCreateBuffer gives
 //! `VK_ERROR_OUT_OF_DEVICE_MEMORY` and is not passed on; `3+`: and so do all after it. After
-//! `VK_ERROR_DEVICE_LOST` (−4) the device stays lost. `MESOLUX_FAULT_CALLS=FILE` writes the name of
-//! each call to a file.
+//! `VK_ERROR_DEVICE_LOST` (−4) the device stays lost; `MESOLUX_FAULT_MADE=FILE` is made at the fault.
+//! `MESOLUX_FAULT_CALLS=FILE` writes the name of each call to a file.
 //!
 //! Arguments are integers and pointers, which registers and the stack hold alike; all are passed on
 //! as words.
@@ -74,6 +74,9 @@ fn fails(name: &str, count: &AtomicUsize) -> Option<i32> {
         return None;
     }
     LOST.fetch_or(fault.result == DEVICE_LOST, SeqCst);
+    if let Some(path) = std::env::var_os("MESOLUX_FAULT_MADE") {
+        let _ = File::create(path);
+    }
     Some(fault.result)
 }
 

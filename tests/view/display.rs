@@ -13,7 +13,8 @@ impl Display {
     pub fn new() -> Self {
         let mut server = Command::new("Xvfb")
             .args(["-displayfd", "1", "-screen", "0", "1024x768x24"])
-            .args(["-nolisten", "tcp"])
+            // A server that begins again after its last client refuses those that come meanwhile.
+            .args(["-nolisten", "tcp", "-noreset"])
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()

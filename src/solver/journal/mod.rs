@@ -185,6 +185,12 @@ impl Journal {
         Ok(Some(recorded.into_rows()))
     }
 
+    /// Sources of the next recorded batch: how many are begun at once may depend on time.
+    pub fn next_size(&self) -> Option<usize> {
+        let recorded = self.recorded.front()?;
+        Some(recorded.sources().len())
+    }
+
     /// Rows that are still to be asked for.
     pub fn rows(&self) -> usize {
         self.recorded

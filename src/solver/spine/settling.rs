@@ -59,7 +59,7 @@ impl Spine {
         self.ledger.system.release();
         loop {
             while self.ledger.lacks_emitters() {
-                let Some(batch) = self.choose(on, Phase::First, report)? else {
+                let Some(batch) = self.choose(on, Phase::First, report, None)? else {
                     break;
                 };
                 self.submit(batch)?;

@@ -43,7 +43,6 @@ impl Commands {
         let pipeline = &pipeline.owner;
         let bytes = pipeline.push_constants(push);
         pipeline.check_set(&set.owner);
-        self.hold(pipeline);
         self.hold(&set.owner);
         let raw = &self.device.raw;
         // SAFETY: set and constants are those of the pipeline, as checked.

@@ -70,7 +70,6 @@ impl Commands {
     ) {
         let pipeline = &pipeline.owner;
         pipeline.check_set(&set.owner);
-        self.hold(pipeline);
         self.hold(&set.owner);
         let raw = &self.device.raw;
         // SAFETY: the set is one of the pipeline, as checked; vertices match by construction of
