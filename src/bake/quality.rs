@@ -112,7 +112,13 @@ pub fn sized(hemicube: u32, scale: f64) -> Settings {
 /// The default grouping with sources `scale` times as large in elements, area and power.
 pub fn scaled(scale: f64) -> Grouping {
     let plain = Grouping::default();
+    let sky_bands = match scale {
+        8.0.. => 14,
+        4.0.. => 18,
+        _ => plain.sky_bands,
+    };
     Grouping {
+        sky_bands,
         max_elements: ((plain.max_elements as f64 * scale).round() as usize).max(1),
         max_area: plain.max_area * scale,
         max_power: plain.max_power * scale,
@@ -139,7 +145,7 @@ mod tests {
             better.check().expect("settings that can be solved");
             assert!(better.hemicube >= worse.hemicube && better.residual <= worse.residual);
             assert!(b.max_elements <= a.max_elements && b.max_area <= a.max_area);
-            assert!(b.max_power <= a.max_power);
+            assert!(b.max_power <= a.max_power && b.sky_bands >= a.sky_bands);
             assert!(better.emitter_places >= worse.emitter_places);
             assert!(better.places >= worse.places);
             assert!(better.nearness.source <= worse.nearness.source);

@@ -105,7 +105,7 @@ pub(super) struct Pace {
 }
 
 /// Sources times elements that are begun before it is known how long they take, at most.
-const UNKNOWN_PAIRS: usize = 1 << 21;
+const UNKNOWN_PAIRS: usize = 1 << 20;
 
 impl Pace {
     /// A batch has begun.

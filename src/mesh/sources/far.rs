@@ -21,9 +21,6 @@ use crate::scene::sky::{Sky, SkyPart};
 use crate::scene::{Beam, Lights, PointLight, Sun};
 use crate::structs::ShadowOccluder;
 
-/// Bands from the nadir to the zenith, an even number: parts of 6° each way.
-const BANDS: u32 = 30;
-
 /// Samples of a part's light, each way.
 const GRID: usize = 16;
 
@@ -35,9 +32,9 @@ const MOST_CUTS: u32 = 4;
 const SHARP: f64 = 1e-6;
 
 /// All sources of the lights that are no surfaces and no even points.
-pub(super) fn far(lights: &Lights, elements: &Elements) -> Vec<Source> {
+pub(super) fn far(lights: &Lights, elements: &Elements, sky_bands: u32) -> Vec<Source> {
     let mut list: Vec<Source> = lights.suns.iter().filter_map(sun).collect();
-    list.extend(lights.sky.iter().flat_map(sky));
+    list.extend(lights.sky.iter().flat_map(|of| sky(of, sky_bands)));
     let beams = lights.points.iter().filter_map(|light| {
         let beam = light.beam.as_ref()?;
         Some(self::beam(light, beam, elements))
@@ -70,14 +67,14 @@ fn sun(sun: &Sun) -> Option<Source> {
     Some(source(KIND_SUN, directions, size, radiosity))
 }
 
-/// Parts of a sky that shine.
-fn sky(sky: &Sky) -> Vec<Source> {
+/// Parts of a sky that shine, in so many bands from the nadir to the zenith.
+fn sky(sky: &Sky, bands: u32) -> Vec<Source> {
     let mut parts: Vec<(SkyPart, Lit)> = Vec::new();
     let mut add = |part: SkyPart| parts.push((part, Lit::of(&part, sky)));
-    for band in 0..BANDS {
-        let angle = |band: u32| PI * (f64::from(band) / f64::from(BANDS) - 0.5);
+    for band in 0..bands {
+        let angle = |band: u32| PI * (f64::from(band) / f64::from(bands) - 0.5);
         let flat = angle(band).midpoint(angle(band + 1)).cos();
-        let columns = (f64::from(2 * BANDS) * flat).round().max(3.0) as u32;
+        let columns = (f64::from(2 * bands) * flat).round().max(3.0) as u32;
         for column in 0..columns {
             let turns = |column: u32| f64::from(column) / f64::from(columns);
             add(SkyPart {

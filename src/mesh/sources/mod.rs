@@ -51,6 +51,8 @@ pub struct Grouping {
     pub max_unevenness: f64,
     /// Whether every element is a source of its own, whatever it is.
     pub alone: bool,
+    /// Bands of a sky's parts from the nadir to the zenith, an even number: 30 are of 6° each way.
+    pub sky_bands: u32,
 }
 
 impl Grouping {
@@ -61,6 +63,7 @@ impl Grouping {
         max_power: f64::INFINITY,
         max_unevenness: f64::INFINITY,
         alone: true,
+        sky_bands: 30,
     };
 
     /// The work of drawing grows as sources times elements, and the work near a source as elements
@@ -83,6 +86,7 @@ impl Default for Grouping {
             max_power: 1.0 / 32.0,
             max_unevenness: 0.025,
             alone: false,
+            sky_bands: 30,
         }
     }
 }
@@ -186,6 +190,8 @@ pub struct Sources {
     pub chart: Vec<u32>,
     /// Range of the list whose elements have a relief.
     pub relief: std::ops::Range<usize>,
+    /// See [`Grouping::sky_bands`].
+    sky_bands: u32,
 }
 
 impl Sources {
@@ -223,7 +229,7 @@ impl Sources {
         for light in lights.points.iter().filter(|light| light.beam.is_none()) {
             self.list.extend(point(light, elements));
         }
-        self.list.extend(far(lights, elements));
+        self.list.extend(far(lights, elements, self.sky_bands));
         turn_frames(&mut self.list, seed);
     }
 }
@@ -274,6 +280,7 @@ pub fn group_by(
         black: 0,
         chart: groups.chart,
         relief: 0..0,
+        sky_bands: grouping.sky_bands,
     };
     let can_shoot = |e: usize| (elements.reflectance[e] + elements.emitted[e]).max_element() > 0.0;
     let mut plain = None;

@@ -165,13 +165,21 @@ impl Scene {
 
     /// Cuts triangles as `refinement` says. The result has [`Scene::refined_from`].
     pub fn refined(&self, refinement: &Refinement) -> Self {
+        let (count, most) = (self.triangles.len(), refinement.max_elements);
+        // What would be found by trying ever coarser sizes.
+        let uncut = || {
+            let mut whole = Cutting::new(self).into_scene(self);
+            whole.notes.push(format!(
+                "the {count} triangles are not cut into elements: --max-elements {most}"
+            ));
+            whole
+        };
         let area: f64 = self.triangles.iter().map(|t| area(self.corners(t))).sum();
         let Refinement { fineness, .. } = *refinement;
         let even = 2.0 * (area / Refinement::EVEN).sqrt() / fineness;
         let mut size = refinement.element_size.unwrap_or(even);
         let least = Least::new(fineness);
         let shadow = SHADOW / (fineness * fineness);
-        let most = refinement.max_elements.max(self.triangles.len());
         let surroundings = Surroundings::new(self);
         let wanted = size;
         loop {
@@ -183,12 +191,15 @@ impl Scene {
                 of_shell: OF_SHELL * size / wanted,
             };
             let mut cutting = Cutting::new(self);
-            if !cutting.until(|cut, t| wish.is_met(cut, t), most) {
-                size *= COARSER;
-                continue;
+            let most = most.max(count);
+            let fits = cutting.until(|cut, t| wish.is_met(cut, t), most) && {
+                let lines = outlines::outlines(self, &surroundings, size);
+                splitting::split_along(&mut cutting, &lines, most)
+            };
+            if !fits && count == most {
+                return uncut();
             }
-            let lines = outlines::outlines(self, &surroundings, size);
-            if !splitting::split_along(&mut cutting, &lines, most) {
+            if !fits {
                 size *= COARSER;
                 continue;
             }
