@@ -153,6 +153,12 @@ fn cuts_are_finer_where_shadows_end() {
             .iter()
             .any(|note| note.contains("--max-elements 500"))
     );
+    let whole = scene.refined(&Refinement {
+        max_elements: 1,
+        ..Refinement::default()
+    });
+    assert_eq!(whole.triangles, scene.triangles);
+    assert!(whole.notes.iter().any(|note| note.contains("not cut")));
     let fine = Refinement {
         element_size: Some(100.0),
         ..Refinement::default()
