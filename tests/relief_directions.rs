@@ -110,7 +110,7 @@ impl Walls {
         let fine = displace(scene).expect("it is small");
         let wanted = Wanted {
             sample: Sample::Some(300),
-            paths: 8_000,
+            paths: 16_000,
             seed: 7,
             direct: true,
         };
