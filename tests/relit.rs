@@ -5,7 +5,7 @@ mod common;
 use common::{Build, assert_silent, device};
 use glam::{DVec3, Vec3};
 use mesolux::bake;
-use mesolux::solver::{Light, Settings, Solver};
+use mesolux::solver::{Light, Settings, Solver, StopReason, Update};
 
 /// Largest difference over the mean of what it is of, RGB.
 fn apart(a: &[Vec3], b: &[Vec3]) -> f64 {
@@ -40,10 +40,21 @@ fn emitted_light_comes_first_then_what_coupling_makes_of_it() {
         assert_eq!(emitted.irradiance, emitted.irradiance_direct);
         // The two halves of the point light.
         assert_eq!(solver.report().shots, 2);
-        let brought = solver.gather_coupled(|| true);
-        assert!(brought.expect("reflected light arrives"));
+        // Stopped on the way, and gone on with.
+        for goes_on in [false, true] {
+            let brought = solver.gather_coupled(|| goes_on);
+            assert_eq!(brought.expect("reflected light arrives"), goes_on);
+        }
         let coupled = light(&solver);
+        let mut looks = 0;
+        let not_drawing = |update: &Update| {
+            looks += u32::from(!update.draws);
+            update.draws
+        };
+        solver.run(not_drawing).expect("it is stopped");
+        assert_eq!(solver.report().stop, StopReason::Interrupted);
         solver.run(|_| true).expect("it is solved");
+        assert_eq!((looks, solver.report().stop), (1, StopReason::Residual));
         let all = light(&solver);
 
         let direct = apart(&emitted.irradiance, &all.irradiance_direct);

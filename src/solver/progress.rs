@@ -113,13 +113,13 @@ impl Pace {
         self.since.get_or_insert_with(Instant::now);
     }
 
-    /// The oldest batch has ended, of so many sources, and others are `under_way` or not.
-    pub fn end(&mut self, kind: RowKind, sources: usize, under_way: bool) {
-        let Some(since) = self.since.take() else {
-            return;
-        };
-        let seconds = since.elapsed().as_secs_f64();
-        self.source = Some((kind, seconds / sources.max(1) as f64));
+    /// The oldest batch has ended, of which so many sources were `drawn`, and others are `under_way`
+    /// or not.
+    pub fn end(&mut self, kind: RowKind, drawn: usize, under_way: bool) {
+        if let Some(since) = self.since.take().filter(|_| drawn > 0) {
+            let seconds = since.elapsed().as_secs_f64();
+            self.source = Some((kind, seconds / drawn as f64));
+        }
         self.since = under_way.then(Instant::now);
     }
 
@@ -222,4 +222,33 @@ fn time_left(history: &[(f64, f64)], target: f64) -> Option<Duration> {
     let rate = (share_then / share).ln() / (now - then);
     let left = ((share / target).ln() / rate).max(0.0);
     (left.is_finite() && left < 1e6).then(|| Duration::from_secs_f64(left))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_more_is_begun_than_there_is_time_for() {
+        let mut pace = Pace::default();
+        let fitting = |pace: &Pace, kind, seconds, under_way| {
+            pace.fitting(kind, Duration::from_secs(seconds), under_way, 1 << 18)
+        };
+        // Of an unknown pace 2²⁰ pairs.
+        assert_eq!(fitting(&pace, RowKind::Common, 100, 0), 4);
+        assert_eq!(fitting(&pace, RowKind::Common, 100, 4), 0);
+        pace.source = Some((RowKind::Common, 3.0));
+        assert_eq!(fitting(&pace, RowKind::Common, 100, 0), 33);
+        assert_eq!(fitting(&pace, RowKind::Common, 100, 20), 13);
+        assert_eq!(fitting(&pace, RowKind::Common, 2, 0), 1);
+        assert_eq!(fitting(&pace, RowKind::Common, 2, 1), 0);
+        assert_eq!(fitting(&pace, RowKind::Strong, 100, 0), 4);
+        // What was recorded says nothing of it.
+        pace.begin();
+        pace.end(RowKind::Common, 0, false);
+        assert_eq!(fitting(&pace, RowKind::Common, 100, 0), 33);
+        pace.begin();
+        pace.end(RowKind::Common, 5, false);
+        assert!(fitting(&pace, RowKind::Common, 100, 0) > 33);
+    }
 }

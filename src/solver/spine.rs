@@ -336,7 +336,8 @@ impl Spine {
         else {
             return Ok(false);
         };
-        self.pace.end(kind, made.rows.len(), team.is_drawing());
+        let drawn = if recorded { 0 } else { made.rows.len() };
+        self.pace.end(kind, drawn, team.is_drawing());
         if let Some(journal) = self.journal.as_mut().filter(|_| !recorded) {
             journal.add(kind, &made, &self.kept);
         }
