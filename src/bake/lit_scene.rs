@@ -33,7 +33,7 @@ const GROUPING: Grouping = Grouping {
     max_power: f64::INFINITY,
     max_unevenness: f64::INFINITY,
     alone: false,
-    sky_bands: 30,
+    sky_bands: Grouping::SKY_BANDS,
 };
 
 impl LitScene {

@@ -88,8 +88,8 @@ impl Gathering {
         })
     }
 
-    /// Adds what these rows bring, part by part: after each part `go_on` is passed its rows. Whether
-    /// it never said no.
+    /// Adds what these rows bring, part by part, and passes the rows of each part to `go_on`.
+    /// Returns whether it never said no.
     pub fn run(
         &self,
         mut rows: Vec<LitRow>,

@@ -17,8 +17,8 @@ pub struct Update {
     /// Power that can still be missing, as a share of all that was emitted; none where a
     /// reflectance is 1.
     pub error_bound: Option<f64>,
-    /// Sources are drawn. Otherwise their light is brought to the elements: who stops there lets
-    /// that begin again.
+    /// Whether sources are being drawn. Otherwise their light is brought to the elements; stopping
+    /// there makes the next turn begin that again.
     pub draws: bool,
     /// Since the start of the solution.
     pub elapsed: Duration,
@@ -113,8 +113,7 @@ impl Pace {
         self.since.get_or_insert_with(Instant::now);
     }
 
-    /// The oldest batch has ended, of which so many sources were `drawn`, and others are `under_way`
-    /// or not.
+    /// The oldest batch has ended, with so many sources `drawn`. `under_way`: there are others.
     pub fn end(&mut self, kind: RowKind, drawn: usize, under_way: bool) {
         if let Some(since) = self.since.take().filter(|_| drawn > 0) {
             let seconds = since.elapsed().as_secs_f64();

@@ -17,7 +17,7 @@ pub(super) struct Pipelines(Mutex<HashMap<Recipe, Entry>>);
 /// A hash of what a pipeline is made of.
 pub(super) type Recipe = [u8; 32];
 
-/// Locked while the pipeline is made, so that whoever wants the same waits for it.
+/// Locked while the pipeline is made: other threads that need it wait.
 type Entry = Arc<Mutex<Option<Arc<PipelineOwner>>>>;
 
 /// A pipeline with its layouts. It lives as long as its device, which destroys it.
@@ -56,7 +56,8 @@ impl Pipelines {
     }
 
     pub(super) fn count(&self) -> usize {
-        lock(&self.0).len()
+        let made = |entry: &&Entry| lock(entry).is_some();
+        lock(&self.0).values().filter(made).count()
     }
 
     /// # Safety

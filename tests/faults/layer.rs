@@ -3,8 +3,8 @@
 //!
 //! `MESOLUX_FAULT="vkCreateBuffer 3 -2"`: the third call of vkCreateBuffer gives
 //! `VK_ERROR_OUT_OF_DEVICE_MEMORY` and is not passed on; `3+`: and so do all after it. After
-//! `VK_ERROR_DEVICE_LOST` (−4) the device stays lost; `MESOLUX_FAULT_MADE=FILE` is made at the fault.
-//! `MESOLUX_FAULT_CALLS=FILE` writes the name of each call to a file.
+//! `VK_ERROR_DEVICE_LOST` (−4) the device stays lost. The fault makes the file of
+//! `MESOLUX_FAULT_MADE=FILE`; `MESOLUX_FAULT_CALLS=FILE` writes the name of each call to a file.
 //!
 //! Arguments are integers and pointers, which registers and the stack hold alike; all are passed on
 //! as words.

@@ -51,7 +51,7 @@ pub struct Grouping {
     pub max_unevenness: f64,
     /// Whether every element is a source of its own, whatever it is.
     pub alone: bool,
-    /// Bands of a sky's parts from the nadir to the zenith, an even number: 30 are of 6° each way.
+    /// Bands of a sky's parts from the nadir to the zenith, an even number.
     pub sky_bands: u32,
 }
 
@@ -63,8 +63,11 @@ impl Grouping {
         max_power: f64::INFINITY,
         max_unevenness: f64::INFINITY,
         alone: true,
-        sky_bands: 30,
+        sky_bands: Self::SKY_BANDS,
     };
+
+    /// Of [`Self::sky_bands`] by default: parts of 6° each way.
+    pub const SKY_BANDS: u32 = 30;
 
     /// The work of drawing grows as sources times elements, and the work near a source as elements
     /// times members of a source. With members as the square root of the elements both grow alike,
@@ -86,7 +89,7 @@ impl Default for Grouping {
             max_power: 1.0 / 32.0,
             max_unevenness: 0.025,
             alone: false,
-            sky_bands: 30,
+            sky_bands: Self::SKY_BANDS,
         }
     }
 }

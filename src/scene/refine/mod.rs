@@ -165,15 +165,8 @@ impl Scene {
 
     /// Cuts triangles as `refinement` says. The result has [`Scene::refined_from`].
     pub fn refined(&self, refinement: &Refinement) -> Self {
-        let (count, most) = (self.triangles.len(), refinement.max_elements);
-        // What would be found by trying ever coarser sizes.
-        let uncut = || {
-            let mut whole = Cutting::new(self).into_scene(self);
-            whole.notes.push(format!(
-                "the {count} triangles are not cut into elements: --max-elements {most}"
-            ));
-            whole
-        };
+        let (count, limit) = (self.triangles.len(), refinement.max_elements);
+        let most = limit.max(count);
         let area: f64 = self.triangles.iter().map(|t| area(self.corners(t))).sum();
         let Refinement { fineness, .. } = *refinement;
         let even = 2.0 * (area / Refinement::EVEN).sqrt() / fineness;
@@ -191,13 +184,17 @@ impl Scene {
                 of_shell: OF_SHELL * size / wanted,
             };
             let mut cutting = Cutting::new(self);
-            let most = most.max(count);
             let fits = cutting.until(|cut, t| wish.is_met(cut, t), most) && {
                 let lines = outlines::outlines(self, &surroundings, size);
                 splitting::split_along(&mut cutting, &lines, most)
             };
             if !fits && count == most {
-                return uncut();
+                // What ever coarser sizes would give.
+                let mut whole = Cutting::new(self).into_scene(self);
+                whole.notes.push(format!(
+                    "the {count} triangles are not cut into elements: --max-elements {limit}"
+                ));
+                return whole;
             }
             if !fits {
                 size *= COARSER;

@@ -135,8 +135,10 @@ impl Spine {
         watch: &mut Watch<'_>,
     ) -> Result<bool> {
         let mut go_on = self.looks(report, watch);
-        let moved = self.bring(on, by_direction, report, &mut go_on)?;
-        let settled = moved.is_some_and(|moved| self.is_still(moved));
+        let Some(moved) = self.bring(on, by_direction, report, &mut go_on)? else {
+            return Ok(false);
+        };
+        let settled = self.is_still(moved);
         if !settled {
             let most = UNSOLVED * self.ledger.bound.stop_power();
             self.solve(most, MOST_SWEEPS, report);
