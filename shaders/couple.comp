@@ -1,7 +1,8 @@
 // Couples the drawn sources of a batch to all sources: what a source's row brings to the members of
 // each target, as a mean by weights w_j, of which those of a target sum to its area A_t. A target
 // of one reflectance has one word, Σ w_j F_js / A_t, which the host multiplies by the reflectance;
-// any other has three, Σ ρ_j w_j F_js / A_t. One invocation a target and slot.
+// any other has three, Σ ρ_j w_j F_js / A_t. One invocation a target, whose elements are all of this
+// row, and slot.
 // src/reference/couple.rs is the same in f64.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -28,6 +29,9 @@ layout(push_constant, scalar) uniform Parameters {
     uint plain_blocks;
     uint meso_count;
     uint block_count;
+    // The first elements of the row of each kind; NONE of a row without relief.
+    uint first_plain;
+    uint first_meso;
 };
 
 void main() {
@@ -36,8 +40,8 @@ void main() {
         return;
     }
     CouplingTarget target = targets[gl_GlobalInvocationID.x];
-    bool meso = target.first_element >= plain_count;
-    uint begin = target.first_element - (meso ? plain_count : 0);
+    bool meso = target.first_element >= first_meso;
+    uint begin = target.first_element - (meso ? first_meso : first_plain);
     uint end = begin + target.element_count;
     uint first_block = slot * block_count + (meso ? plain_blocks : 0);
     uint first_factor = slot * (meso ? meso_count : plain_count);

@@ -28,12 +28,15 @@ void main() {
     within = min(within, GROUP - 1);
     i = inside ? i : 0;
     uint e = first_element + i;
-    MesoElement meso = meso_elements[i];
+    uint m = first_meso + i;
+    MesoElement meso = meso_elements[m];
     vec3 middle = balls[e].xyz;
-    vec3 sum = vec3(0.0);
+    bool goes_on = inside && continues == 1;
+    uint first_sum = i * (1 + RELIEF_RANK);
+    vec3 sum = goes_on ? partial_sums[first_sum] : vec3(0.0);
     vec3 sums[RELIEF_RANK];
     for (uint r = 0; r < RELIEF_RANK; r++) {
-        sums[r] = vec3(0.0);
+        sums[r] = goes_on ? partial_sums[first_sum + 1 + r] : vec3(0.0);
     }
 
     // See gather_even.glsl.
@@ -57,7 +60,7 @@ void main() {
             vec3 light = sent_to(first + from, sender(shot.source), middle);
             vec3 f = factor(subgroupBroadcast(mine.block, from), within, shot.scale, inside);
             sum += f.z * light;
-            receive_by_direction(i, meso.response, f, light, sums);
+            receive_by_direction(m, meso.response, f, light, sums);
         }
         while (any(notEqual(even, uvec4(0)))) {
             uint from = next_lane(even);
@@ -65,12 +68,17 @@ void main() {
             vec3 light = subgroupBroadcast(mine.light, from) / scale;
             vec3 f = factor(subgroupBroadcast(mine.block, from), within, scale, inside);
             sum += f.z * light;
-            receive_by_direction(i, meso.response, f, light, sums);
+            receive_by_direction(m, meso.response, f, light, sums);
         }
     }
 
-    if (inside) {
+    if (inside && is_continued == 1) {
+        partial_sums[first_sum] = sum;
+        for (uint r = 0; r < RELIEF_RANK; r++) {
+            partial_sums[first_sum + 1 + r] = sums[r];
+        }
+    } else if (inside) {
         accumulate(irradiance[e], irradiance_error[e], sum);
-        keep_coefficients(i, meso, sums);
+        keep_coefficients(m, meso, sums);
     }
 }

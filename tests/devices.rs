@@ -107,7 +107,7 @@ fn solve(
     settings: &Settings,
     kept: Option<&Visibility>,
 ) -> Solver {
-    bake::solve_on(devices, scene, settings, kept, |_| true).expect("the scene is solved")
+    bake::solve_by(&devices.into(), scene, settings, kept, |_| true).expect("the scene is solved")
 }
 
 /// Bakes with one device, two and three.
@@ -151,24 +151,46 @@ fn several_devices_give_the_bytes_of_one() {
 }
 
 #[test]
-fn so_they_do_where_few_form_factors_or_none_are_kept() {
+fn so_they_do_where_no_form_factors_are_kept() {
+    for relief in [false, true] {
+        let settings = Settings {
+            visibility_memory: Some(0),
+            residual: 5e-3,
+            ..settings()
+        };
+        let what = format!("relief {relief}, no memory");
+        let report = agree(&what, (&scene(relief, true), true), &settings);
+        assert_eq!(report.kept_sources, 0);
+        assert!(report.drawn_again > 0);
+    }
+}
+
+/// Each device has memory of its own: two keep about twice the rows, and draw fewer of them again.
+/// What is drawn again is added up apart, so that the light differs by rounding, and by what may be
+/// unshot.
+#[test]
+fn memory_for_rows_adds_up_over_devices() {
+    const RESIDUAL: f64 = 1e-4;
     for relief in [false, true] {
         let scene = scene(relief, true);
-        for memory in [0, 40 << 10] {
-            let settings = Settings {
-                visibility_memory: Some(memory),
-                residual: 5e-3,
-                ..settings()
-            };
-            let report = agree(
-                &format!("relief {relief}, {memory} bytes"),
-                (&scene, true),
-                &settings,
-            );
-            assert!(report.kept_sources < report.sources);
-            assert!(report.drawn_again > 0);
-        }
+        let settings = Settings {
+            visibility_memory: Some(40 << 10),
+            residual: RESIDUAL,
+            ..settings()
+        };
+        let all = devices(2);
+        let [one, two] = [1, 2].map(|count| solve(&all[..count], &scene, &settings, None));
+        let kept = [&one, &two].map(|solver| solver.report().kept_sources);
+        let again = [&one, &two].map(|solver| solver.report().drawn_again);
+        let [a, b] = [&one, &two].map(|solver| solver.light().expect("it comes back").irradiance);
+        let mean = a.iter().map(|e| f64::from(e.element_sum())).sum::<f64>() / a.len() as f64;
+        let apart = |(a, b): (&Vec3, &Vec3)| f64::from((*a - b).abs().element_sum()) / mean;
+        let apart = a.iter().zip(&b).map(apart).fold(0.0, f64::max);
+        println!("relief {relief}: {kept:?} kept, {again:?} again, {apart:.1e} apart");
+        assert!(kept[1] as f64 > 1.5 * kept[0] as f64 && again[1] < again[0]);
+        assert!(kept[1] < two.report().sources && apart < 10.0 * RESIDUAL);
     }
+    assert_silent();
 }
 
 #[test]
@@ -198,7 +220,7 @@ fn so_they_do_when_they_are_interrupted_and_go_on() {
         let elements =
             bake::elements(&devices[0], &scene, &settings).expect("the relief fits the device");
         let lights = &scene.lights;
-        let mut solver = Solver::on_devices(devices, elements, lights, &settings, None)
+        let mut solver = Solver::by(&devices.into(), elements, lights, &settings, None)
             .expect("the scene fits the device");
         let mut parts = Vec::new();
         for batches in [1, 2, 5, usize::MAX] {
@@ -287,10 +309,10 @@ fn the_pixel_estimator_takes_one_device() {
         ..settings()
     };
     let scene = scene(false, true);
-    let error = bake::solve_on(&devices(2), &scene, &settings, None, |_| true);
+    let error = bake::solve_by(&devices(2)[..].into(), &scene, &settings, None, |_| true);
     let error = error.err().expect("it is refused").to_string();
     println!("{error}");
     assert!(error.contains("--estimator pixel") && error.contains("--device"));
-    let none = bake::solve_on(&[], &scene, &settings, None, |_| true);
+    let none = bake::solve_by(&[][..].into(), &scene, &settings, None, |_| true);
     assert!(none.is_err());
 }

@@ -10,8 +10,9 @@ use mesolux::mesh::sources::Grouping;
 use mesolux::meso::{Options, RANK, Transport};
 use mesolux::passes::buffers::{SceneBuffers, State, download};
 use mesolux::passes::gather::Part;
-use mesolux::passes::near_to_relief::NearToRelief;
-use mesolux::passes::relief_buffers::ReliefBuffers;
+use mesolux::passes::near_to_relief::{NearParts, NearToRelief};
+use mesolux::passes::relief_buffers::{ReliefBuffers, ReliefData};
+use mesolux::passes::scene_data::SceneData;
 use mesolux::passes::types::Reflected;
 use mesolux::reference;
 use mesolux::reference::near_to_relief::receive;
@@ -270,18 +271,13 @@ fn near_parts_bring_light_as_their_twin() {
     let on = &solver.problem;
     let relief = on.elements.relief.as_ref().expect("it has relief");
     let (connections, occluders) = (&on.connections, &on.occluders);
-    let scene = SceneBuffers::new(
-        &device,
-        &on.elements,
-        &on.sources,
-        connections,
-        occluders,
-        &on.near,
-    )
-    .expect("it fits");
+    let scene = SceneData::new(&on.elements, &on.sources, connections, occluders, &on.near);
+    let scene = SceneBuffers::new(&device, &scene, scene.shape).expect("it fits");
     let state = State::new(&device, &scene).expect("it fits");
-    let buffers = ReliefBuffers::new(&device, &on.elements, relief, &on.sources).expect("it fits");
-    let pass = NearToRelief::new(&device, &on.near, &state, &buffers).expect("it is made");
+    let buffers = ReliefData::new(&on.elements, relief, &on.sources);
+    let buffers = ReliefBuffers::new(&device, &buffers).expect("it fits");
+    let pass = NearToRelief::new(&device, &NearParts::new(&on.near), &state, &buffers);
+    let pass = pass.expect("it is made");
     let pass = pass.expect("relief sees near sources");
     let light = |i: u32| Vec3::new((i % 7) as f32 - 2.0, (i % 5) as f32, 0.5 * (i % 3) as f32);
     let beyond: Vec<Vec3> = (0..on.near.parts).map(light).collect();

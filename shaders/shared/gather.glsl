@@ -37,25 +37,28 @@ layout(scalar, binding = 1) buffer Irradiance { vec3 irradiance[]; };
 layout(scalar, binding = 2) buffer IrradianceError { vec3 irradiance_error[]; };
 // Words of the chunk that holds the rows.
 layout(binding = 3) uniform usamplerBuffer words;
+// Sums of what the elements of the dispatch have received so far, [element]; to relief
+// [element][irradiance and RELIEF_RANK coefficients].
+layout(scalar, binding = 4) buffer Partial { vec3 partial_sums[]; };
 #ifdef FROM_RELIEF
-layout(scalar, binding = 4) readonly buffer Slots { Slot slots[]; };
+layout(scalar, binding = 5) readonly buffer Slots { Slot slots[]; };
 // Light that the sources with a relief send by direction,
-// [slot from first_slot on][emitted, reflected][direction].
-layout(binding = 5) uniform usamplerBuffer exits;
+// [slot from first_exit on][emitted, reflected][direction].
+layout(binding = 6) uniform usamplerBuffer exits;
 // SOURCE_TEXELS a source.
-layout(binding = 6) uniform usamplerBuffer sources;
-layout(scalar, binding = 7) readonly buffer Balls { vec4 balls[]; };
+layout(binding = 7) uniform usamplerBuffer sources;
+layout(scalar, binding = 8) readonly buffer Balls { vec4 balls[]; };
 #endif
 #ifdef TO_RELIEF
-layout(scalar, binding = 8) readonly buffer MesoElements { MesoElement meso_elements[]; };
+layout(scalar, binding = 9) readonly buffer MesoElements { MesoElement meso_elements[]; };
 // Radiosity for each coefficient, [response][rank].
-layout(binding = 9) uniform usamplerBuffer albedos;
+layout(binding = 10) uniform usamplerBuffer albedos;
 // Moments ∫ L ω dω of the light that arrives, in the element's frame, [meso
 // element][direction][colour].
-layout(scalar, binding = 10) buffer Moments { vec3 moments[]; };
-layout(scalar, binding = 11) buffer MesoReflected { Reflected meso_reflected[]; };
-layout(binding = 12) uniform usamplerBuffer bases;
-layout(scalar, binding = 13) buffer Coefficients { vec4 coefficients[]; };
+layout(scalar, binding = 11) buffer Moments { vec3 moments[]; };
+layout(scalar, binding = 12) buffer MesoReflected { Reflected meso_reflected[]; };
+layout(binding = 13) uniform usamplerBuffer bases;
+layout(scalar, binding = 14) buffer Coefficients { vec4 coefficients[]; };
 #endif
 
 layout(push_constant, scalar) uniform Parameters {
@@ -63,6 +66,7 @@ layout(push_constant, scalar) uniform Parameters {
     uint element_count;
     uint first_slot;
     uint end_slot;
+    uint first_exit;          // the slot whose light by direction comes first
     uint first_block;
     uint reflected;           // 0: light that is emitted, 1: that is reflected
     // With relief:
@@ -70,6 +74,11 @@ layout(push_constant, scalar) uniform Parameters {
     uint relief_source_count;
     uvec2 cells;              // of the directions' square
     uvec2 kept_cells;         // of the square of the slots that elements with a relief keep
+    // Rows that are added up together may lie in several chunks, a dispatch each. 1: it goes on from
+    // the sums of the dispatch before; 1: it leaves them to the next.
+    uint continues;
+    uint is_continued;
+    uint first_meso;          // of the elements with a relief, the first of the dispatch
 };
 
 #include "shared/accumulate.glsl"
@@ -110,7 +119,7 @@ Sender sender(uint source) {
 vec3 sent_to(uint slot, Sender s, vec3 middle) {
     vec3 d = middle - s.middle;
     vec3 local = vec3(dot(d, s.tangent), dot(d, s.bitangent), dot(d, s.normal));
-    return sent_towards(slot - first_slot, reflected, local * inversesqrt(max(dot(d, d), 1e-38)));
+    return sent_towards(slot - first_exit, reflected, local * inversesqrt(max(dot(d, d), 1e-38)));
 }
 
 bool by_direction(uint source) {

@@ -33,7 +33,7 @@ void main() {
         uint i = GROUP * gl_WorkGroupID.x + FACTORS * texel + n % FACTORS;
         bool inside = texel < TEXELS && i < element_count;
         receivers[n].i = inside ? i : NONE;
-        receivers[n].irradiance = vec3(0.0);
+        receivers[n].irradiance = inside && continues == 1 ? partial_sums[i] : vec3(0.0);
 #ifdef FROM_RELIEF
         receivers[n].middle = inside ? balls[first_element + i].xyz : vec3(0.0);
 #endif
@@ -96,6 +96,10 @@ void main() {
             continue;
         }
         uint e = first_element + i;
-        accumulate(irradiance[e], irradiance_error[e], receivers[n].irradiance);
+        if (is_continued == 1) {
+            partial_sums[i] = receivers[n].irradiance;
+        } else {
+            accumulate(irradiance[e], irradiance_error[e], receivers[n].irradiance);
+        }
     }
 }

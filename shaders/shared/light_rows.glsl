@@ -46,8 +46,11 @@ layout(push_constant, scalar) uniform Parameters {
     uint first_element;
     uint element_count;
     uint first_block;
-    uint block_count;    // of all elements
+    uint block_count;    // of all elements of a row
     uint first_slot;
+    // Elements that are this member's, counted from the first; no form factor is found to others.
+    uint own_begin;
+    uint own_end;
 };
 
 // 1: lights at a finite distance, whose places are the eye alone.

@@ -55,10 +55,11 @@ void main() {
         bool opens = any_near(some_open[j]);
         // The light of a beam is uneven even where nothing blocks it.
         bool closes = BEAMS == 1 || any_near(some_closed[j]);
-        if (inside[j] && opens && !closes) {
+        bool own = inside[j] && i >= own_begin && i < own_end;
+        if (own && opens && !closes) {
             put(slot, i, flux_to(i, flux_along(light, light.middle), normal[j]));
         }
-        bool mine = inside[j] && opens && closes;
+        bool mine = own && opens && closes;
         uvec4 lanes = subgroupBallot(mine);
         uint list = slot * RECEIVE_LISTS + RECEIVE_CROSSED;
         uint first = 0;

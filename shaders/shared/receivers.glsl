@@ -30,10 +30,23 @@ layout(push_constant, scalar) uniform Parameters {
     uint face_size;
     uint first_slot;     // of the fresh ones
     uint end_slot;
-    // Of form_factors.comp alone:
     uint first_block;
-    uint block_count;    // of all elements
+    uint block_count;    // of all elements of a row
+    // Elements that are this member's, counted from the first; no form factor is found to others.
+    uint own_begin;
+    uint own_end;
 };
+
+// Whether an element of the dispatch is this member's.
+bool is_own(uint i) {
+    return i >= own_begin && i < own_end;
+}
+
+// How many of the elements from `begin` to `end` are.
+uint own_between(uint begin, uint end) {
+    uint last = min(end, own_end);
+    return last - min(max(begin, own_begin), last);
+}
 
 // Rounding of a plane's height at a point: a few steps of f32 at coordinates up to 1.
 const float HEIGHT_EPSILON = 1e-6;

@@ -181,6 +181,7 @@ void main() {
     uint first = begin + gl_SubgroupInvocationID;
     uint last_element = element_count - 1;
     uint in_range = min(begin + SORT_ELEMENTS * gl_SubgroupSize, element_count) - min(begin, element_count);
+    uint own = own_between(begin, begin + in_range);
     uint held;
     uint sighted = sighted_slots(first_slot, min(begin, last_element), min(begin + in_range, element_count) - 1, held);
     uint away = held & ~sighted;
@@ -188,7 +189,7 @@ void main() {
         uint k = findLSB(away);
         away &= away - 1;
         if (subgroupElect()) {
-            atomicAdd(away_count[first_slot + k], in_range);
+            atomicAdd(away_count[first_slot + k], own);
         }
     }
     if (sighted != 0) {
@@ -213,7 +214,7 @@ void main() {
             for (uint j = 0; j < SORT_ELEMENTS; j++) {
                 uint i = first + j * gl_SubgroupSize;
                 kind[j] = kind_of(s, ball[j], n[j], near[j]);
-                wanted[j] = i < element_count && kind[j] < RECEIVE_KINDS;
+                wanted[j] = is_own(i) && kind[j] < RECEIVE_KINDS;
                 bool may = near[j] || form_factor_about(s, ball[j].xyz, n[j]) > CROSSED_FACTOR;
                 bool by_parts = is_near_part(slot, i, wanted[j] && may);
                 wanted[j] = wanted[j] && !by_parts;
@@ -232,7 +233,7 @@ void main() {
                 bool found = wanted[j] && (near[j] || seen[j]) && !crossed[j];
                 append(slot, kind[j], found, with_share(i, 1.0));
                 append_one(slot, RECEIVE_CROSSED, crossed[j], i);
-                of_slot += subgroupBallotBitCount(subgroupBallot(i < element_count && kind[j] == RECEIVE_KINDS));
+                of_slot += subgroupBallotBitCount(subgroupBallot(is_own(i) && kind[j] == RECEIVE_KINDS));
             }
 #else
             for (uint j = 0; j < SORT_ELEMENTS; j++) {
@@ -240,7 +241,7 @@ void main() {
                 uint e = first_element + i;
                 bool near;
                 uint kind = kind_of(s, ball[j], n[j], near);
-                bool mine = i < element_count && kind < RECEIVE_KINDS;
+                bool mine = is_own(i) && kind < RECEIVE_KINDS;
                 bool fills = form_factor_about(s, ball[j].xyz, n[j]) > CROSSED_FACTOR;
                 mine = mine && !is_near_part(slot, i, mine && (near || fills));
                 bool asks = mine && !near;
@@ -257,7 +258,7 @@ void main() {
                     append_one(slot, RECEIVE_DOUBTFUL, sight == DOUBTFUL && !crossed, i);
                 }
                 append_one(slot, RECEIVE_CROSSED, crossed, i);
-                of_slot += subgroupBallotBitCount(subgroupBallot(i < element_count && kind == RECEIVE_KINDS));
+                of_slot += subgroupBallotBitCount(subgroupBallot(is_own(i) && kind == RECEIVE_KINDS));
             }
 #endif
             if (subgroupElect()) {

@@ -15,7 +15,7 @@ use crate::mesh::elements::Elements;
 use crate::meso::{self, HeightField, Relief};
 use crate::passes::relief_visibility::ReliefVisibility;
 use crate::scene::Scene;
-use crate::solver::{self, Settings, Solver, Update, Visibility};
+use crate::solver::{Crew, Settings, Solver, Update, Visibility};
 use crate::vk::Device;
 
 /// Bakes a scene. `go_on` is called at every step; when it returns false, the bake stops, and what
@@ -44,26 +44,26 @@ pub fn solve(
     kept: Option<&Visibility>,
     go_on: impl FnMut(&Update) -> bool,
 ) -> Result<Solver> {
-    solve_on(&[Arc::clone(device)], scene, settings, kept, go_on)
+    solve_by(&device.into(), scene, settings, kept, go_on)
 }
 
-/// As [`solve`], with several devices; see [`Solver::on_devices`]. With
+/// As [`solve`], with several devices; see [`Solver::by`]. With
 /// [`Settings::checkpoints`] it goes on from what a bake of the same kind has left that was killed.
-pub fn solve_on(
-    devices: &[Arc<Device>],
+pub fn solve_by(
+    crew: &Crew,
     scene: &Scene,
     settings: &Settings,
     kept: Option<&Visibility>,
     go_on: impl FnMut(&Update) -> bool,
 ) -> Result<Solver> {
     let start = Instant::now();
-    let first = solver::check_devices(devices, settings)?;
+    let first = crew.check(settings)?;
     let elements = elements(first, scene, settings)?;
     if let Some(kept) = kept {
         kept.check(scene, settings)?;
     }
     let lights = &scene.lights;
-    let mut solver = Solver::on_devices(devices, elements, lights, settings, kept)?;
+    let mut solver = Solver::by(crew, elements, lights, settings, kept)?;
     if settings.checkpoints.is_some() {
         let rows = kept.map(Visibility::described).unwrap_or_default();
         solver.keep_checkpoints(&format!("{} {rows}", scene.hash()))?;

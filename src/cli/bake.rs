@@ -16,7 +16,9 @@ use mesolux::atomic_file::with_ending;
 use mesolux::bake::solution::{Origin, Solution};
 use mesolux::error::{Error, Result};
 use mesolux::scene::Scene;
-use mesolux::solver::{Checkpoints, Report, Settings, Solver, StopReason, Update, Visibility};
+use mesolux::solver::{
+    Checkpoints, Crew, Report, Settings, Solver, StopReason, Update, Visibility,
+};
 use mesolux::vk::Device;
 
 /// Solve a scene and write the light on every element
@@ -76,7 +78,42 @@ struct Printed<'a> {
     report: &'a Report,
 }
 
+#[cfg(not(feature = "mpi"))]
 pub fn run(options: &Options) -> Result<()> {
+    match mesolux::solver::started_together() {
+        1 => bake(options, || options.device.open()),
+        many => Err(Error::Usage(format!(
+            "{many} processes were started together, and this build has no MPI: \
+             cargo build --release --features mpi"
+        ))),
+    }
+}
+
+/// One of the processes of an `mpirun`, or alone.
+#[cfg(feature = "mpi")]
+pub fn run(options: &Options) -> Result<()> {
+    let Some(ranks) = mesolux::solver::Ranks::join()?.map(Arc::new) else {
+        return bake(options, || options.device.open());
+    };
+    let open = || options.device.open_in_turn(ranks.local_rank());
+    let done = match ranks.rank() {
+        0 => bake(options, || {
+            let device = open()?;
+            let count = ranks.count();
+            tracing::info!(
+                "device: {} and those of {} others",
+                device.name(),
+                count - 1
+            );
+            Ok(Crew::with_ranks(&device, Arc::clone(&ranks)))
+        }),
+        _ => open().and_then(|device| ranks.serve(&device)),
+    };
+    ranks.end();
+    done
+}
+
+fn bake(options: &Options, open: impl FnOnce() -> Result<Crew>) -> Result<()> {
     let start = Instant::now();
     let mut settings = Settings {
         checkpoints: options.checkpoints()?,
@@ -98,10 +135,10 @@ pub fn run(options: &Options) -> Result<()> {
         .as_ref()
         .map(|bake| kept_with(bake))
         .transpose()?;
-    let devices = options.device.open()?;
+    let crew = open()?;
     let budget = settings.budget;
     settings.budget = budget.map(|budget| budget.saturating_sub(start.elapsed()));
-    let solver = solve_visibly(&devices, &scene, &settings, kept.as_ref())?;
+    let solver = solve_visibly(&crew, &scene, &settings, kept.as_ref())?;
     let solution = mesolux::bake::solution(&scene, &solver)?;
     refuse_darkness(&scene, &solution)?;
     options.device.check()?;
@@ -184,9 +221,8 @@ impl Options {
 
 /// Bakes with progress on stderr; Ctrl-C stops the bake and keeps what it has.
 pub fn bake_visibly(device: &Arc<Device>, scene: &Scene, settings: &Settings) -> Result<Solution> {
-    let devices = [Arc::clone(device)];
-    let solution =
-        mesolux::bake::solution(scene, &solve_visibly(&devices, scene, settings, None)?)?;
+    let solver = solve_visibly(&device.into(), scene, settings, None)?;
+    let solution = mesolux::bake::solution(scene, &solver)?;
     refuse_darkness(scene, &solution)?;
     Ok(solution)
 }
@@ -208,14 +244,14 @@ fn refuse_darkness(scene: &Scene, solution: &Solution) -> Result<()> {
 }
 
 fn solve_visibly(
-    devices: &[Arc<Device>],
+    crew: &Crew,
     scene: &Scene,
     settings: &Settings,
     kept: Option<&Visibility>,
 ) -> Result<Solver> {
     catch_interrupts();
     let bar = Bar::new();
-    let solver = mesolux::bake::solve_on(devices, scene, settings, kept, |update| {
+    let solver = mesolux::bake::solve_by(crew, scene, settings, kept, |update| {
         bar.show(progress(update));
         !interrupted()
     });

@@ -37,6 +37,7 @@ use mesolux::bake::quality::Quality;
 use mesolux::console;
 use mesolux::error::{Error, Result};
 use mesolux::scene::{ImportOptions, LoadOptions, Refinement, Scene};
+use mesolux::solver::Crew;
 use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::prelude::*;
 
@@ -265,7 +266,8 @@ impl DeviceOptions {
 struct BakingDevices {
     /// Vulkan device by its index or a part of its name (see `mesolux info`); the best one if not
     /// given. Several, as in 0,1, bake together, and 0,0 opens a software device twice; the result
-    /// is the same to the byte as with one of their kind
+    /// is the same to the byte as with one of their kind. Under `mpirun` each process of a machine
+    /// takes one of the list in its turn
     #[arg(long, value_name = "INDEX|NAME[,…]")]
     device: Option<String>,
     /// Watch every Vulkan call with the validation layer
@@ -274,13 +276,20 @@ struct BakingDevices {
 }
 
 impl BakingDevices {
-    fn open(&self) -> Result<Vec<std::sync::Arc<mesolux::vk::Device>>> {
+    fn open(&self) -> Result<Crew> {
         let devices =
             mesolux::solver::open_devices(self.device.as_deref(), watched(self.validate))?;
         for device in &devices {
             tracing::info!("device: {}", device.name());
         }
-        Ok(devices)
+        Ok(devices[..].into())
+    }
+
+    /// The device of one of the processes of this machine.
+    #[cfg(feature = "mpi")]
+    fn open_in_turn(&self, turn: usize) -> Result<std::sync::Arc<mesolux::vk::Device>> {
+        let watched = watched(self.validate);
+        mesolux::solver::open_in_turn(self.device.as_deref(), turn, watched)
     }
 
     fn check(&self) -> Result<()> {

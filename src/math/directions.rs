@@ -8,12 +8,13 @@
 use std::f64::consts::{FRAC_PI_4, PI};
 
 use glam::{DVec2, DVec3};
+use serde::{Deserialize, Serialize};
 
 use crate::constants::FINE_DIRECTIONS;
 use crate::error::{Error, Result};
 
 /// The division of the hemisphere into slots.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Directions {
     pub columns: u32,
     pub rows: u32,

@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use glam::{DVec2, DVec3, Vec3};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{HeightField, Response, Visibility};
 use crate::constants::NONE;
@@ -13,7 +13,7 @@ use crate::error::Result;
 use crate::math::directions::Directions;
 
 /// How relief takes part in the transport of light.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Transport {
     /// Masking, shadowing and bounces inside the relief; keeps energy.
@@ -27,7 +27,7 @@ pub enum Transport {
 }
 
 /// Settings of a scene's relief.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Options {
     pub transport: Transport,
     pub directions: Directions,

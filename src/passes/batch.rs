@@ -105,14 +105,8 @@ impl Batch {
 
 impl Hemicubes {
     /// How many slots a batch may have: what fits the device's largest buffer, its widest image and
-    /// an eighth of its memory, and no more than `wanted`.
-    pub fn fitting_slots(
-        device: &Device,
-        scene: &SceneBuffers,
-        face_size: u32,
-        wanted: u32,
-    ) -> u32 {
-        let counts = (scene.element_count, scene.occluder_count);
+    /// an eighth of its memory, and no more than `wanted`. `counts`: of elements and occluders.
+    pub fn fitting_slots(device: &Device, counts: (u32, u32), face_size: u32, wanted: u32) -> u32 {
         wanted.min(most_slots(device.limits(), counts, face_size))
     }
 

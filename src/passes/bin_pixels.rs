@@ -61,7 +61,7 @@ impl BinPixels {
                 fresh: &rows.plain,
                 occupied: &rows.occupied,
             })?,
-            element_count: rows.shape.plain_count,
+            element_count: rows.shape.plain.count,
             block_count: rows.shape.blocks(),
             face_size: hemicubes.face_size,
             slot_count: batch.slot_count,

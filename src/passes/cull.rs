@@ -3,6 +3,8 @@
 
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use super::batch::Batch;
 use super::buffers::SceneBuffers;
 use super::shaders::cull::{Bindings, Parameters, SHADER};
@@ -11,7 +13,7 @@ use crate::error::Result;
 use crate::vk::{BoundCompute, Commands, ComputePipeline, Device};
 
 /// What is left out of the item buffer's draws. Every level gives the same item buffer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Culling {
     /// Every triangle is drawn in every face.
     Off,

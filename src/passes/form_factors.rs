@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use super::batch::{Batch, Hemicubes, Sight};
 use super::buffers::SceneBuffers;
-use super::fresh_rows::{FreshRows, ReceiverLists};
+use super::fresh_rows::{FreshRows, ReceiverLists, Span};
 use super::near_marks::NearMarks;
 use super::occluder_tree::OccluderTree;
 use super::shaders::{
@@ -56,8 +56,7 @@ pub struct FormFactors {
 
 /// The elements of a dispatch.
 struct Range {
-    first_element: u32,
-    element_count: u32,
+    span: Span,
     first_block: u32,
     lists: ReceiverLists,
     fresh: Buffer,
@@ -143,7 +142,7 @@ impl FormFactors {
         // Rays of one slot at a time.
         let (face_size, at_once) = match &batch.sight {
             Sight::Hemicubes(hemicubes) => {
-                let elements = rows.shape.plain_count + rows.shape.meso_count;
+                let elements = rows.shape.plain.count + rows.shape.meso.count;
                 let most = (SORT_RATE * PART_PAIRS / u64::from(elements.max(1))) as u32;
                 let most = most.clamp(1, SORT_SLOTS);
                 (hemicubes.face_size, most)
@@ -178,22 +177,24 @@ impl FormFactors {
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         // All of these shaders have the same.
         let parameters = |range: &Range, slots: std::ops::Range<u32>| sort_receivers::Parameters {
-            first_element: range.first_element,
-            element_count: range.element_count,
+            first_element: range.span.first,
+            element_count: range.span.count,
             face_size: self.face_size,
             first_slot: slots.start,
             end_slot: slots.end,
             first_block: range.first_block,
             block_count: rows.shape.blocks(),
+            own_begin: range.span.own[0],
+            own_end: range.span.own[1],
         };
         let mut parts = Parts::of(PART_PAIRS);
         for first in (0..self.slot_count).step_by(self.at_once as usize) {
             for range in &self.ranges {
                 let slots = first..(first + self.at_once).min(self.slot_count);
-                let pairs = u64::from(range.element_count) * slots.len() as u64;
+                let pairs = u64::from(range.span.count) * slots.len() as u64;
                 let rate = if self.face_size > 0 { SORT_RATE } else { 1 };
                 parts.step(cmd, pairs / rate);
-                let size = [groups(range.element_count.div_ceil(SORT_ELEMENTS)), 1, 1];
+                let size = [groups(range.span.count.div_ceil(SORT_ELEMENTS)), 1, 1];
                 cmd.dispatch(&range.sort, &parameters(range, slots), size);
             }
         }
@@ -205,7 +206,7 @@ impl FormFactors {
         for range in &self.ranges {
             for &(list, ref resolve) in &range.resolve {
                 for slot in 0..self.slot_count {
-                    parts.step(cmd, range.element_count.into());
+                    parts.step(cmd, range.span.count.into());
                     let push = parameters(range, slot..slot + 1);
                     let at = list_at(slot, list);
                     cmd.dispatch_indirect(resolve, &push, &range.lists.counts, at);
@@ -217,7 +218,7 @@ impl FormFactors {
         // Every element is in one list of a slot at most.
         for range in &self.ranges {
             for slot in 0..self.slot_count {
-                parts.step(cmd, range.element_count.into());
+                parts.step(cmd, range.span.count.into());
                 for (kind, form_factors) in (0..).zip(&range.form_factors) {
                     let push = parameters(range, slot..slot + 1);
                     let at = list_at(slot, kind);
@@ -231,19 +232,18 @@ impl FormFactors {
 impl Range {
     fn new(device: &Arc<Device>, on: &On<'_>, care: Care) -> Result<Self> {
         let shape = on.rows.shape;
-        let [first_element, element_count, first_block] = match on.meso {
-            None => [0, shape.plain_count, 0],
-            Some(_) => [shape.plain_count, shape.meso_count, shape.plain_blocks()],
+        let (span, first_block) = match on.meso {
+            None => (shape.plain, 0),
+            Some(_) => (shape.meso, shape.plain_blocks()),
         };
         let relief = on.meso.is_some();
         let pairs = match relief {
             false => &on.scene.near_rows,
             true => &on.scene.near_relief_rows,
         };
-        let near = NearMarks::new(device, on.batch, pairs, element_count, relief)?;
+        let near = NearMarks::new(device, on.batch, pairs, span.count, relief)?;
         Ok(Self {
-            first_element,
-            element_count,
+            span,
             first_block,
             lists: on.lists.clone(),
             fresh: on.fresh.clone(),

@@ -1,36 +1,95 @@
 //! The rows of a batch on the device, before they are kept.
 
+use std::ops::Range;
 use std::sync::Arc;
 
-use super::buffers::{SceneBuffers, filled, upload};
+use serde::{Deserialize, Serialize};
+
+use super::buffers::{filled, upload};
 use super::groups;
 use super::types::ReceiverList;
-use crate::constants::RECEIVE_LISTS;
+use crate::constants::{GROUP, NONE, RECEIVE_LISTS};
 use crate::error::Result;
 use crate::vk::{Buffer, BufferUse, Device};
 
-/// How the elements of a scene lie in rows: those without relief first, in blocks of GROUP
-/// elements.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct RowShape {
-    pub plain_count: u32,
-    pub meso_count: u32,
+/// Elements of one kind in whole blocks of GROUP, counted from the first of their kind. The first
+/// and the last block may hold elements of others, whose form factors stay 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Span {
+    /// Counted from the first element of all.
+    pub first: u32,
+    pub count: u32,
+    /// Those that are found, counted from `first`: their begin and their end.
+    pub own: [u32; 2],
 }
 
-impl RowShape {
-    pub fn new(scene: &SceneBuffers, meso_count: u32) -> Self {
+impl Span {
+    /// All `count` elements of a kind, which begin with `first`.
+    pub fn whole(first: u32, count: u32) -> Self {
         Self {
-            plain_count: scene.element_count - meso_count,
-            meso_count,
+            first,
+            count,
+            own: [0, count],
         }
     }
 
+    /// Of the elements of `kind`, the whole blocks in which these are, which begin with one of a
+    /// block of their own.
+    pub fn about(kind: Range<u32>, own: Range<u32>) -> Self {
+        let first = kind.start + (own.start - kind.start) / GROUP * GROUP;
+        let blocks = (own.end - first).div_ceil(GROUP);
+        let end = (first + blocks * GROUP).min(kind.end).max(first);
+        Self {
+            first,
+            count: end - first,
+            own: [own.start - first, own.end - first],
+        }
+    }
+
+    /// The elements that are found, counted from the first of all.
+    pub fn own_range(self) -> Range<u32> {
+        self.first + self.own[0]..self.first + self.own[1]
+    }
+}
+
+/// How elements lie in rows: those without relief first, in blocks of GROUP elements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RowShape {
+    pub plain: Span,
+    pub meso: Span,
+}
+
+impl RowShape {
+    /// Of all elements of a scene, of which the last have a relief.
+    pub fn whole(elements: u32, meso_count: u32) -> Self {
+        let plain_count = elements - meso_count;
+        Self {
+            plain: Span::whole(0, plain_count),
+            meso: Span::whole(plain_count, meso_count),
+        }
+    }
+
+    /// Whether form factors to an element are found.
+    pub fn has(self, element: u32) -> bool {
+        [self.plain, self.meso]
+            .iter()
+            .any(|span| span.own_range().contains(&element))
+    }
+
     pub fn plain_blocks(self) -> u32 {
-        groups(self.plain_count)
+        groups(self.plain.count)
     }
 
     pub fn meso_blocks(self) -> u32 {
-        groups(self.meso_count)
+        groups(self.meso.count)
+    }
+
+    /// The first element with a relief; NONE of rows without one.
+    pub fn first_meso(self) -> u32 {
+        match self.meso.count {
+            0 => NONE,
+            _ => self.meso.first,
+        }
     }
 
     /// Blocks of all elements, those with relief last.
@@ -101,13 +160,13 @@ impl FreshRows {
         Ok(Self {
             shape,
             slot_count,
-            plain: storage("form factors", 4 * slots * u64::from(shape.plain_count))?,
+            plain: storage("form factors", 4 * slots * u64::from(shape.plain.count))?,
             meso: storage(
                 "form factors to relief",
-                12 * slots * u64::from(shape.meso_count),
+                12 * slots * u64::from(shape.meso.count),
             )?,
-            plain_lists: lists(shape.plain_count)?,
-            meso_lists: lists(shape.meso_count)?,
+            plain_lists: lists(shape.plain.count)?,
+            meso_lists: lists(shape.meso.count)?,
             occupied: zeroed("occupied blocks", 4 * slots * u64::from(shape.blocks()))?,
             facing_away: zeroed("facing away", 4 * slots)?,
         })

@@ -14,6 +14,7 @@ use super::shaders::{gather, gather_from_relief, gather_to_relief};
 use super::types::{KeptRow, Slot};
 use crate::constants::GROUP;
 use crate::error::Result;
+use crate::meso::RANK;
 use crate::vk::{
     BoundCompute, Buffer, BufferUse, Commands, ComputePipeline, Device, Stage, TEXEL_BYTES,
 };
@@ -72,6 +73,8 @@ pub struct Gather {
     lanes: u32,
     /// For the elements without relief, and what is the same for all.
     parameters: gather::Parameters,
+    /// Of the elements with a relief, the first.
+    first_meso: u32,
     /// For each chunk of rows.
     chunks: Vec<OfChunk>,
 }
@@ -82,11 +85,13 @@ struct OfChunk {
     meso: Option<[BoundCompute; 2]>,
 }
 
-/// Slots whose rows lie in one chunk.
+/// Slots whose rows lie in one chunk, of those that are added up together.
 #[derive(Debug, Clone)]
 pub struct ChunkSlots {
     pub chunk: u32,
     pub slots: Range<u32>,
+    /// All that are added up together: other chunks hold the others.
+    pub of: Range<u32>,
 }
 
 /// What is bound for one part of the light.
@@ -98,6 +103,8 @@ struct On<'a> {
     words: &'a Buffer,
     irradiance: &'a Buffer,
     irradiance_error: &'a Buffer,
+    /// Sums so far, to elements without and with a relief.
+    partial: [&'a Buffer; 2],
 }
 
 /// Slots of a dispatch: a software device ends a shader's loops after 65,535 turns of all together.
@@ -136,6 +143,18 @@ impl Gather {
             None => None,
             Some(relief) => Some((make("gather to relief", &gather_to_relief::SHADER)?, relief)),
         };
+        let shape = kept.shape;
+        let meso_sums = 1 + RANK as u64;
+        let partial = [
+            ("partial light", u64::from(shape.plain.count)),
+            (
+                "partial light of relief",
+                meso_sums * u64::from(shape.meso.count),
+            ),
+        ];
+        let [plain_partial, meso_partial] =
+            partial.map(|(name, sums)| Buffer::new(device, name, 12 * sums, BufferUse::Storage));
+        let (plain_partial, meso_partial) = (plain_partial?, meso_partial?);
         let bind = |words: &Buffer| {
             let emitted = On {
                 list,
@@ -143,6 +162,7 @@ impl Gather {
                 words,
                 irradiance: &state.direct,
                 irradiance_error: &state.direct_error,
+                partial: [&plain_partial, &meso_partial],
             };
             let reflected = On {
                 irradiance: &state.indirect,
@@ -167,22 +187,26 @@ impl Gather {
             .map_or(none, |r| {
                 (r.first_source, r.source_count, [r.cells(), r.kept_cells()])
             });
-        let shape = kept.shape;
         Ok(Self {
             shape,
             lanes: lanes[0],
             parameters: gather::Parameters {
-                first_element: 0,
-                element_count: shape.plain_count,
+                first_element: shape.plain.first,
+                element_count: shape.plain.count,
                 first_slot: 0,
                 end_slot: 0,
+                first_exit: 0,
                 first_block: 0,
                 reflected: 0,
                 first_relief_source,
                 relief_source_count,
                 cells,
                 kept_cells,
+                continues: 0,
+                is_continued: 0,
+                first_meso: 0,
             },
+            first_meso: relief.map_or(0, |relief| shape.meso.first - relief.first_element),
             chunks: kept.chunks.iter().map(bind).collect::<Result<_>>()?,
         })
     }
@@ -196,20 +220,24 @@ impl Gather {
         let plain = gather::Parameters {
             first_slot: of.slots.start,
             end_slot: of.slots.end,
+            first_exit: of.of.start,
+            continues: (of.slots.start > of.of.start).into(),
+            is_continued: (of.slots.end < of.of.end).into(),
             reflected: (part == Part::Reflected).into(),
             ..self.parameters
         };
-        let size = [groups(shape.plain_count), 1, 1];
+        let size = [groups(shape.plain.count), 1, 1];
         cmd.dispatch(&bound.plain[light], &plain, size);
         if let Some(bound) = &bound.meso {
             let meso = gather::Parameters {
-                first_element: shape.plain_count,
-                element_count: shape.meso_count,
+                first_element: shape.meso.first,
+                element_count: shape.meso.count,
                 first_block: shape.plain_blocks(),
+                first_meso: self.first_meso,
                 ..plain
             };
             let parts = GROUP.div_ceil(self.lanes);
-            let size = [groups(shape.meso_count), parts, 1];
+            let size = [groups(shape.meso.count), parts, 1];
             cmd.dispatch(&bound[light], &meso, size);
         }
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
@@ -227,6 +255,7 @@ fn bind_plain(
             irradiance: on.irradiance,
             irradiance_error: on.irradiance_error,
             words: on.words,
+            partial_sums: on.partial[0],
         };
         return pipeline.bind(&bindings);
     };
@@ -235,6 +264,7 @@ fn bind_plain(
         irradiance: on.irradiance,
         irradiance_error: on.irradiance_error,
         words: on.words,
+        partial_sums: on.partial[0],
         slots: &on.list.slots,
         exits: &relief.exits,
         sources: &on.scene.sources,
@@ -254,6 +284,7 @@ fn bind_meso(
         irradiance: on.irradiance,
         irradiance_error: on.irradiance_error,
         words: on.words,
+        partial_sums: on.partial[1],
         slots: &on.list.slots,
         exits: &relief.exits,
         sources: &on.scene.sources,

@@ -64,9 +64,9 @@ impl Keep {
                 scratch_chunk: kept.chunk_count(),
             },
             then: keep::Parameters {
-                plain_count: shape.plain_count,
+                plain_count: shape.plain.count,
                 plain_blocks: shape.plain_blocks(),
-                meso_count: shape.meso_count,
+                meso_count: shape.meso.count,
                 block_count: shape.blocks(),
             },
             rows,

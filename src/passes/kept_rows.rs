@@ -60,13 +60,9 @@ impl KeptRows {
     ) -> Result<Self> {
         let row = row_bytes(shape);
         let most = size.memory.min(row * u64::from(size.sources));
-        // A row lies in one chunk, so that a chunk may end with most of a row unused.
         let chunk = match restored {
             Some(restored) => 4 * u64::from(restored.chunk_words),
-            None => {
-                let texels = device.limits().max_texels * TEXEL_BYTES;
-                most.min(CHUNK).min(texels).next_multiple_of(TEXEL_BYTES)
-            }
+            None => Self::chunk_bytes(device, shape, size),
         };
         let count = if row > chunk { 0 } else { most.div_ceil(chunk) };
         let least = restored.map_or(0, |restored| restored.chunks as u64);
@@ -115,9 +111,21 @@ impl KeptRows {
         })
     }
 
+    /// Bytes of a chunk. A row lies in one, so that a chunk may end with most of a row unused.
+    pub fn chunk_bytes(device: &Device, shape: RowShape, size: KeptSize) -> u64 {
+        let most = size.memory.min(row_bytes(shape) * u64::from(size.sources));
+        let texels = device.limits().max_texels * TEXEL_BYTES;
+        most.min(CHUNK).min(texels).next_multiple_of(TEXEL_BYTES)
+    }
+
+    /// How far the chunks are filled by all that was submitted.
+    pub fn state_now(&self, device: &Arc<Device>) -> Result<KeptState> {
+        Ok(download::<KeptState>(device, &self.state, 1)?[0])
+    }
+
     /// How far the chunks are filled, and what they hold.
     pub fn download(&self, device: &Arc<Device>) -> Result<(KeptState, Vec<Vec<u32>>)> {
-        let state = download::<KeptState>(device, &self.state, 1)?[0];
+        let state = self.state_now(device)?;
         let full = (0..self.lasting).map(|chunk| {
             let end = self.words_before(chunk, state);
             download(device, &self.chunks[chunk], end)
@@ -126,7 +134,7 @@ impl KeptRows {
     }
 
     /// The inverse of [`Self::download`].
-    pub fn restore(&self, state: KeptState, chunks: &[Vec<u32>]) -> Result<()> {
+    pub fn restore(&self, state: KeptState, chunks: &[&[u32]]) -> Result<()> {
         self.state.set(&[state])?;
         for (buffer, words) in self.chunks[..self.lasting].iter().zip(chunks) {
             buffer.set(words)?;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::batch::{Batch, Sight};
 use super::buffers::SceneBuffers;
-use super::fresh_rows::{FreshRows, ReceiverLists};
+use super::fresh_rows::{FreshRows, ReceiverLists, Span};
 use super::shaders::{light_rows, light_rows_relief, light_survey, light_survey_relief};
 use super::types::ReceiverList;
 use super::{PART_PAIRS, Parts, groups};
@@ -27,8 +27,7 @@ pub struct LightRows {
 }
 
 struct Range {
-    first_element: u32,
-    element_count: u32,
+    span: Span,
     first_block: u32,
     lists: ReceiverLists,
     fresh: Buffer,
@@ -80,8 +79,7 @@ impl LightRows {
         let survey = bindings!(light_survey, scene, batch, tree, rows, lists, fresh,);
         let lit = bindings!(light_rows, scene, batch, tree, rows, lists, fresh,);
         let mut ranges = vec![Range {
-            first_element: 0,
-            element_count: rows.shape.plain_count,
+            span: rows.shape.plain,
             first_block: 0,
             lists: lists.clone(),
             fresh: fresh.clone(),
@@ -111,8 +109,7 @@ impl LightRows {
                 meso_elements
             );
             ranges.push(Range {
-                first_element: rows.shape.plain_count,
-                element_count: rows.shape.meso_count,
+                span: rows.shape.meso,
                 first_block: rows.shape.plain_blocks(),
                 lists: lists.clone(),
                 fresh: fresh.clone(),
@@ -120,7 +117,7 @@ impl LightRows {
                 lit: pipeline("light rows", &light_rows_relief::SHADER)?.bind(&lit)?,
             });
         }
-        ranges.retain(|range| range.element_count > 0);
+        ranges.retain(|range| range.span.count > 0);
         Ok(Self {
             ranges,
             rows: rows.clone(),
@@ -140,15 +137,17 @@ impl LightRows {
         cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
         // All of these shaders have the same.
         let parameters = |range: &Range, first_slot| light_survey::Parameters {
-            first_element: range.first_element,
-            element_count: range.element_count,
+            first_element: range.span.first,
+            element_count: range.span.count,
             first_block: range.first_block,
             block_count: rows.shape.blocks(),
             first_slot,
+            own_begin: range.span.own[0],
+            own_end: range.span.own[1],
         };
         for range in &self.ranges {
             let size = [
-                groups(range.element_count.div_ceil(SURVEY_ELEMENTS)),
+                groups(range.span.count.div_ceil(SURVEY_ELEMENTS)),
                 self.slot_count,
                 1,
             ];
@@ -158,7 +157,7 @@ impl LightRows {
         let mut parts = Parts::of(PART_PAIRS / RAYS);
         for range in &self.ranges {
             for slot in 0..self.slot_count {
-                parts.step(cmd, range.element_count.into());
+                parts.step(cmd, range.span.count.into());
                 let list = u64::from(slot * RECEIVE_LISTS + RECEIVE_CROSSED);
                 let at = size_of::<ReceiverList>() as u64 * list;
                 let push = parameters(range, slot);

@@ -52,7 +52,7 @@ impl NearRows {
             };
             let pipeline = ComputePipeline::new(device, "near rows", &near_rows::SHADER)?;
             let bound = pipeline.bind(&bindings)?;
-            kinds.push(of_kind(near, bound, shape.plain_count, 0));
+            kinds.push(of_kind(near, bound, shape.plain.count, 0));
         }
         let near = &scene.near_relief_rows;
         if near.most > 0 {
@@ -66,7 +66,7 @@ impl NearRows {
             let shader = &near_rows_relief::SHADER;
             let bound =
                 ComputePipeline::new(device, "near rows to relief", shader)?.bind(&bindings)?;
-            kinds.push(of_kind(near, bound, shape.meso_count, shape.plain_blocks()));
+            kinds.push(of_kind(near, bound, shape.meso.count, shape.plain_blocks()));
         }
         Ok(Self { kinds })
     }

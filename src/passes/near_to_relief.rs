@@ -4,15 +4,36 @@
 use std::sync::Arc;
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
-use super::buffers::{State, upload};
+use super::buffers::{State, upload_words};
 use super::gather::Part;
 use super::groups;
 use super::relief_buffers::ReliefBuffers;
 use super::shaders::near_to_relief::{Bindings, Parameters, SHADER};
+use super::words::Words;
 use crate::error::Result;
 use crate::mesh::near::NearPairs;
 use crate::vk::{BoundCompute, Buffer, BufferUse, Commands, ComputePipeline, Device};
+
+/// What elements with a relief receive of near parts, see [`NearPairs::relief_entries`].
+#[derive(Clone, Serialize, Deserialize)]
+pub struct NearParts {
+    list: Words,
+    starts: Words,
+    /// Of all near sources.
+    parts: u32,
+}
+
+impl NearParts {
+    pub fn new(near: &NearPairs) -> Self {
+        Self {
+            list: Words::of(&near.relief_entries.list),
+            starts: Words::of(&near.relief_entries.starts),
+            parts: near.parts,
+        }
+    }
+}
 
 pub struct NearToRelief {
     /// Of emitted and of reflected light: radiosity of the parts.
@@ -23,19 +44,21 @@ pub struct NearToRelief {
 
 impl NearToRelief {
     /// None where no element with a relief receives part by part.
+    ///
+    /// # Errors
+    /// A device without the memory.
     pub fn new(
         device: &Arc<Device>,
-        near: &NearPairs,
+        near: &NearParts,
         state: &State,
         relief: &ReliefBuffers,
     ) -> Result<Option<Self>> {
-        let entries = &near.relief_entries;
-        if entries.list.is_empty() {
+        if near.list.words().is_empty() {
             return Ok(None);
         }
         let storage = BufferUse::Storage;
-        let starts = upload(device, "near relief starts", &entries.starts, storage)?;
-        let parts = upload(device, "near relief parts", &entries.list, storage)?;
+        let starts = upload_words(device, "near relief starts", &near.starts, storage)?;
+        let parts = upload_words(device, "near relief parts", &near.list, storage)?;
         let bytes = 12 * u64::from(near.parts);
         let emitted = Buffer::new(device, "near emitted light", bytes, storage)?;
         let reflected = Buffer::new(device, "near reflected light", bytes, storage)?;

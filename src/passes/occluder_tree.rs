@@ -3,8 +3,11 @@
 
 use std::sync::Arc;
 
-use super::buffers::upload;
+use serde::{Deserialize, Serialize};
+
+use super::buffers::upload_words;
 use super::types::ShadowOccluder;
+use super::words::Words;
 use crate::error::Result;
 use crate::mesh::shadow_tree::ShadowTree;
 use crate::vk::{Buffer, BufferUse, Device};
@@ -16,14 +19,30 @@ pub struct OccluderTree {
     pub occluders: Buffer,
 }
 
+/// The tree as lists.
+#[derive(Clone, Serialize, Deserialize)]
+pub struct TreeData {
+    nodes: Words,
+    occluders: Words,
+}
+
+impl TreeData {
+    pub fn new(tree: &ShadowTree<ShadowOccluder>) -> Self {
+        Self {
+            nodes: Words::of(tree.nodes()),
+            occluders: Words::of(&tree.triangles),
+        }
+    }
+}
+
 impl OccluderTree {
     /// # Errors
     /// A device without the memory.
-    pub fn new(device: &Arc<Device>, tree: &ShadowTree<ShadowOccluder>) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, tree: &TreeData) -> Result<Self> {
         let texels = BufferUse::Texels;
         Ok(Self {
-            nodes: upload(device, "occluder nodes", tree.nodes(), texels)?,
-            occluders: upload(device, "shadow occluders", &tree.triangles, texels)?,
+            nodes: upload_words(device, "occluder nodes", &tree.nodes, texels)?,
+            occluders: upload_words(device, "shadow occluders", &tree.occluders, texels)?,
         })
     }
 }

@@ -3,9 +3,11 @@
 use std::sync::Arc;
 
 use glam::{Vec3, Vec4};
+use serde::{Deserialize, Serialize};
 
-use super::buffers::{filled, upload};
+use super::buffers::{filled, upload_words};
 use super::types::{MesoElement, Reflected};
+use super::words::Words;
 use crate::error::{Error, Result};
 use crate::math::directions::Directions;
 use crate::mesh::elements::Elements;
@@ -14,7 +16,7 @@ use crate::meso::{RANK, Relief, slot_shares};
 use crate::vk::{Buffer, BufferUse, Device, TEXEL_BYTES};
 
 /// The elements with a relief, in their order.
-pub fn meso_elements(elements: &Elements, relief: &Relief) -> Vec<MesoElement> {
+fn meso_elements(elements: &Elements, relief: &Relief) -> Vec<MesoElement> {
     (elements.len() - relief.count()..elements.len())
         .map(|e| MesoElement {
             tangent: relief.tangent[e],
@@ -23,6 +25,50 @@ pub fn meso_elements(elements: &Elements, relief: &Relief) -> Vec<MesoElement> {
             scale: relief.scale[e],
         })
         .collect()
+}
+
+/// What any device holds of the relief of a scene, list by list: see [`ReliefBuffers`].
+#[derive(Clone, Serialize, Deserialize)]
+pub struct ReliefData {
+    pub directions: Directions,
+    pub kept: Directions,
+    pub first_element: u32,
+    pub element_count: u32,
+    pub first_source: u32,
+    pub source_count: u32,
+    pub most_members: u32,
+    pub elements: Words,
+    pub bases: Words,
+    pub matrices: Words,
+    pub albedos: Words,
+    pub emissions: Words,
+    pub directions_list: Words,
+}
+
+impl ReliefData {
+    pub fn new(elements: &Elements, relief: &Relief, sources: &Sources) -> Self {
+        let of_relief = sources.relief.clone();
+        let members = sources.list[of_relief.clone()].iter();
+        let responses = Responses::new(relief);
+        let directions_list: Vec<Vec4> = (slot_shares(&relief.directions).iter().enumerate())
+            .map(|(slot, &share)| relief.directions.centre(slot).extend(share).as_vec4())
+            .collect();
+        Self {
+            directions: relief.directions,
+            kept: relief.kept(),
+            first_element: (elements.len() - relief.count()) as u32,
+            element_count: relief.count() as u32,
+            first_source: of_relief.start as u32,
+            source_count: of_relief.len() as u32,
+            most_members: members.map(|s| s.element_count).max().unwrap_or(1),
+            elements: Words::of(&meso_elements(elements, relief)),
+            bases: Words::of(&responses.bases),
+            matrices: Words::of(&responses.matrices),
+            albedos: Words::of(&responses.albedos),
+            emissions: Words::of(&responses.emissions),
+            directions_list: Words::of(&directions_list),
+        }
+    }
 }
 
 /// Elements and sources with a relief are the last of their kinds, point lights aside: each is a
@@ -72,50 +118,37 @@ const MOST_SENDING: u64 = 256;
 impl ReliefBuffers {
     /// # Errors
     /// More directional state than a buffer of the device may hold.
-    pub fn new(
-        device: &Arc<Device>,
-        elements: &Elements,
-        relief: &Relief,
-        sources: &Sources,
-    ) -> Result<Self> {
-        let k = relief.directions.count() as u64;
-        let first_element = elements.len() - relief.count();
-        let meso = first_element..elements.len();
-        let kept = relief.kept();
-        let slots_kept = kept.count() as u64;
-        let moment_bytes = 36 * slots_kept * meso.len() as u64;
-        check_room(device, meso.len(), slots_kept, moment_bytes)?;
-        let of_relief = sources.relief.clone();
-        let members = sources.list[of_relief.clone()].iter();
-        let most_members = members.map(|s| s.element_count).max().unwrap_or(1);
-        let slot_bytes = 12 * k * u64::from(most_members);
+    pub fn new(device: &Arc<Device>, data: &ReliefData) -> Result<Self> {
+        let k = data.directions.count() as u64;
+        let elements = u64::from(data.element_count);
+        let slots_kept = data.kept.count() as u64;
+        let moment_bytes = 36 * slots_kept * elements;
+        check_room(device, data.element_count, slots_kept, moment_bytes)?;
+        let slot_bytes = 12 * k * u64::from(data.most_members);
         let batch_slots = (SENDING_BYTES / slot_bytes).clamp(1, MOST_SENDING) as u32;
-        let gpu_elements = meso_elements(elements, relief);
-        let responses = Responses::new(relief);
-        let directions_list: Vec<Vec4> = (slot_shares(&relief.directions).iter().enumerate())
-            .map(|(slot, &share)| relief.directions.centre(slot).extend(share).as_vec4())
-            .collect();
         let (uses, texels_use) = (BufferUse::Storage, BufferUse::Texels);
+        let storage = |name, words| upload_words(device, name, words, uses);
+        let texels = |name, words| upload_words(device, name, words, texels_use);
         let zeroed = |name, bytes| filled(device, name, bytes, 0);
         let slots = u64::from(batch_slots);
-        let reflected_bytes = (size_of::<Reflected>() * meso.len()) as u64;
+        let reflected_bytes = size_of::<Reflected>() as u64 * elements;
         Ok(Self {
-            directions: relief.directions,
-            kept,
-            first_element: first_element as u32,
-            element_count: meso.len() as u32,
-            first_source: of_relief.start as u32,
-            source_count: of_relief.len() as u32,
-            most_members,
+            directions: data.directions,
+            kept: data.kept,
+            first_element: data.first_element,
+            element_count: data.element_count,
+            first_source: data.first_source,
+            source_count: data.source_count,
+            most_members: data.most_members,
             slots: batch_slots,
-            elements: upload(device, "meso elements", &gpu_elements, uses)?,
-            bases: upload(device, "relief bases", &responses.bases, texels_use)?,
-            matrices: upload(device, "relief matrices", &responses.matrices, texels_use)?,
-            albedos: upload(device, "relief albedos", &responses.albedos, texels_use)?,
-            emissions: upload(device, "relief emissions", &responses.emissions, uses)?,
-            directions_list: upload(device, "directions", &directions_list, uses)?,
+            elements: storage("meso elements", &data.elements)?,
+            bases: texels("relief bases", &data.bases)?,
+            matrices: texels("relief matrices", &data.matrices)?,
+            albedos: texels("relief albedos", &data.albedos)?,
+            emissions: storage("relief emissions", &data.emissions)?,
+            directions_list: storage("directions", &data.directions_list)?,
             coefficients: {
-                let bytes = RANK as u64 * TEXEL_BYTES * meso.len() as u64;
+                let bytes = RANK as u64 * TEXEL_BYTES * elements;
                 let buffer = Buffer::new(device, "relief coefficients", bytes, texels_use)?;
                 buffer.set_all(0)?;
                 buffer
@@ -123,11 +156,11 @@ impl ReliefBuffers {
             moments_direct: zeroed("moments direct", moment_bytes)?,
             moments_indirect: zeroed("moments indirect", moment_bytes)?,
             reflected: zeroed("meso reflected", reflected_bytes)?,
-            shot_exits: zeroed("shot exits", 12 * k * of_relief.len() as u64)?,
+            shot_exits: zeroed("shot exits", 12 * k * u64::from(data.source_count))?,
             member_exits: Buffer::new(
                 device,
                 "member exits",
-                12 * k * slots * u64::from(most_members),
+                12 * k * slots * u64::from(data.most_members),
                 uses,
             )?,
             exits: Buffer::new(device, "exits", 2 * TEXEL_BYTES * k * slots, texels_use)?,
@@ -157,7 +190,7 @@ impl ReliefBuffers {
 }
 
 /// Refuses moments that no buffer of the device holds.
-fn check_room(device: &Device, elements: usize, directions: u64, bytes: u64) -> Result<()> {
+fn check_room(device: &Device, elements: u32, directions: u64, bytes: u64) -> Result<()> {
     let most = device.limits().max_storage_buffer_range;
     if bytes <= most {
         return Ok(());

@@ -7,6 +7,7 @@
 //! Σ w_j F_js / A_t; the reflectance is applied to the sum over all sources. Any other takes three.
 
 use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
 
 use crate::mesh::elements::Elements;
 use crate::mesh::sources::Source;
@@ -110,7 +111,7 @@ fn target(elements: &Elements, source: &Source, word: usize, word_count: u32) ->
 }
 
 /// One row without its zeros.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct CouplingRow {
     /// First word and number of words of each run of values.
     runs: Vec<[u32; 2]>,

@@ -45,7 +45,10 @@ impl Drawing {
         face: u32,
     ) -> BatchSize {
         BatchSize {
-            slots: Hemicubes::fitting_slots(device, scene, face, slots),
+            slots: {
+                let counts = (scene.element_count, scene.occluder_count);
+                Hemicubes::fitting_slots(device, counts, face, slots)
+            },
             face,
             list_room: settings.list_room,
         }

@@ -2,18 +2,17 @@
 
 use std::sync::Arc;
 
-use super::{Estimator, Settings};
+use super::Estimator;
+use super::row_maker::RowParts;
 use crate::error::Result;
 use crate::passes::batch::{Batch, Sight};
 use crate::passes::bin_pixels::BinPixels;
-use crate::passes::buffers::SceneBuffers;
 use crate::passes::cull::Culling;
 use crate::passes::form_factors::{Care, FormFactors};
-use crate::passes::fresh_rows::FreshRows;
 use crate::passes::light_rows::LightRows;
 use crate::passes::near_rows::NearRows;
-use crate::passes::normalise::Normalise;
-use crate::vk::{Buffer, Commands, Device, Stage};
+use crate::passes::sum_factors::SumFactors;
+use crate::vk::{Commands, Device, Stage};
 
 /// The passes between a batch's item buffers and its form factors.
 #[allow(clippy::large_enum_variant)] // one or two of them live as long as the solver
@@ -22,21 +21,21 @@ pub(super) enum Evaluate {
         form_factors: FormFactors,
         near: NearRows,
         /// In enclosed scenes.
-        normalise: Option<Normalise>,
+        sums: Option<SumFactors>,
     },
     Pixels(BinPixels),
     Lights(LightRows),
 }
 
 impl Evaluate {
-    pub fn new(
-        device: &Arc<Device>,
-        settings: &Settings,
-        scene: &SceneBuffers,
-        meso: Option<&Buffer>,
-        batch: &Batch,
-        fresh: &FreshRows,
-    ) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, parts: &RowParts<'_>, batch: &Batch) -> Result<Self> {
+        let RowParts {
+            settings,
+            scene,
+            meso,
+            fresh,
+            ..
+        } = *parts;
         if settings.estimator == Estimator::Pixel {
             return Ok(Self::Pixels(BinPixels::new(device, scene, batch, fresh)?));
         }
@@ -48,18 +47,18 @@ impl Evaluate {
                 Sight::Rays(_) => settings.emitter_places,
             },
         };
-        let normalise = || Normalise::new(device, scene, batch, fresh, settings.normalise);
+        let sums = || SumFactors::new(device, scene, batch, fresh, parts.parcels);
         Ok(Self::Receivers {
             form_factors: FormFactors::new(device, scene, batch, fresh, meso, care)?,
             near: NearRows::new(device, scene, batch, fresh)?,
-            normalise: scene.enclosed.then(normalise).transpose()?,
+            sums: scene.enclosed.then(sums).transpose()?,
         })
     }
 
-    /// Sums of the form factors of each slot's source, in enclosed scenes.
-    pub fn shares(&self) -> Option<&Buffer> {
+    /// Sums of the form factors to each slot's source, in enclosed scenes.
+    pub fn sums(&self) -> Option<&SumFactors> {
         match self {
-            Self::Receivers { normalise, .. } => Some(&normalise.as_ref()?.shares),
+            Self::Receivers { sums, .. } => sums.as_ref(),
             Self::Pixels(_) | Self::Lights(_) => None,
         }
     }
@@ -73,15 +72,15 @@ impl Evaluate {
             Self::Receivers {
                 form_factors,
                 near,
-                normalise,
+                sums,
             } => {
                 form_factors.record(cmd, stamp);
                 cmd.part();
                 cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
                 near.record(cmd);
-                if let Some(normalise) = normalise {
+                if let Some(sums) = sums {
                     cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
-                    normalise.record(cmd);
+                    sums.record(cmd);
                 }
             }
             Self::Pixels(bin) => {

@@ -9,10 +9,9 @@ use super::gather::LitRow;
 use super::makers::RowKind;
 use super::near::Sent;
 use super::progress::Bound;
-use super::rows::looks_closer;
+use super::row_maker::looks_closer;
 use super::system::{Carrier, System};
 use crate::constants::KIND_SKY;
-use crate::passes::types::KeptRow;
 use crate::vk::Device;
 
 /// The system of the sources, and how far the elements have its light.
@@ -40,6 +39,15 @@ pub(super) fn strongest_first(a: &(u32, f64), b: &(u32, f64)) -> std::cmp::Order
     power(b).total_cmp(&power(a)).then(a.0.cmp(&b.0))
 }
 
+/// A row that is kept.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Kept {
+    /// Of its form factors.
+    pub scale: f32,
+    /// Rows are added up in the order in which they were made.
+    pub order: u32,
+}
+
 /// What has been done with a source.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Drawn {
@@ -51,8 +59,8 @@ pub(super) struct Drawn {
     pub under_way: bool,
     /// Times that it was drawn.
     pub times: u32,
-    /// Where its row is kept.
-    pub row: Option<KeptRow>,
+    /// Its row, where it is kept.
+    pub row: Option<Kept>,
     pub emission_gathered: bool,
     /// Reflected radiosity that the elements have received.
     pub gathered: DVec3,
@@ -91,7 +99,7 @@ impl Ledger {
         device: &Device,
         on: &Problem,
         bound: Bound,
-        row: impl Fn(usize) -> Option<KeptRow>,
+        row: impl Fn(usize) -> Option<Kept>,
         mut coupling: impl FnMut(usize, usize) -> Option<CouplingRow>,
     ) -> Self {
         let list = &on.sources.list;
@@ -130,7 +138,7 @@ impl Ledger {
     /// Lowers the importance of sources. Relief may send to other places than its row says, which
     /// is of even light, and may reflect more of what it receives.
     pub fn weigh(&mut self, on: &Problem) {
-        if on.relief.is_none() {
+        if !on.has_relief() {
             self.system.weigh();
         }
     }
@@ -319,7 +327,7 @@ impl Ledger {
     }
 
     /// What a source has to send through its row.
-    pub fn to_send(&self, s: usize, row: KeptRow, by_direction: bool) -> Option<LitRow> {
+    pub fn to_send(&self, s: usize, scale: f32, by_direction: bool) -> Option<LitRow> {
         let (emitted, reflected) = self.owed(s);
         let reflected = reflected.as_vec3();
         let drawn = &self.sources[s];
@@ -333,8 +341,8 @@ impl Ledger {
             false => (emitted, reflected),
         };
         Some(LitRow {
-            row,
             source: s as u32,
+            scale,
             emitted,
             reflected,
         })
@@ -348,7 +356,7 @@ impl Ledger {
         if !drawn.is_sky {
             drawn.gathered += lit.reflected.as_dvec3();
         }
-        drawn.scale = Some(lit.row.scale);
+        drawn.scale = Some(lit.scale);
         drawn.emission_gathered |= self.system.emission_is_shot(s);
         drawn.directed |= drawn.relief && drawn.times > 1;
     }
@@ -362,14 +370,14 @@ impl Ledger {
     }
 
     /// As [`Self::to_send`], but only what a source emits as direct light.
-    pub fn emitted_to_send(&self, s: usize, row: KeptRow) -> Option<LitRow> {
+    pub fn emitted_to_send(&self, s: usize, scale: f32) -> Option<LitRow> {
         let (emitted, _) = self.owed(s);
         if emitted == Vec3::ZERO || self.sources[s].is_sky {
             return None;
         }
         Some(LitRow {
-            row,
             source: s as u32,
+            scale,
             emitted,
             reflected: Vec3::ZERO,
         })
@@ -417,8 +425,8 @@ impl Ledger {
         (0..self.sources.len()).map(left).sum()
     }
 
-    /// Where each source's row is kept.
-    pub fn rows(&self) -> Vec<Option<KeptRow>> {
+    /// The row of each source, if it is kept.
+    pub fn rows(&self) -> Vec<Option<Kept>> {
         self.sources.iter().map(|drawn| drawn.row).collect()
     }
 }

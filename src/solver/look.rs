@@ -1,7 +1,7 @@
 //! Pictures of what single sources see.
 
 use super::drawing::Drawing;
-use super::{Problem, Solver};
+use super::{Method, Solver};
 use crate::constants::NONE;
 use crate::error::Result;
 use crate::passes::batch::BatchSize;
@@ -39,9 +39,15 @@ impl Solver {
             (source as usize) < self.problem.sources.list.len(),
             "a source of this scene"
         );
-        let Problem {
-            settings, scene, ..
-        } = &self.problem;
+        let settings = &self.problem.settings;
+        let first;
+        let scene = match &self.method {
+            Method::Shots(shots) => &shots.scene,
+            Method::Rows(spine) => {
+                first = spine.team.first();
+                &first.scene
+            }
+        };
         let (device, face) = (&self.device, settings.hemicube);
         let size = BatchSize {
             slots: 1,

@@ -11,25 +11,33 @@ mod coupling;
 mod devices;
 mod drawing;
 mod estimate;
+mod exchange;
 mod gather;
 mod journal;
+mod kept_parts;
 mod ledger;
 mod look;
 mod makers;
+mod member;
 mod near;
+mod packed;
 mod places;
 mod problem;
 mod progress;
+#[cfg(feature = "mpi")]
+mod ranks;
 mod relief_light;
 mod report;
+mod row_maker;
 mod rows;
 mod self_test;
 mod settings;
-mod several;
+mod shares;
 mod shots;
 mod spine;
 mod system;
 mod team;
+mod threads;
 mod turns;
 mod visibility;
 mod word_file;
@@ -42,19 +50,22 @@ use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Result};
 use crate::mesh::elements::Elements;
-use crate::passes::buffers::{download, download_all};
-use crate::passes::types::{CouplingTarget, Reflected, Slot};
+use crate::passes::buffers::{SceneBuffers, download};
+use crate::passes::fresh_rows::RowShape;
+use crate::passes::types::{CouplingTarget, Slot};
 use crate::scene::{Lights, Scene};
 use crate::vk::Device;
 
 pub use ambient::Ambient;
-pub use devices::{check_devices, open_devices};
+pub use devices::{Crew, open_devices, open_in_turn, started_together};
 pub use journal::Checkpoints;
 pub use look::ItemPicture;
 pub use places::{Arriving, LightAt, Lit, Place, Senders, SentByDirection};
 pub use problem::Problem;
 pub use progress::Update;
 use progress::{Bound, Watch};
+#[cfg(feature = "mpi")]
+pub use ranks::Ranks;
 pub use relief_light::ReliefLight;
 pub use report::{BY_PAPER, Discretisation, Report, Seconds, Skipped, StopReason, SurfaceError};
 pub use rows::Stages;
@@ -92,6 +103,16 @@ enum Method {
     Shots(Shots),
 }
 
+impl Method {
+    /// Names of the devices but the first.
+    fn other_devices(&self) -> Vec<String> {
+        match self {
+            Self::Rows(spine) => spine.team.other_devices(),
+            Self::Shots(_) => Vec::new(),
+        }
+    }
+}
+
 impl Solver {
     /// Groups the elements into sources and brings everything to the device.
     pub fn new(
@@ -100,7 +121,7 @@ impl Solver {
         lights: &Lights,
         settings: &Settings,
     ) -> Result<Self> {
-        Self::on_devices(&[Arc::clone(device)], elements, lights, settings, None)
+        Self::by(&device.into(), elements, lights, settings, None)
     }
 
     /// As [`Self::new`], for the `elements` of a scene whose rows were kept when it was lit
@@ -116,33 +137,35 @@ impl Solver {
         settings: &Settings,
         kept: &Visibility,
     ) -> Result<Self> {
-        let devices = [Arc::clone(device)];
-        Self::on_devices(&devices, elements, lights, settings, Some(kept))
+        Self::by(&device.into(), elements, lights, settings, Some(kept))
     }
 
-    /// As [`Self::new`] or [`Self::relit`], with all of `devices`, the first of which holds the
-    /// solution. The others draw for it. Devices that draw alike, as those of one kind and driver
-    /// do, give the same bytes as one.
+    /// As [`Self::new`] or [`Self::relit`], with all devices of a crew: each finds and keeps the
+    /// form factors of its share of the elements. Devices that draw alike, as those of one kind and
+    /// driver do, give the same bytes as one, if all rows find room.
     ///
     /// # Errors
-    /// No device, or several for what one alone can do; see [`check_devices`].
-    pub fn on_devices(
-        devices: &[Arc<Device>],
+    /// No device, or several for what one alone can do; see [`Crew::check`].
+    pub fn by(
+        crew: &Crew,
         elements: Elements,
         lights: &Lights,
         settings: &Settings,
         kept: Option<&Visibility>,
     ) -> Result<Self> {
         settings.check()?;
-        let device = check_devices(devices, settings)?;
+        let device = crew.check(settings)?;
         let start = Instant::now();
-        let problem = Problem::new(device, elements, lights, settings, kept)?;
+        let (problem, scene) = Problem::new(device, elements, lights, settings, kept)?;
         let bound = Bound::new(&problem);
         let method = match settings.estimator {
-            Estimator::Paper => Method::Shots(Shots::new(device, &problem, bound)?),
-            _ => Method::Rows(Spine::new(devices, &problem, bound, kept)?),
+            Estimator::Paper => {
+                let scene = SceneBuffers::new(device, &scene, scene.shape)?;
+                Method::Shots(Shots::new(device, &problem, scene, bound)?)
+            }
+            _ => Method::Rows(Spine::new(crew, &problem, scene, bound, kept)?),
         };
-        let mut report = Report::new(devices, &problem);
+        let mut report = Report::new(device, &problem, &method.other_devices());
         report.seconds.setup = start.elapsed().as_secs_f64();
         Ok(Self {
             device: Arc::clone(device),
@@ -166,10 +189,11 @@ impl Solver {
             let what = "the paper's method keeps no form factors: bake again";
             return Err(Error::Usage(what.into()));
         };
-        let relit = self.problem.relight(&self.device, scene)?;
+        let relit = self.problem.relight(scene)?;
         self.bound = Bound::new(&self.problem);
         spine.relight(&self.problem, self.bound, &relit)?;
-        self.report = Report::new(&spine.devices, &self.problem);
+        let others = spine.team.other_devices();
+        self.report = Report::new(&self.device, &self.problem, &others);
         self.report.seconds.setup = start.elapsed().as_secs_f64();
         Ok(())
     }
@@ -188,11 +212,7 @@ impl Solver {
         let Some(checkpoints) = &settings.checkpoints else {
             return Ok(());
         };
-        let device = |device: &Arc<Device>| {
-            let candidate = device.candidate();
-            format!("{} {}", candidate.name, candidate.driver)
-        };
-        let devices: Vec<String> = spine.devices.iter().map(device).collect();
+        let devices = &spine.team.devices;
         let maker = &checkpoints.maker;
         let key = format!("{maker}\n{devices:?}\n{scene}\n{}", settings.key());
         let key = word_file::hexadecimal(Sha256::new_with_prefix(key));
@@ -285,17 +305,16 @@ impl Solver {
     }
 
     /// What has been solved so far.
+    ///
+    /// # Errors
+    /// A device that fails.
     pub fn light(&self) -> Result<Light> {
-        let Problem {
-            elements, state, ..
-        } = &self.problem;
+        let Problem { elements, .. } = &self.problem;
         let spine = match &self.method {
             Method::Rows(spine) => spine,
             Method::Shots(shots) => return shots.light(elements),
         };
-        let count = elements.len();
-        let parts = [&state.direct, &state.indirect];
-        let [mut direct, mut indirect] = download_all::<Vec3, 2>(&self.device, parts, count)?;
+        let ([mut direct, mut indirect], sums) = spine.team.light()?;
         // What rounding leaves below none is none.
         let add = |light: &mut [Vec3], near: &[DVec3]| {
             for (light, near) in light.iter_mut().zip(near) {
@@ -305,18 +324,16 @@ impl Solver {
         add(&mut direct, &spine.near.direct);
         add(&mut indirect, &spine.near.indirect);
         let irradiance: Vec<Vec3> = direct.iter().zip(&indirect).map(|(d, i)| d + i).collect();
-        let mut radiosity: Vec<Vec3> = (0..count)
+        let mut radiosity: Vec<Vec3> = (0..elements.len())
             .map(|e| elements.emitted[e] + elements.reflectance[e] * irradiance[e])
             .collect();
-        let relief = match (&self.problem.relief, &elements.relief) {
-            (Some(buffers), Some(relief)) => {
-                let light = ReliefLight::download(&self.device, elements, relief, buffers)?;
-                let reflected: Vec<Reflected> =
-                    download(&self.device, &buffers.reflected, light.elements.len())?;
-                for (&e, reflected) in light.elements.iter().zip(&reflected) {
-                    radiosity[e as usize] = elements.emitted[e as usize] + reflected.sum;
+        let relief = match (sums, &elements.relief) {
+            (Some(sums), Some(relief)) => {
+                let first = elements.len() - relief.count();
+                for (e, &reflected) in (first..).zip(&sums.reflected) {
+                    radiosity[e] = elements.emitted[e] + reflected;
                 }
-                Some(light)
+                Some(ReliefLight::new(elements, relief, sums))
             }
             _ => None,
         };
@@ -330,20 +347,26 @@ impl Solver {
 
     /// The rows that the device keeps of `scene`, whose elements these are, with their coupling;
     /// none where nothing is kept.
+    ///
+    /// # Errors
+    /// A device that fails.
     pub fn visibility(&self, scene: &Scene) -> Result<Option<Visibility>> {
         let Method::Rows(spine) = &self.method else {
             return Ok(None);
         };
-        if !spine.kept.keeps() {
+        if !spine.team.keeps() {
             return Ok(None);
         }
-        let (state, chunks) = spine.kept.download(&self.device)?;
+        let parts = spine.team.rows()?;
+        let elements = &self.problem.elements;
+        let meso_count = elements.len() - elements.plain_count();
+        let shape = RowShape::whole(elements.len() as u32, meso_count as u32);
         let kept = visibility::Kept {
             rows: spine.ledger.rows(),
             coupling: spine.ledger.system.rows().collect(),
-            state,
-            chunks,
-            chunk_words: spine.kept.chunk_words,
+            parts,
+            shape,
+            chunk_words: spine.team.whole_chunk_words(shape),
         };
         Ok(Some(Visibility::new(scene, &self.problem, kept)))
     }
@@ -381,11 +404,15 @@ impl Solver {
     /// The last sources that were gathered and what each sent, with what those with a relief sent
     /// by direction; for comparison with the pass's twin. None without relief.
     pub fn relief_exits(&self, count: usize) -> Result<Option<ReliefExits>> {
-        let (Some(relief), Method::Rows(spine)) = (&self.problem.relief, &self.method) else {
+        let Method::Rows(spine) = &self.method else {
+            return Ok(None);
+        };
+        let first = spine.team.first();
+        let Some(relief) = &first.relief else {
             return Ok(None);
         };
         let k = relief.directions.count();
-        let slots = spine.gathered_slots(count)?;
+        let slots = first.gathered_slots(count)?;
         Ok(Some(ReliefExits {
             slots,
             exits: download::<Vec4>(&self.device, &relief.exits, 2 * k * count)?

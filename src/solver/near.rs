@@ -3,6 +3,7 @@
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::Problem;
 use crate::constants::NONE;
@@ -39,7 +40,7 @@ pub(super) struct NearLight {
 }
 
 /// Something of light that is emitted, and of light that is reflected.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct ByLight<T> {
     pub emitted: T,
     pub reflected: T,

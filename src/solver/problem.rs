@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
+use super::member::MemberData;
 use super::{Estimator, Settings, Visibility};
 use crate::constants::{LISTED_BITS, SOURCE_EYES};
 use crate::error::{Error, Result};
@@ -16,13 +17,15 @@ use crate::mesh::shadow_tree::ShadowTree;
 use crate::mesh::sources::{self, LitBy, Source, Sources, far_power};
 use crate::meso::{Relief, Transport};
 use crate::passes::batch::Hemicubes;
-use crate::passes::buffers::{SceneBuffers, State};
-use crate::passes::relief_buffers::ReliefBuffers;
+use crate::passes::near_to_relief::NearParts;
+use crate::passes::occluder_tree::TreeData;
+use crate::passes::relief_buffers::ReliefData;
+use crate::passes::scene_data::SceneData;
 use crate::passes::types::ShadowOccluder;
 use crate::scene::even_light::far_lights;
 use crate::scene::sky::Sky;
 use crate::scene::{Lights, PointLight, Scene};
-use crate::vk::{Commands, Device};
+use crate::vk::Device;
 
 /// The light by which elements were grouped.
 #[derive(Debug, Clone)]
@@ -44,9 +47,7 @@ pub struct Problem {
     /// Of the occluders; of the `receiver` estimator alone.
     pub(super) occluder_tree: ShadowTree<ShadowOccluder>,
     pub near: NearPairs,
-    pub(super) scene: SceneBuffers,
-    pub(super) state: State,
-    pub(super) relief: Option<ReliefBuffers>,
+    pub(super) meshlet_count: u32,
     /// Sources of a batch.
     pub(super) slots: u32,
     pub(super) grouped_by: GroupedBy,
@@ -54,13 +55,14 @@ pub struct Problem {
 }
 
 impl Problem {
+    /// With the scene as lists for devices.
     pub(super) fn new(
         device: &Arc<Device>,
         mut elements: Elements,
         lights: &Lights,
         settings: &Settings,
         kept: Option<&Visibility>,
-    ) -> Result<Self> {
+    ) -> Result<(Self, SceneData)> {
         if elements.len() > 1 << LISTED_BITS {
             let (count, most) = (elements.len(), 1 << LISTED_BITS);
             let what = format!("{count} elements, more than the {most} that can be solved");
@@ -112,16 +114,11 @@ impl Problem {
                 (ShadowTree::default(), none)
             }
         };
-        let scene =
-            SceneBuffers::new(device, &elements, &sources, &connections, &occluders, &near)?;
-        let state = State::new(device, &scene)?;
+        let scene = SceneData::new(&elements, &sources, &connections, &occluders, &near);
         let wanted = settings.batch.clamp(1, scene.source_count.max(1));
-        let slots = Hemicubes::fitting_slots(device, &scene, settings.hemicube, wanted);
-        let relief = (elements.relief.as_ref())
-            .filter(|_| settings.estimator != Estimator::Paper)
-            .map(|relief| ReliefBuffers::new(device, &elements, relief, &sources))
-            .transpose()?;
-        Ok(Self {
+        let counts = (scene.element_count, scene.occluder_count);
+        let slots = Hemicubes::fitting_slots(device, counts, settings.hemicube, wanted);
+        let problem = Self {
             settings: settings.clone(),
             elements,
             sources,
@@ -129,22 +126,42 @@ impl Problem {
             occluders,
             occluder_tree,
             near,
-            scene,
-            state,
-            relief,
+            meshlet_count: scene.meshlet_count,
             slots,
             grouped_by,
             sky: lights.sky.clone(),
-        })
+        };
+        Ok((problem, scene))
     }
 
-    /// Takes the emission and the point lights of `scene`, which is otherwise this one, and forgets
-    /// all light.
+    /// Whether elements receive and send by direction.
+    pub(super) fn has_relief(&self) -> bool {
+        self.elements.relief.is_some() && self.settings.estimator != Estimator::Paper
+    }
+
+    /// What the members of a team are made from, with the scene as [`Self::new`] gave it.
+    pub(super) fn member_data(&self, scene: SceneData) -> MemberData {
+        let relief = self.elements.relief.as_ref().filter(|_| self.has_relief());
+        let is_receiver = self.settings.estimator == Estimator::Receiver;
+        let mut settings = self.settings.clone();
+        // Files are the first member's.
+        (settings.checkpoints, settings.relief.cache) = (None, None);
+        MemberData {
+            settings,
+            relief: relief.map(|relief| ReliefData::new(&self.elements, relief, &self.sources)),
+            near: relief.map(|_| NearParts::new(&self.near)),
+            tree: is_receiver.then(|| TreeData::new(&self.occluder_tree)),
+            slots: self.slots,
+            scene,
+        }
+    }
+
+    /// Takes the emission and the point lights of `scene`, which is otherwise this one.
     ///
     /// # Errors
     /// Emission of elements that neither emitted nor reflected; another number of point lights. The
     /// problem is then as it was.
-    pub(super) fn relight(&mut self, device: &Arc<Device>, scene: &Scene) -> Result<Relit> {
+    pub(super) fn relight(&mut self, scene: &Scene) -> Result<Relit> {
         if scene.materials.len() < self.grouped_by.emitted.len() {
             return Err(Error::Usage("another scene: bake again".into()));
         }
@@ -185,26 +202,7 @@ impl Problem {
         }
         self.sources = sources;
         self.sky = scene.lights.sky.clone();
-        (self.scene).write_sources(device, &self.sources.list, more_eyes)?;
-        Commands::run(device, "no light", |cmd| {
-            self.state.buffers().for_each(|buffer| cmd.fill(buffer, 0));
-            let relief = self.relief.iter().flat_map(ReliefBuffers::light);
-            relief.for_each(|buffer| cmd.fill(buffer, 0));
-            Ok(())
-        })?;
         Ok(Relit { moved, more_eyes })
-    }
-
-    /// The scene's buffers on another device.
-    pub(super) fn buffers(&self, device: &Arc<Device>) -> Result<SceneBuffers> {
-        SceneBuffers::new(
-            device,
-            &self.elements,
-            &self.sources,
-            &self.connections,
-            &self.occluders,
-            &self.near,
-        )
     }
 
     /// Whether a source emits so strongly that it is looked at with more care, `[source]`.

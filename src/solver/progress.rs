@@ -159,7 +159,7 @@ impl<'a> Watch<'a> {
             start: Instant::now(),
             budget: problem.settings.budget.unwrap_or(Duration::MAX),
             bound,
-            sources: problem.scene.source_count,
+            sources: problem.sources.list.len() as u32,
             history: Vec::new(),
             go_on,
             stop: None,

@@ -1,15 +1,18 @@
 //! The solution's directional part.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
 use crate::mesh::elements::Elements;
 use crate::meso::{RANK, Relief};
-use crate::passes::buffers::download;
+use crate::passes::buffers::download_from;
 use crate::passes::relief_buffers::ReliefBuffers;
+use crate::passes::types::Reflected;
 use crate::vk::Device;
 
 /// Light of the elements with a relief, in internal order, in their tangent frames; `slot` is an
@@ -36,22 +39,18 @@ impl ReliefLight {
         &self.exitant[m * k..(m + 1) * k]
     }
 
-    pub(super) fn download(
-        device: &Arc<Device>,
-        elements: &Elements,
-        relief: &Relief,
-        buffers: &ReliefBuffers,
-    ) -> Result<Self> {
-        let count = relief.kept().count() * buffers.element_count as usize;
-        let direct: Vec<[Vec3; 3]> = download(device, &buffers.moments_direct, count)?;
-        let mut moments: Vec<[Vec3; 3]> = download(device, &buffers.moments_indirect, count)?;
+    /// Of the elements with a relief, which are the last, from what they hold.
+    pub(super) fn new(elements: &Elements, relief: &Relief, sums: ReliefSums) -> Self {
+        let ReliefSums {
+            direct,
+            mut moments,
+            coefficients,
+            ..
+        } = sums;
         for (sum, direct) in moments.iter_mut().zip(&direct) {
             (0..3).for_each(|c| sum[c] += direct[c]);
         }
-        let held = RANK * buffers.element_count as usize;
-        let coefficients: Vec<Vec4> = download(device, &buffers.coefficients, held)?;
-        let coefficients: Vec<Vec3> = coefficients.into_iter().map(Vec4::truncate).collect();
-        let first = buffers.first_element;
+        let first = (elements.len() - relief.count()) as u32;
         let exitant = coefficients
             .par_chunks(RANK)
             .enumerate()
@@ -66,12 +65,57 @@ impl ReliefLight {
                     .collect::<Vec<_>>()
             })
             .collect();
-        Ok(Self {
-            elements: (first..first + buffers.element_count).collect(),
+        Self {
+            elements: (first..elements.len() as u32).collect(),
             moments,
             moments_direct: direct,
             coefficients,
             exitant,
+        }
+    }
+}
+
+/// What the elements with a relief of a member hold on its device.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct ReliefSums {
+    /// Moments of direct and of indirect light, `[meso element][slot][colour]`.
+    direct: Vec<[Vec3; 3]>,
+    moments: Vec<[Vec3; 3]>,
+    /// `[meso element][rank]`
+    coefficients: Vec<Vec3>,
+    /// What they reflect in all, `[meso element]`.
+    pub reflected: Vec<Vec3>,
+}
+
+impl ReliefSums {
+    /// Of these elements, counted from the first of all.
+    pub fn download(
+        device: &Arc<Device>,
+        buffers: &ReliefBuffers,
+        elements: Range<usize>,
+    ) -> Result<Self> {
+        let first = elements.start - buffers.first_element as usize;
+        let of = |buffer, each: usize| {
+            download_from::<[Vec3; 3]>(device, buffer, first * each, elements.len() * each)
+        };
+        let slots = buffers.kept.count();
+        let (at, held) = (first * RANK, elements.len() * RANK);
+        let coefficients: Vec<Vec4> = download_from(device, &buffers.coefficients, at, held)?;
+        let reflected: Vec<Reflected> =
+            download_from(device, &buffers.reflected, first, elements.len())?;
+        Ok(Self {
+            direct: of(&buffers.moments_direct, slots)?,
+            moments: of(&buffers.moments_indirect, slots)?,
+            coefficients: coefficients.into_iter().map(Vec4::truncate).collect(),
+            reflected: reflected.into_iter().map(|of| of.sum).collect(),
         })
+    }
+
+    /// Takes those of further elements behind.
+    pub fn append(&mut self, mut others: Self) {
+        self.direct.append(&mut others.direct);
+        self.moments.append(&mut others.moments);
+        self.coefficients.append(&mut others.coefficients);
+        self.reflected.append(&mut others.reflected);
     }
 }

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use super::makers::RowKind;
-use super::rows::{Row, Stages, emitter_face};
+use super::row_maker::emitter_face;
+use super::rows::{Row, Stages};
 use super::{Estimator, Problem};
 use crate::meso::{Class, Relief, Transport};
 use crate::passes::cull::Culling;
@@ -170,6 +171,8 @@ pub struct Report {
     pub triangles_drawn: u64,
     /// Sources whose rows are kept.
     pub kept_sources: u64,
+    /// Bytes that several members sent one another of item buffers and parts of rows.
+    pub sent_bytes: u64,
     /// Rows that were drawn again, since they had found no room.
     pub drawn_again: u64,
     /// Rows that an earlier run had drawn, which was stopped; see [`super::Checkpoints`]. Times are
@@ -233,7 +236,7 @@ impl ReliefReport {
 }
 
 impl Report {
-    pub(super) fn new(devices: &[Arc<Device>], problem: &Problem) -> Self {
+    pub(super) fn new(device: &Arc<Device>, problem: &Problem, others: &[String]) -> Self {
         let Problem {
             settings,
             elements,
@@ -241,10 +244,9 @@ impl Report {
             ..
         } = problem;
         let strong = problem.strong().contains(&true);
-        let mut names = devices.iter().map(|device| device.name().to_owned());
         Self {
-            device: names.next().unwrap_or_default(),
-            other_devices: names.collect(),
+            device: device.name().to_owned(),
+            other_devices: others.to_vec(),
             estimator: match settings.estimator {
                 Estimator::Receiver => "receiver",
                 Estimator::Pixel => "pixel",
@@ -252,7 +254,7 @@ impl Report {
             },
             hemicube: settings.hemicube,
             emitter_hemicube: match strong {
-                true => emitter_face(&devices[0], settings),
+                true => emitter_face(device, settings),
                 false => settings.hemicube,
             },
             elements: elements.len() as u64,
@@ -271,7 +273,7 @@ impl Report {
                 sweeps: 0,
             },
             relief: elements.relief.as_ref().map(ReliefReport::new),
-            meshlets: problem.scene.meshlet_count.into(),
+            meshlets: problem.meshlet_count.into(),
             culls: settings.culling != Culling::Off,
             ..Self::default()
         }

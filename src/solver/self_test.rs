@@ -14,6 +14,7 @@ use crate::mesh::occluders::Occluders;
 use crate::mesh::sources;
 use crate::passes::batch::BatchSize;
 use crate::passes::buffers::SceneBuffers;
+use crate::passes::scene_data::SceneData;
 use crate::scene::shapes::Shapes;
 use crate::scene::{Lights, Scene};
 use crate::vk::{Candidate, Device, Instance};
@@ -84,7 +85,8 @@ pub fn ids_come_back_right(device: &Arc<Device>) -> Result<bool> {
         sources::build(&mut elements, &Lights::NONE, &settings.grouping, 0);
     let occluders = Occluders::elements(&elements);
     let near = NearPairs::none(&elements, sources.list.len());
-    let scene = SceneBuffers::new(device, &elements, &sources, &connections, &occluders, &near)?;
+    let scene = SceneData::new(&elements, &sources, &connections, &occluders, &near);
+    let scene = SceneBuffers::new(device, &scene, scene.shape)?;
     let size = BatchSize {
         slots: 1,
         face: SIZE,

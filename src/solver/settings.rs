@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use serde::{Deserialize, Serialize};
+
 use super::Checkpoints;
 use crate::constants::SOURCE_EYES;
 use crate::error::{Error, Result};
@@ -11,7 +13,7 @@ use crate::meso;
 use crate::passes::cull::Culling;
 
 /// How form factors are taken from the item buffer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Estimator {
     /// Lambert's formula for each receiver, visibility from the item buffer.
     #[default]
@@ -43,7 +45,7 @@ impl EmitterShadows {
     }
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Settings {
     pub estimator: Estimator,
     /// Pixels a side of a hemicube's face; even.

@@ -16,6 +16,7 @@ use crate::error::Result;
 use crate::mesh::sources::Source;
 use crate::passes::batch::Batch;
 use crate::passes::bin_shots::BinShots;
+use crate::passes::buffers::SceneBuffers;
 use crate::passes::shoot::Shoot;
 use crate::passes::shot_light::ShotLight;
 use crate::passes::types::Slot;
@@ -31,6 +32,7 @@ pub(super) struct Shots {
     reflected: Vec<Vec3>,
     /// Emitted power that waits to be sent, `[source]`.
     emitted: Vec<DVec3>,
+    pub scene: SceneBuffers,
     light: ShotLight,
     batch: ShotBatch,
     bound: Bound,
@@ -48,10 +50,15 @@ const MOST_SENT: f64 = 1000.0;
 const STAMPS: u32 = 4;
 
 impl Shots {
-    pub fn new(device: &Arc<Device>, on: &Problem, bound: Bound) -> Result<Self> {
+    pub fn new(
+        device: &Arc<Device>,
+        on: &Problem,
+        scene: SceneBuffers,
+        bound: Bound,
+    ) -> Result<Self> {
         let power: f64 = on.sources.list.iter().map(Source::emitted_power).sum();
         let light = ShotLight::new(device, &on.elements, power, on.slots)?;
-        let unshot = Unshot::new(device, &on.scene, &light)?;
+        let unshot = Unshot::new(device, &scene, &light)?;
         let bytes = unshot.powers.bytes();
         let readback = Buffer::new(device, "unshot readback", bytes, BufferUse::Readback)?;
         let measuring = Commands::record(device, "unshot", |cmd| {
@@ -68,7 +75,8 @@ impl Shots {
             readback,
             reflected: vec![Vec3::ZERO; on.sources.list.len()],
             emitted: on.sources.list.iter().map(emitted).collect(),
-            batch: ShotBatch::new(device, on, &light)?,
+            batch: ShotBatch::new(device, on, &scene, &light)?,
+            scene,
             light,
             bound,
             sent: 0.0,
@@ -180,12 +188,17 @@ struct ShotBatch {
 }
 
 impl ShotBatch {
-    fn new(device: &Arc<Device>, on: &Problem, light: &ShotLight) -> Result<Self> {
+    fn new(
+        device: &Arc<Device>,
+        on: &Problem,
+        scene: &SceneBuffers,
+        light: &ShotLight,
+    ) -> Result<Self> {
         let face = on.settings.hemicube;
-        let size = Drawing::fitting(device, &on.scene, &on.settings, on.slots, face);
-        let (drawing, batch) = Drawing::new(device, &on.scene, on.settings.culling, &size)?;
-        let shoot = Shoot::new(device, &on.scene, light, &batch.slots, batch.slot_count)?;
-        let bin = BinShots::new(device, &on.scene, light, &batch)?;
+        let size = Drawing::fitting(device, scene, &on.settings, on.slots, face);
+        let (drawing, batch) = Drawing::new(device, scene, on.settings.culling, &size)?;
+        let shoot = Shoot::new(device, scene, light, &batch.slots, batch.slot_count)?;
+        let bin = BinShots::new(device, scene, light, &batch)?;
         let counts = &batch.hemicubes().counts;
         let bytes = u64::from(batch.slot_count) * size_of::<Slot>() as u64;
         let wanted = Buffer::new(device, "wanted shots", bytes, BufferUse::Upload)?;
@@ -199,7 +212,7 @@ impl ShotBatch {
             cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
             shoot.record(cmd);
             cmd.timestamp(&timestamps, 0);
-            drawing.record(cmd, &on.scene, &batch, || cmd.timestamp(&timestamps, 1));
+            drawing.record(cmd, scene, &batch, || cmd.timestamp(&timestamps, 1));
             cmd.timestamp(&timestamps, 2);
             cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
             bin.record(cmd);

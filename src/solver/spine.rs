@@ -6,41 +6,40 @@
 
 mod settling;
 
+use std::cmp::Reverse;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use glam::DVec3;
 use settling::MOST_TURNS;
 
-use super::gather::{Gathering, LitRow};
+use super::coupling::Targets;
+use super::devices::Crew;
+use super::gather::LitRow;
 use super::journal::{Checkpoints, Journal};
-use super::ledger::{Candidates, Drawn, Ledger, strongest_first};
-use super::makers::{Batch, RowKind, TeamParts};
+use super::ledger::{Candidates, Drawn, Kept, Ledger, strongest_first};
+use super::makers::{Batch, RowKind};
 use super::near::NearLight;
 use super::problem::Relit;
 use super::progress::{Bound, Pace, Watch};
-use super::rows::{Factors, Made};
+use super::rows::Made;
+use super::shares::Share;
 use super::team::{Taken, Team};
 use super::turns::Turns;
 use super::visibility::Visibility;
-use super::{DrawnBatch, Problem, Report, StopReason, VISIBILITY_MEMORY};
+use super::{DrawnBatch, Problem, Report, StopReason};
 use crate::error::Result;
-use crate::passes::fresh_rows::RowShape;
-use crate::passes::kept_rows::{KeptRows, KeptSize};
-use crate::passes::relief_buffers::meso_elements;
-use crate::passes::types::KeptRow;
-use crate::vk::Device;
+use crate::mesh::sources::Source;
+use crate::passes::scene_data::SceneData;
 
 /// A solution under way.
 pub(super) struct Spine {
-    pub devices: Vec<Arc<Device>>,
-    /// Made when a source is first to be drawn.
-    team: Option<Team>,
+    pub team: Team,
     pub ledger: Ledger,
-    pub kept: KeptRows,
+    /// Rows that were kept so far.
+    made: u32,
     journal: Option<Journal>,
     pace: Pace,
-    gathering: Gathering,
     pub near: NearLight,
     /// Of what sources reflect of near light.
     turns: Turns,
@@ -82,38 +81,31 @@ const CORRECTIONS: u32 = 50;
 impl Spine {
     /// With the rows of `restored`, which lie behind one another in the order of the sources.
     pub fn new(
-        devices: &[Arc<Device>],
+        crew: &Crew,
         on: &Problem,
+        scene: SceneData,
         bound: Bound,
         restored: Option<&Visibility>,
     ) -> Result<Self> {
-        let device = &devices[0];
-        let relief = on.relief.as_ref();
-        let shape = RowShape::new(&on.scene, relief.map_or(0, |r| r.element_count));
-        let most = VISIBILITY_MEMORY.min(device.limits().heap_bytes / 3);
-        let kept_size = KeptSize {
-            memory: on.settings.visibility_memory.unwrap_or(most),
-            sources: on.scene.source_count,
-            slots: on.slots,
-        };
-        let kept = KeptRows::new(device, shape, kept_size, restored.map(Visibility::size))?;
-        if let Some(restored) = restored {
-            kept.restore(restored.state(), restored.chunks())?;
-        }
-        let not_lights = |s: usize| on.sources.list[s].is_surface();
-        let rows = |s: usize| restored?.row(s).filter(|_| not_lights(s));
+        let targets = Targets::new(&on.elements, &on.sources.list);
+        // Lights may have moved, and be others.
+        let not_lights = |s: usize| on.sources.list.get(s).is_some_and(Source::is_surface);
+        let kept = restored
+            .map(|restored| restored.kept(not_lights))
+            .unwrap_or_default();
+        let rows = |s: usize| kept.get(s).copied().flatten();
         let coupling = |s, words| restored?.coupling(s, words);
+        let whole = scene.shape;
+        let slices = |shares: &[Arc<Share>]| Some(restored?.slices(shares, whole, not_lights));
         Ok(Self {
-            gathering: Gathering::new(device, on, &kept)?,
+            team: Team::new(crew, on, scene, &targets, slices)?,
             near: NearLight::new(on),
             turns: Turns::default(),
             brought: true,
-            devices: devices.to_vec(),
-            team: None,
+            made: kept.iter().flatten().count() as u32,
             journal: None,
             pace: Pace::default(),
-            ledger: Ledger::new(device, on, bound, rows, coupling),
-            kept,
+            ledger: Ledger::new(crew.first()?, on, bound, rows, coupling),
         })
     }
 
@@ -128,14 +120,14 @@ impl Spine {
         key: String,
         report: &mut Report,
     ) -> Result<()> {
-        if !self.kept.keeps() {
+        if !self.team.keeps() {
             return Ok(());
         }
         let sizes = [
             self.ledger.sources.len(),
             self.ledger.system.targets.words(),
         ];
-        let journal = Journal::open(&self.devices[0], at, key, &self.kept, sizes)?;
+        let journal = Journal::open(&mut self.team, at, key, sizes)?;
         report.resumed = journal.rows() as u64;
         self.journal = Some(journal);
         Ok(())
@@ -146,31 +138,19 @@ impl Spine {
         let moved = &relit.moved;
         // It is of the light before.
         self.journal = None;
+        let device = Arc::clone(&self.team.first().device);
         let before = &mut self.ledger;
         let rows: Vec<_> = (before.sources.iter().zip(moved))
             .map(|(drawn, moved)| drawn.row.filter(|_| !moved))
             .collect();
-        let dropped = before
-            .sources
-            .iter()
-            .zip(moved)
-            .filter(|(_, moved)| **moved);
-        let dropped: Vec<KeptRow> = dropped.filter_map(|(drawn, _)| drawn.row).collect();
+        let of_moved = (0..).zip(moved).filter(|(_, moved)| **moved);
+        let dropped: Vec<u32> = of_moved.map(|(s, _)| s).collect();
         let coupling = |s, _| before.system.take_row(s);
         self.near.relight(on);
         self.brought = true;
-        self.ledger = Ledger::new(&self.devices[0], on, bound, |s| rows[s], coupling);
-        // Other devices hold lights where they were, and those that were drawn first may have been
-        // all of their kind.
-        let kinds = self.kinds_to_draw();
-        let makes = |team: &Team, kind| kind == RowKind::Common || team.has(kind);
-        let team = self.team.take();
-        let fits = |team: &Team| {
-            team.is_alone() && !relit.more_eyes && kinds.iter().all(|&kind| makes(team, kind))
-        };
-        self.team = team.filter(fits);
-        let kept: Vec<KeptRow> = self.ledger.sources.iter().filter_map(|d| d.row).collect();
-        self.kept.forget(&dropped, &kept)
+        self.ledger = Ledger::new(&device, on, bound, |s| rows[s], coupling);
+        // Those that were drawn first may have been all of their kind.
+        self.team.relight(on, relit, dropped, &self.kinds_to_draw())
     }
 
     /// Goes on until the solution is done, which the elements have then, or the watch says stop.
@@ -192,7 +172,7 @@ impl Spine {
                 continue;
             }
             // With relief the first light is measured next, which tells more than another turn.
-            let first = on.relief.is_some() && corrections == 0;
+            let first = on.has_relief() && corrections == 0;
             match first {
                 true => drop(self.bring(on, false, report, &mut self.looks(report, watch))?),
                 false => self.settle(on, corrections > 0, report, watch)?,
@@ -219,7 +199,7 @@ impl Spine {
             }
             // By coupling alone the light is solved where every source has its row, and sends
             // evenly.
-            if on.relief.is_none() && self.ledger.system.is_whole() {
+            if !on.has_relief() && self.ledger.system.is_whole() {
                 break;
             }
             self.measure(on)?;
@@ -299,10 +279,7 @@ impl Spine {
             None => None,
         };
         self.pace.begin();
-        match &mut self.team {
-            Some(team) => team.submit(batch, recorded, &self.kept),
-            None => Ok(()),
-        }
+        self.team.submit(batch, recorded)
     }
 
     /// Asks the watch during work that draws nothing.
@@ -318,28 +295,25 @@ impl Spine {
     /// If it is time for one, or `now`, if the bake is long.
     fn write_checkpoint(&mut self, now: bool) -> Result<()> {
         match &mut self.journal {
-            Some(journal) => journal.write(&self.devices[0], &self.kept, now),
+            Some(journal) => journal.write(&mut self.team, now),
             None => Ok(()),
         }
     }
 
     /// Takes in the oldest batch under way. Whether there was one.
     fn take(&mut self, on: &Problem, phase: Phase, report: &mut Report) -> Result<bool> {
-        let Some(team) = &mut self.team else {
-            return Ok(false);
-        };
         let Some(Taken {
             kind,
             made,
             recorded,
-        }) = team.take(&self.kept)?
+        }) = self.team.take(&on.sources.list)?
         else {
             return Ok(false);
         };
         let drawn = if recorded { 0 } else { made.rows.len() };
-        self.pace.end(kind, drawn, team.is_drawing());
+        self.pace.end(kind, drawn, self.team.is_drawing());
         if let Some(journal) = self.journal.as_mut().filter(|_| !recorded) {
-            journal.add(kind, &made, &self.kept);
+            journal.add(kind, &made);
         }
         self.take_in(on, made, report)?;
         if phase == Phase::First {
@@ -381,12 +355,12 @@ impl Spine {
             self.pace.fitting(kind, left, under_way, elements)
         };
         let in_time = recorded.or(time.map(fitting)).unwrap_or(usize::MAX);
-        let team = self.team(on)?;
-        if !team.has_room(kind) || in_time == 0 {
+        self.prepare()?;
+        if !self.team.has_room(kind) || in_time == 0 {
             return Ok(None);
         }
         candidates.sort_by(strongest_first);
-        candidates.truncate(team.slots(kind).min(left).min(worth).min(in_time));
+        candidates.truncate(self.team.slots(kind).min(left).min(worth).min(in_time));
         let sources = candidates.into_iter().map(|(s, _)| s).collect();
         Ok(Some(Batch { sources, kind }))
     }
@@ -394,6 +368,7 @@ impl Spine {
     /// Solves the system, keeps the rows of a batch, and gathers by those that find no room.
     fn take_in(&mut self, on: &Problem, made: Made, report: &mut Report) -> Result<()> {
         report.seconds.stages += made.stages;
+        report.sent_bytes += made.sent;
         let mut loose = Vec::new();
         for row in made.rows {
             let s = row.source as usize;
@@ -403,30 +378,38 @@ impl Spine {
                 self.ledger.sources[s].kind,
                 self.ledger.sources[s].times > 0,
             );
-            let Factors::Kept(place) = row.factors else {
-                unreachable!("a team keeps its rows");
-            };
             let drawn = &mut self.ledger.sources[s];
             drawn.under_way = false;
             drawn.times += 1;
             if !self.ledger.system.is_drawn(s) {
                 self.ledger.system.draw(s, Some(row.coupling));
             }
-            match place.chunk < self.kept.chunk_count() {
-                true => self.ledger.sources[s].row = Some(place),
-                false => loose.extend(self.ledger.to_send(s, place, true)),
+            match row.places.is_some() {
+                true => {
+                    self.ledger.sources[s].row = Some(Kept {
+                        scale: row.scale,
+                        order: self.made,
+                    });
+                    self.made += 1;
+                }
+                false => loose.extend(self.ledger.to_send(s, row.scale, true)),
             }
         }
         self.gather(loose, report, &mut || true)?;
         Ok(())
     }
 
-    /// What `lit` has of the sources whose rows are kept.
-    fn kept_rows(&self, lit: impl Fn(&Ledger, usize, KeptRow) -> Option<LitRow>) -> Vec<LitRow> {
+    /// What `lit` has of the sources whose rows are kept, the last one first: those that send little
+    /// are added up before the strongest.
+    fn kept_rows(&self, lit: impl Fn(&Ledger, usize, f32) -> Option<LitRow>) -> Vec<LitRow> {
         let sources = self.ledger.sources.iter().enumerate();
-        sources
-            .filter_map(|(s, drawn)| lit(&self.ledger, s, drawn.row?))
-            .collect()
+        let of = |(s, drawn): (usize, &Drawn)| {
+            let Kept { scale, order } = drawn.row?;
+            Some((order, lit(&self.ledger, s, scale)?))
+        };
+        let mut rows: Vec<(u32, LitRow)> = sources.filter_map(of).collect();
+        rows.sort_by_key(|(order, _)| Reverse(*order));
+        rows.into_iter().map(|(_, lit)| lit).collect()
     }
 
     /// Sends through rows what they have to send. Whether `go_on` never said no.
@@ -438,11 +421,16 @@ impl Spine {
     ) -> Result<bool> {
         let start = Instant::now();
         self.brought |= !rows.is_empty();
-        let whole = self.gathering.run(rows, |some| {
+        let mut whole = true;
+        for some in rows.chunks(self.team.most_rows()) {
+            self.team.gather(some)?;
             some.iter().for_each(|lit| self.ledger.sent_by(lit));
             report.gathered_rows += some.len() as u64;
-            go_on()
-        })?;
+            whole = go_on();
+            if !whole {
+                break;
+            }
+        }
         report.seconds.gather += start.elapsed().as_secs_f64();
         Ok(whole)
     }
@@ -466,7 +454,7 @@ impl Spine {
 
     /// Goes on from the light that the elements have.
     fn measure(&mut self, on: &Problem) -> Result<()> {
-        let reflected = self.gathering.measure()?;
+        let reflected = self.team.measure()?;
         let sent: Vec<DVec3> = self
             .ledger
             .sources
@@ -482,16 +470,16 @@ impl Spine {
 
     /// See [`super::Solver::draw`].
     pub fn draw_alone(&mut self, on: &Problem, sources: &[u32]) -> Result<DrawnBatch> {
-        self.team(on)?;
-        let Some(team) = &mut self.team else {
-            unreachable!("it was made above")
-        };
+        self.prepare()?;
         let batch = Batch {
             sources: sources.to_vec(),
             kind: RowKind::Common,
         };
-        team.submit(batch, None, &self.kept)?;
-        let taken = team.take(&self.kept)?.expect("a batch was submitted");
+        self.team.submit(batch, None)?;
+        let taken = self
+            .team
+            .take(&on.sources.list)?
+            .expect("a batch was submitted");
         let (made, words) = (taken.made, self.ledger.system.targets.words());
         Ok(DrawnBatch {
             stages: made.stages,
@@ -500,45 +488,28 @@ impl Spine {
             coupling: (made.rows.into_iter())
                 .map(|row| row.coupling.words(words))
                 .collect(),
-            items: team.items()?,
-            slots: team.slots(RowKind::Common) as u32,
+            items: self.team.items()?,
+            slots: self.team.slots(RowKind::Common) as u32,
         })
     }
 
     /// Kinds of the sources without a row.
     fn kinds_to_draw(&self) -> Vec<RowKind> {
         let without_row = |drawn: &&Drawn| drawn.row.is_none();
+        kinds_of(self.ledger.sources.iter().filter(without_row))
+    }
+
+    /// Lets the team make what draws, when a source is first to be drawn.
+    fn prepare(&mut self) -> Result<()> {
+        let without_row = |drawn: &&Drawn| drawn.row.is_none();
         let undrawn = self.ledger.sources.iter().filter(without_row);
-        let mut kinds: Vec<RowKind> = undrawn.map(|drawn| drawn.kind).collect();
-        kinds.sort_unstable();
-        kinds.dedup();
-        kinds
+        self.team.prepare(|| kinds_of(undrawn))
     }
+}
 
-    /// The team, which is made when it is first asked for.
-    fn team(&mut self, on: &Problem) -> Result<&mut Team> {
-        let team = match self.team.take() {
-            Some(team) => team,
-            None => {
-                let meso = match &on.elements.relief {
-                    Some(relief) => meso_elements(&on.elements, relief),
-                    None => Vec::new(),
-                };
-                let kinds = self.kinds_to_draw();
-                let parts = TeamParts {
-                    problem: on,
-                    targets: &self.ledger.system.targets.list,
-                    meso: &meso,
-                    kinds: &kinds,
-                };
-                Team::new(&self.devices, parts, &self.kept)?
-            }
-        };
-        Ok(self.team.insert(team))
-    }
-
-    /// The last rows that were gathered with their light, for comparison with the twins.
-    pub fn gathered_slots(&self, count: usize) -> Result<Vec<crate::passes::types::Slot>> {
-        self.gathering.slots(count)
-    }
+fn kinds_of<'a>(sources: impl Iterator<Item = &'a Drawn>) -> Vec<RowKind> {
+    let mut kinds: Vec<RowKind> = sources.map(|drawn| drawn.kind).collect();
+    kinds.sort_unstable();
+    kinds.dedup();
+    kinds
 }

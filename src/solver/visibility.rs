@@ -1,13 +1,18 @@
 //! Kept rows and their coupling outside the device: what lights a scene again without drawing it.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::coupling::CouplingRow;
+use super::kept_parts::{merged, slice};
+use super::ledger;
+use super::member::RestoredRows;
 use super::problem::GroupedBy;
+use super::shares::Share;
 use super::word_file::{Kind, hexadecimal};
 use super::{Problem, Settings};
 use crate::constants::NONE;
@@ -16,8 +21,9 @@ use crate::mesh::elements::Elements;
 use crate::mesh::near::NearPairs;
 use crate::mesh::sources::Source;
 use crate::meso::Transport;
-use crate::passes::kept_rows::RestoredSize;
-use crate::passes::types::{KeptRow, KeptState};
+use crate::passes::fresh_rows::RowShape;
+use crate::passes::types::KeptRow;
+use crate::passes::words::Words;
 use crate::scene::{Lights, PointLight, Scene};
 
 /// Form factors of the sources of a scene that had been drawn, for the same scene with other
@@ -31,10 +37,13 @@ pub struct Visibility {
 
 /// What a solver keeps.
 pub(super) struct Kept<'a> {
-    pub rows: Vec<Option<KeptRow>>,
+    pub rows: Vec<Option<ledger::Kept>>,
     pub coupling: Vec<Option<&'a CouplingRow>>,
-    pub state: KeptState,
-    pub chunks: Vec<Vec<u32>>,
+    /// `[member]`
+    pub parts: Vec<(Arc<Share>, RestoredRows)>,
+    /// Of all elements.
+    pub shape: RowShape,
+    /// Of a member that has all.
     pub chunk_words: u32,
 }
 
@@ -156,12 +165,35 @@ impl Visibility {
             first: 0,
             scale: 1.0,
         };
-        let mut chunks = kept.chunks;
+        let whole = match <[_; 1]>::try_from(kept.parts) {
+            Ok([(_, part)]) => part,
+            Err(parts) => {
+                let mut order: Vec<(u32, u32)> = (0..)
+                    .zip(&kept.rows)
+                    .filter_map(|(s, row)| Some((row.as_ref()?.order, s)))
+                    .collect();
+                order.sort_unstable();
+                let sources: Vec<u32> = order.into_iter().map(|(_, s)| s).collect();
+                merged(&parts, &sources, kept.shape, kept.chunk_words)
+            }
+        };
+        let mut rows = vec![none; kept.rows.len()];
+        for &[source, chunk, first] in &whole.places {
+            if let Some(row) = kept.rows.get(source as usize).copied().flatten() {
+                let scale = row.scale;
+                rows[source as usize] = KeptRow {
+                    chunk,
+                    first,
+                    scale,
+                };
+            }
+        }
+        let mut chunks: Vec<Vec<u32>> = whole.chunks.into_iter().map(Words::into_words).collect();
         while chunks.pop_if(|chunk| chunk.is_empty()).is_some() {}
         let surface = |source: &&Source| source.is_surface();
         let surfaces = problem.sources.list.iter().filter(surface).count();
         let mut lists = Lists {
-            rows: kept.rows.iter().map(|row| row.unwrap_or(none)).collect(),
+            rows,
             chunks,
             near: problem.near.lists(surfaces).into(),
             ..Lists::default()
@@ -187,8 +219,8 @@ impl Visibility {
                 .map(|&(towards, irradiance)| (towards.to_array(), irradiance))
                 .collect(),
             surfaces,
-            chunk_words: kept.chunk_words,
-            state: [kept.state.chunk, kept.state.used, kept.state.rows],
+            chunk_words: whole.chunk_words,
+            state: whole.state,
             chunks: lists.chunks.len(),
         };
         Self {
@@ -207,31 +239,50 @@ impl Visibility {
         })
     }
 
-    /// What the chunks of the device hold.
-    pub(super) fn chunks(&self) -> &[Vec<u32>] {
-        &self.lists.chunks
+    /// Rows of the sources that are wanted, in the order in which they were made.
+    fn rows(&self, wanted: impl Fn(usize) -> bool) -> Vec<(u32, KeptRow)> {
+        let all = (0..).zip(&self.lists.rows);
+        let mut rows: Vec<(u32, KeptRow)> = all
+            .filter(|(s, row)| row.chunk != NONE && wanted(*s as usize))
+            .map(|(s, row)| (s, *row))
+            .collect();
+        rows.sort_unstable_by_key(|(_, row)| (row.chunk, row.first));
+        rows
     }
 
-    /// Of the chunks on the device.
-    pub(super) fn size(&self) -> RestoredSize {
-        RestoredSize {
-            chunk_words: self.header.chunk_words,
-            chunks: self.lists.chunks.len(),
+    /// What is kept of each source that is wanted, `[source]`.
+    pub(super) fn kept(&self, wanted: impl Fn(usize) -> bool) -> Vec<Option<ledger::Kept>> {
+        let mut kept = vec![None; self.lists.rows.len()];
+        for (order, (s, row)) in (0..).zip(self.rows(wanted)) {
+            let scale = row.scale;
+            kept[s as usize] = Some(ledger::Kept { scale, order });
         }
+        kept
     }
 
-    pub(super) fn state(&self) -> KeptState {
-        let [chunk, used, rows] = self.header.state;
-        KeptState { chunk, used, rows }
-    }
-
-    /// Where the row of a source is kept, if it is.
-    pub(super) fn row(&self, s: usize) -> Option<KeptRow> {
-        self.lists
-            .rows
-            .get(s)
-            .copied()
-            .filter(|row| row.chunk != NONE)
+    /// What each member is to begin with, of the sources that are wanted. `whole`: the shape of all
+    /// elements.
+    pub(super) fn slices(
+        &self,
+        shares: &[Arc<Share>],
+        whole: RowShape,
+        wanted: impl Fn(usize) -> bool,
+    ) -> Vec<RestoredRows> {
+        let rows = self.rows(wanted);
+        let chunks = self.lists.chunks.iter();
+        let chunks: Vec<Words> = chunks.map(|chunk| chunk.clone().into()).collect();
+        let chunk_words = self.header.chunk_words;
+        if let [_] = shares {
+            let place = |(source, row): &(u32, KeptRow)| [*source, row.chunk, row.first];
+            return vec![RestoredRows {
+                chunk_words,
+                state: self.header.state,
+                places: rows.iter().map(place).collect(),
+                chunks,
+            }];
+        }
+        let of = |share: &Arc<Share>| slice(&chunks, &rows, whole, share.shape, chunk_words);
+        shares.iter().map(of).collect()
     }
 
     /// The coupling row of a source, of so many words; none where it was not kept.

@@ -172,7 +172,9 @@ impl ImageUse {
     fn flags(self) -> vk::ImageUsageFlags {
         use vk::ImageUsageFlags as F;
         match self {
-            Self::ColourTarget => F::COLOR_ATTACHMENT | F::SAMPLED | F::TRANSFER_SRC,
+            Self::ColourTarget => {
+                F::COLOR_ATTACHMENT | F::SAMPLED | F::TRANSFER_SRC | F::TRANSFER_DST
+            }
             Self::DepthTarget => F::DEPTH_STENCIL_ATTACHMENT,
             Self::Texture => F::SAMPLED | F::TRANSFER_DST | F::TRANSFER_SRC,
         }

@@ -22,6 +22,7 @@ mod tests;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::constants::NONE;
 use crate::mesh::elements::Elements;
@@ -35,7 +36,7 @@ pub(super) use rays::{blocked, first_met};
 use receivers::Receiver;
 
 /// What counts as near.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Nearness {
     /// A source is near an element whose view it fills by more than this share.
     pub source: f64,

@@ -15,6 +15,7 @@ mod single;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
 
 use crate::constants::{KIND_POINT, KIND_SURFACE};
 use crate::error::{Error, Result};
@@ -33,7 +34,7 @@ use lit::Lit;
 use single::{halves, part, point};
 
 /// Where groups are cut.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Grouping {
     /// Most elements of a source that has a relief; a curved one may have twice as many, and more
     /// where more than [`Self::MANY`] elements are curved: as the square root of their number. The

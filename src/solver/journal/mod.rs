@@ -12,23 +12,23 @@ mod part;
 use std::collections::VecDeque;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use part::{FOREIGN_ROWS, Header, Part, Recorded, array};
+use part::{Header, Part, Recorded};
+use serde::{Deserialize, Serialize};
 
 use super::makers::{Batch, RowKind};
+use super::member::state_words;
 use super::rows::{Made, Row};
+use super::team::Team;
 use crate::atomic_file::is_temporary;
 use crate::error::{Error, Result};
-use crate::passes::buffers::download;
-use crate::passes::kept_rows::KeptRows;
 use crate::passes::types::KeptState;
-use crate::vk::Device;
+use crate::passes::words::Words;
 
 /// Where a long bake keeps its rows while it runs: the same bake goes on from them after it was
 /// killed, to the same light.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Checkpoints {
     /// Made when it is first needed.
     pub folder: PathBuf,
@@ -67,8 +67,9 @@ pub(super) struct Journal {
     fresh: Vec<Recorded>,
     parts: usize,
     last: Instant,
-    /// How far the chunks were filled at the end of the last part, and of the last batch.
-    filled: [KeptState; 2],
+    /// How far the chunks of each member were filled at the end of the last part, and of the last
+    /// batch.
+    filled: Vec<[KeptState; 2]>,
     /// A part could not be written: none is tried again.
     failed: bool,
 }
@@ -105,13 +106,12 @@ impl Journal {
     /// # Errors
     /// A device that fails.
     pub fn open(
-        device: &Arc<Device>,
+        team: &mut Team,
         at: &Checkpoints,
         key: String,
-        kept: &KeptRows,
         [sources, words]: [usize; 2],
     ) -> Result<Self> {
-        let filled = download::<KeptState>(device, &kept.state, 1)?[0];
+        let states = team.states()?;
         let mut journal = Self {
             folder: at.folder.clone(),
             every: at.every,
@@ -120,7 +120,7 @@ impl Journal {
             fresh: Vec::new(),
             parts: 0,
             last: Instant::now(),
-            filled: [filled; 2],
+            filled: states.into_iter().map(|state| [state; 2]).collect(),
             failed: false,
         };
         loop {
@@ -134,10 +134,13 @@ impl Journal {
                 }
                 return Ok(journal);
             }
-            match journal.read(&path, kept, [sources, words]) {
+            match journal.read(&path, team, [sources, words]) {
                 Ok(part) => {
-                    kept.restore_between(device, part.filled(), &part.chunk_words)?;
-                    journal.filled = [part.filled()[1]; 2];
+                    let filled: Vec<KeptState> = part.filled().map(|[_, to]| to).collect();
+                    let places = part.places(filled.len());
+                    let words = part.chunk_words.into_iter().map(Words::from).collect();
+                    team.restore(&filled, words, places)?;
+                    journal.filled = filled.into_iter().map(|state| [state; 2]).collect();
                     journal.recorded.extend(part.batches);
                     journal.parts += 1;
                 }
@@ -151,7 +154,7 @@ impl Journal {
     }
 
     /// Reads the part that comes next.
-    fn read(&self, path: &Path, kept: &KeptRows, size: [usize; 2]) -> Result<Part> {
+    fn read(&self, path: &Path, team: &Team, size: [usize; 2]) -> Result<Part> {
         let bad = |what: &str| Error::file(path, what);
         let part = Part::read(path, size)?;
         let header = &part.header;
@@ -159,14 +162,13 @@ impl Journal {
             let what = "of another scene, other settings, another device or another program";
             return Err(bad(what));
         }
-        let fits = header.chunk_words == kept.chunk_words && header.chunks == kept.chunk_count();
-        if header.filled[0] != array(self.filled[1]) || !fits {
+        let follows = header.filled.len() == self.filled.len()
+            && (part.filled().zip(&self.filled))
+                .all(|([from, _], filled)| state_words(from) == state_words(filled[1]));
+        if header.room != team.room || !follows {
             return Err(bad("not what follows, or made with other memory"));
         }
-        match part.chunk_words.len() == kept.words_between(part.filled()) {
-            true => Ok(part),
-            false => Err(bad(FOREIGN_ROWS)),
-        }
+        Ok(part)
     }
 
     /// The recorded rows of the next batch; none after the last recorded batch.
@@ -200,12 +202,14 @@ impl Journal {
     }
 
     /// Notes a batch that was drawn.
-    pub fn add(&mut self, kind: RowKind, made: &Made, kept: &KeptRows) {
+    pub fn add(&mut self, kind: RowKind, made: &Made) {
         if self.failed {
             return;
         }
-        self.filled[1] = made.state.unwrap_or(self.filled[1]);
-        self.fresh.push(Recorded::new(kind, &made.rows, kept));
+        for (filled, &state) in self.filled.iter_mut().zip(made.states.iter().flatten()) {
+            filled[1] = state;
+        }
+        self.fresh.push(Recorded::new(kind, &made.rows));
     }
 
     /// Writes a part if it is time for one, or `now`, if one was written before. A disk without
@@ -213,17 +217,20 @@ impl Journal {
     ///
     /// # Errors
     /// A device that fails.
-    pub fn write(&mut self, device: &Arc<Device>, kept: &KeptRows, now: bool) -> Result<()> {
+    pub fn write(&mut self, team: &mut Team, now: bool) -> Result<()> {
         let is_due = self.last.elapsed() >= self.every || (now && self.parts > 0);
         if self.failed || self.fresh.is_empty() || !is_due {
             return Ok(());
         }
-        let words = kept.download_between(device, self.filled)?;
+        let words = team.words(&self.filled)?;
         let header = Header {
             key: self.key.clone(),
-            chunk_words: kept.chunk_words,
-            chunks: kept.chunk_count(),
-            filled: self.filled.map(array),
+            room: team.room.clone(),
+            filled: self
+                .filled
+                .iter()
+                .map(|states| states.map(state_words))
+                .collect(),
         };
         let path = path_of(&self.folder, self.parts);
         let written = fs::create_dir_all(&self.folder)
@@ -236,7 +243,9 @@ impl Journal {
             return Ok(());
         }
         self.parts += 1;
-        self.filled[0] = self.filled[1];
+        for filled in &mut self.filled {
+            filled[0] = filled[1];
+        }
         self.last = Instant::now();
         Ok(())
     }

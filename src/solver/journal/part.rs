@@ -5,17 +5,18 @@ use std::path::Path;
 use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 
-use crate::constants::{FACES, NONE, RECEIVE_LISTS};
+use crate::constants::{FACES, RECEIVE_LISTS};
 use crate::error::{Error, Result};
-use crate::passes::kept_rows::KeptRows;
 use crate::passes::types::{KeptRow, KeptState};
+use crate::passes::words::Words;
 use crate::solver::coupling::CouplingRow;
 use crate::solver::makers::RowKind;
-use crate::solver::rows::{Factors, Row};
+use crate::solver::member::kept_state;
+use crate::solver::rows::Row;
 use crate::solver::word_file::Kind;
 
 const FILE: Kind = Kind {
-    magic: b"mesolux batches1",
+    magic: b"mesolux batches2",
     name: "rows of a bake",
 };
 
@@ -23,18 +24,18 @@ const FILE: Kind = Kind {
 pub struct Header {
     /// Of the scene, the settings, the program and the devices.
     pub key: String,
-    pub chunk_words: u32,
-    pub chunks: u32,
-    /// How far the chunks were filled before and after; see [`KeptState`].
-    pub filled: [[u32; 3]; 2],
+    /// Words of a chunk and number of chunks, `[member]`.
+    pub room: Vec<[u32; 2]>,
+    /// How far the chunks were filled before and after, see [`KeptState`], `[member]`.
+    pub filled: Vec<[[u32; 3]; 2]>,
 }
 
 /// A part whose lists fit together.
 pub struct Part {
     pub header: Header,
     pub batches: Vec<Recorded>,
-    /// What the chunks hold between its two states.
-    pub chunk_words: Vec<u32>,
+    /// What the chunks hold between its two states, `[member]`.
+    pub chunk_words: Vec<Vec<u32>>,
 }
 
 pub const FOREIGN_ROWS: &str = "its rows are not rows of this scene";
@@ -44,16 +45,22 @@ impl Part {
     pub fn read(path: &Path, [sources, words]: [usize; 2]) -> Result<Self> {
         let bad = |what: &str| Error::file(path, what);
         let (header, lists): (Header, _) = FILE.read(path)?;
-        let lists: std::result::Result<[Vec<u32>; 5], _> = lists.try_into();
-        let [batches, rows, runs, values, chunk_words] =
-            lists.map_err(|_| bad("its lists are not those of a part"))?;
-        let lists = Lists {
-            batches,
-            rows,
-            runs,
-            values,
+        let members = header.filled.len();
+        let mut lists: std::collections::VecDeque<Vec<u32>> = lists.into();
+        if members == 0 || header.room.len() != members || lists.len() != LISTS + members {
+            return Err(bad("its lists are not those of a part"));
+        }
+        let mut next = || lists.pop_front().unwrap_or_default();
+        let rows_of = Lists {
+            batches: next(),
+            rows: next(),
+            runs: next(),
+            values: next(),
+            places: next(),
         };
-        let batches = (lists.batches(sources, words)).ok_or_else(|| bad(FOREIGN_ROWS))?;
+        let chunk_words = lists.into();
+        let batches = rows_of.batches([sources, words, members]);
+        let batches = batches.ok_or_else(|| bad(FOREIGN_ROWS))?;
         let part = Self {
             header,
             batches,
@@ -70,27 +77,54 @@ impl Part {
         path: &Path,
         header: &Header,
         batches: &[Recorded],
-        chunk_words: &[u32],
+        chunk_words: &[Words],
     ) -> Result<()> {
         let lists = Lists::new(batches);
         FILE.write(path, header, &lists.words(chunk_words))
     }
 
-    /// How far the chunks are filled before and after it.
-    pub fn filled(&self) -> [KeptState; 2] {
-        (self.header.filled).map(|[chunk, used, rows]| KeptState { chunk, used, rows })
+    /// How far the chunks of each member are filled before and after it.
+    pub fn filled(&self) -> impl Iterator<Item = [KeptState; 2]> {
+        self.header
+            .filled
+            .iter()
+            .map(|states| states.map(kept_state))
     }
 
-    fn is_in_chunks(&self) -> bool {
-        let [from, to] = self.filled();
-        let is_kept = |record: &Record| {
-            record.chunk == NONE || (record.chunk, record.first) < (to.chunk, to.used)
+    /// Source, chunk and first word of the rows that are kept, `[member][row]`.
+    pub fn places(&self, members: usize) -> Vec<Vec<[u32; 3]>> {
+        let rows = || self.batches.iter().flat_map(|batch| &batch.rows);
+        let of = |member: usize| {
+            let place = |row: &RecordedRow| {
+                let [chunk, first] = *row.places.get(member)?;
+                Some([row.record.source, chunk, first])
+            };
+            rows().filter_map(place).collect()
         };
-        let mut records = self.batches.iter().flat_map(|batch| &batch.rows);
-        (from.chunk, from.used) <= (to.chunk, to.used)
-            && to.chunk <= self.header.chunks
-            && to.used <= self.header.chunk_words
-            && records.all(|(record, _)| is_kept(record))
+        (0..members).map(of).collect()
+    }
+
+    /// Whether every member's chunks hold so many words, and all rows lie in them.
+    fn is_in_chunks(&self) -> bool {
+        let is_filled = |((([from, to], &[words, chunks]), held), member): (
+            (([KeptState; 2], &[u32; 2]), &Vec<u32>),
+            usize,
+        )| {
+            let at = |state: KeptState| {
+                u64::from(state.chunk) * u64::from(words) + u64::from(state.used)
+            };
+            let is_kept = |place: &[u32; 2]| (place[0], place[1]) < (to.chunk, to.used);
+            let mut rows = self.batches.iter().flat_map(|batch| &batch.rows);
+            (from.chunk, from.used) <= (to.chunk, to.used)
+                && to.chunk <= chunks
+                && from.used <= words
+                && to.used <= words
+                && (to.chunk < chunks || to.used == 0)
+                && at(to) - at(from) == held.len() as u64
+                && rows.all(|row| row.places.get(member).is_none_or(is_kept))
+        };
+        let members = self.filled().zip(&self.header.room).zip(&self.chunk_words);
+        members.zip(0..).all(is_filled)
     }
 }
 
@@ -99,9 +133,8 @@ impl Part {
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 struct Record {
     source: u32,
-    /// `NONE`: there was no room.
-    chunk: u32,
-    first: u32,
+    /// 0: a member had none.
+    has_room: u32,
     scale: f32,
     /// Below 0: none.
     share: f32,
@@ -118,8 +151,18 @@ struct Record {
 /// Of a batch, what was taken in.
 pub struct Recorded {
     pub kind: RowKind,
-    rows: Vec<(Record, CouplingRow)>,
+    rows: Vec<RecordedRow>,
 }
+
+struct RecordedRow {
+    record: Record,
+    coupling: CouplingRow,
+    /// Chunk and first word, `[member]`; empty of a row without room.
+    places: Vec<[u32; 2]>,
+}
+
+/// Lists of a part before those of the members.
+const LISTS: usize = 5;
 
 /// The kinds as files have them.
 const KINDS: [RowKind; 4] = [
@@ -129,27 +172,22 @@ const KINDS: [RowKind; 4] = [
     RowKind::Common,
 ];
 
-pub fn array(state: KeptState) -> [u32; 3] {
-    [state.chunk, state.used, state.rows]
-}
-
-fn record(row: &Row, kept: &KeptRows) -> (Record, CouplingRow) {
-    let Factors::Kept(place) = row.factors else {
-        unreachable!("a team keeps its rows");
+fn record(row: &Row) -> RecordedRow {
+    let Some(places) = &row.places else {
+        let mut record = Record::zeroed();
+        record.source = row.source;
+        return RecordedRow {
+            record,
+            coupling: CouplingRow::default(),
+            places: Vec::new(),
+        };
     };
-    let mut record = Record::zeroed();
-    record.source = row.source;
-    record.chunk = NONE;
-    if place.chunk >= kept.chunk_count() {
-        return (record, CouplingRow::default());
-    }
     let (runs, values) = row.coupling.lists();
     let mut counts = [[0; 3]; FACES as usize];
     counts[..row.counts.len()].copy_from_slice(&row.counts);
     let record = Record {
         source: row.source,
-        chunk: place.chunk,
-        first: place.first,
+        has_room: 1,
         scale: row.scale,
         share: row.share.unwrap_or(-1.0),
         facing_away: row.facing_away,
@@ -159,21 +197,34 @@ fn record(row: &Row, kept: &KeptRows) -> (Record, CouplingRow) {
         runs: runs.len() as u32,
         values: values.len() as u32,
     };
-    (record, row.coupling.clone())
+    RecordedRow {
+        record,
+        coupling: row.coupling.clone(),
+        places: places
+            .iter()
+            .map(|place| [place.chunk, place.first])
+            .collect(),
+    }
 }
 
 /// The inverse of [`record`].
-fn row((record, coupling): (Record, CouplingRow)) -> Row {
+fn row(recorded: RecordedRow) -> Row {
+    let RecordedRow {
+        record,
+        coupling,
+        places,
+    } = recorded;
+    let place = |[chunk, first]: [u32; 2]| KeptRow {
+        chunk,
+        first,
+        scale: record.scale,
+    };
     Row {
         source: record.source,
         scale: record.scale,
         share: (record.share >= 0.0).then_some(record.share),
         coupling,
-        factors: Factors::Kept(KeptRow {
-            chunk: record.chunk,
-            first: record.first,
-            scale: record.scale,
-        }),
+        places: (record.has_room > 0).then(|| places.into_iter().map(place).collect()),
         counts: record.counts[..record.faces as usize].to_vec(),
         facing_away: record.facing_away,
         listed: record.listed.map(u64::from),
@@ -181,13 +232,13 @@ fn row((record, coupling): (Record, CouplingRow)) -> Row {
 }
 
 impl Recorded {
-    pub fn new(kind: RowKind, rows: &[Row], kept: &KeptRows) -> Self {
-        let rows = rows.iter().map(|row| record(row, kept)).collect();
+    pub fn new(kind: RowKind, rows: &[Row]) -> Self {
+        let rows = rows.iter().map(record).collect();
         Self { kind, rows }
     }
 
     pub fn sources(&self) -> impl ExactSizeIterator<Item = u32> {
-        self.rows.iter().map(|(record, _)| record.source)
+        self.rows.iter().map(|row| row.record.source)
     }
 
     pub fn into_rows(self) -> Vec<Row> {
@@ -204,6 +255,8 @@ struct Lists {
     rows: Vec<u32>,
     runs: Vec<u32>,
     values: Vec<u32>,
+    /// Chunk and first word of rows with room, `[row][member]`.
+    places: Vec<u32>,
 }
 
 impl Lists {
@@ -213,9 +266,10 @@ impl Lists {
             let kind = KINDS.iter().position(|&kind| kind == batch.kind);
             let kind = kind.expect("all kinds are listed") as u32;
             lists.batches.extend([kind, batch.rows.len() as u32]);
-            for (record, coupling) in &batch.rows {
-                let (runs, values) = coupling.lists();
-                (lists.rows).extend_from_slice(bytemuck::cast_slice(&[*record]));
+            for row in &batch.rows {
+                let (runs, values) = row.coupling.lists();
+                (lists.rows).extend_from_slice(bytemuck::cast_slice(&[row.record]));
+                lists.places.extend_from_slice(row.places.as_flattened());
                 lists.runs.extend_from_slice(runs.as_flattened());
                 (lists.values).extend_from_slice(bytemuck::cast_slice(values));
             }
@@ -223,18 +277,29 @@ impl Lists {
         lists
     }
 
-    fn words<'a>(&'a self, chunks: &'a [u32]) -> [&'a [u32]; 5] {
-        [&self.batches, &self.rows, &self.runs, &self.values, chunks]
+    fn words<'a>(&'a self, chunks: &'a [Words]) -> Vec<&'a [u32]> {
+        let Self {
+            batches,
+            rows,
+            runs,
+            values,
+            places,
+        } = self;
+        let own = [batches, rows, runs, values, places].map(Vec::as_slice);
+        own.into_iter()
+            .chain(chunks.iter().map(Words::words))
+            .collect()
     }
 
-    /// The inverse of [`Self::new`]; none if they are no rows of so many sources and words.
-    fn batches(&self, sources: usize, words: usize) -> Option<Vec<Recorded>> {
+    /// The inverse of [`Self::new`]; none if they are no rows of so many sources, words and members.
+    fn batches(&self, [sources, words, members]: [usize; 3]) -> Option<Vec<Recorded>> {
         let records: &[Record] = bytemuck::try_cast_slice(&self.rows).ok()?;
         let mut records = records.iter();
         let (runs, odd) = self.runs.as_chunks::<2>();
         let values: &[f32] = bytemuck::cast_slice(&self.values);
         let (counts, more) = self.batches.as_chunks::<2>();
-        let (mut first_run, mut first_value) = (0, 0);
+        let (all_places, odd_places) = self.places.as_chunks::<2>();
+        let (mut first_run, mut first_value, mut first_place) = (0, 0, 0);
         let mut next = || {
             let record = *records.next()?;
             let of_runs = runs.get(first_run..first_run + record.runs as usize)?;
@@ -242,8 +307,15 @@ impl Lists {
             first_run += of_runs.len();
             first_value += of_values.len();
             let coupling = CouplingRow::from_lists(of_runs.to_vec(), of_values.to_vec(), words)?;
+            let own = if record.has_room > 0 { members } else { 0 };
+            let places = all_places.get(first_place..first_place + own)?.to_vec();
+            first_place += own;
             let fits = (record.source as usize) < sources && record.faces <= FACES;
-            (fits && record.scale.is_finite()).then_some((record, coupling))
+            (fits && record.scale.is_finite()).then_some(RecordedRow {
+                record,
+                coupling,
+                places,
+            })
         };
         let batch = |&[kind, rows]: &[u32; 2]| {
             Some(Recorded {
@@ -252,7 +324,9 @@ impl Lists {
             })
         };
         let batches = counts.iter().map(batch).collect::<Option<Vec<_>>>()?;
-        (odd.is_empty() && more.is_empty() && records.next().is_none()).then_some(batches)
+        let is_all = odd.is_empty() && more.is_empty() && odd_places.is_empty();
+        let is_read = records.next().is_none() && first_place == all_places.len();
+        (is_all && is_read).then_some(batches)
     }
 }
 
@@ -267,7 +341,7 @@ mod tests {
         let coupling = CouplingRow::new(&[0.0, 1.0, 0.0, 0.0, 0.0, 0.5], 2.0);
         let kept = Record {
             source: 4,
-            first: 12,
+            has_room: 1,
             scale: 2.0,
             share: -1.0,
             faces: FACES,
@@ -278,32 +352,48 @@ mod tests {
         };
         let loose = Record {
             source: 2,
-            chunk: NONE,
             ..Record::zeroed()
         };
+        let row = |record, coupling: &CouplingRow, places: &[[u32; 2]]| RecordedRow {
+            record,
+            coupling: coupling.clone(),
+            places: places.to_vec(),
+        };
         let batch = |kind, rows| Recorded { kind, rows };
-        let first = batch(RowKind::Strong, vec![(kept, coupling.clone())]);
-        let second = vec![(loose, CouplingRow::default()), (kept, coupling)];
+        let first = batch(
+            RowKind::Strong,
+            vec![row(kept, &coupling, &[[0, 12], [1, 8]])],
+        );
+        let second = vec![
+            row(loose, &CouplingRow::default(), &[]),
+            row(kept, &coupling, &[[0, 40], [2, 0]]),
+        ];
         let lists = Lists::new(&[first, batch(RowKind::Common, second)]);
-        let found = lists.batches(5, 6).expect("they are whole");
+        let found = lists.batches([5, 6, 2]).expect("they are whole");
         assert_eq!(found.len(), 2);
         assert_eq!(found[0].kind, RowKind::Strong);
         assert!(found[1].sources().eq([2, 4]));
-        let (record, coupling) = &found[1].rows[1];
-        assert_eq!(bytemuck::bytes_of(record), bytemuck::bytes_of(&kept));
-        assert_eq!(coupling.words(6), [0.0, 2.0, 0.0, 0.0, 0.0, 1.0]);
-        assert!(lists.batches(4, 6).is_none(), "there is no source 4");
-        assert!(lists.batches(5, 5).is_none(), "there is no sixth word");
-        for cut in 0..4 {
+        let last = &found[1].rows[1];
+        assert_eq!(bytemuck::bytes_of(&last.record), bytemuck::bytes_of(&kept));
+        assert_eq!(last.coupling.words(6), [0.0, 2.0, 0.0, 0.0, 0.0, 1.0]);
+        assert_eq!(last.places, [[0, 40], [2, 0]]);
+        assert!(lists.batches([4, 6, 2]).is_none(), "there is no source 4");
+        assert!(lists.batches([5, 5, 2]).is_none(), "there is no sixth word");
+        assert!(
+            lists.batches([5, 6, 3]).is_none(),
+            "there is no third member"
+        );
+        for cut in 0..5 {
             let mut lists = Lists::new(&found);
             let all = [
                 &mut lists.batches,
                 &mut lists.rows,
                 &mut lists.runs,
                 &mut lists.values,
+                &mut lists.places,
             ];
-            all.into_iter().nth(cut).expect("four lists").pop();
-            assert!(lists.batches(5, 6).is_none(), "list {cut}");
+            all.into_iter().nth(cut).expect("five lists").pop();
+            assert!(lists.batches([5, 6, 2]).is_none(), "list {cut}");
         }
     }
 }

@@ -32,7 +32,7 @@ impl Spine {
         report: &mut Report,
         go_on: &mut dyn FnMut() -> bool,
     ) -> Result<Option<f64>> {
-        let rows = self.kept_rows(|ledger, s, row| ledger.to_send(s, row, by_direction));
+        let rows = self.kept_rows(|ledger, s, scale| ledger.to_send(s, scale, by_direction));
         if !self.gather(rows, report, go_on)? {
             return Ok(None);
         }
@@ -40,13 +40,16 @@ impl Spine {
             return Ok(Some(0.0));
         }
         let start = Instant::now();
-        let brought = self.gathering.irradiance(on)?;
+        let [direct, indirect] = self.team.irradiance()?;
+        let brought = direct.iter().zip(&indirect);
+        let brought: Vec<DVec3> = brought.map(|(d, i)| d.as_dvec3() + i.as_dvec3()).collect();
         let sum: DVec3 = brought.iter().sum();
         let mean = sum.max_element() / brought.len() as f64;
         let most = UNSETTLED * on.settings.residual * mean;
         let sent = self.ledger.sent(on);
         self.near.solve(on, &brought, &sent, most);
-        self.gathering.near(&self.near.send_to_relief(on, &sent))?;
+        let to_relief = self.near.send_to_relief(on, &sent);
+        self.team.near(to_relief)?;
         let moved = self.turn_near(on);
         report.seconds.near += start.elapsed().as_secs_f64();
         report.near.sweeps = self.near.sweeps;

@@ -1,0 +1,437 @@
+//! A member of a team: a device that holds the scene, finds the form factors of its share of the
+//! elements, keeps them, and brings these elements their light.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use super::drawing::read_items;
+use super::exchange::Exchange;
+use super::gather::{Gathering, LitRow};
+use super::makers::{Makers, RowKind};
+use super::near::ByLight;
+use super::relief_light::ReliefSums;
+use super::row_maker::RowParts;
+use super::rows::MadeParts;
+use super::shares::Share;
+use super::{Settings, VISIBILITY_MEMORY};
+use crate::error::{Error, Result};
+use crate::passes::buffers::{SceneBuffers, State, download_from, upload};
+use crate::passes::fresh_rows::{FreshRows, RowShape};
+use crate::passes::kept_rows::{KeptRows, KeptSize, RestoredSize};
+use crate::passes::near_to_relief::NearParts;
+use crate::passes::occluder_tree::{OccluderTree, TreeData};
+use crate::passes::relief_buffers::{ReliefBuffers, ReliefData};
+use crate::passes::scene_data::{LitSources, SceneData};
+use crate::passes::types::{CouplingTarget, KeptRow, KeptState, MesoElement, Slot};
+use crate::passes::words::Words;
+use crate::vk::{Buffer, BufferUse, Commands, Device};
+
+/// What all members are made from.
+#[derive(Clone, Serialize, Deserialize)]
+pub(super) struct MemberData {
+    pub settings: Settings,
+    pub scene: SceneData,
+    pub relief: Option<ReliefData>,
+    /// Of a scene with relief.
+    pub near: Option<NearParts>,
+    /// Of the `receiver` estimator.
+    pub tree: Option<TreeData>,
+    /// Sources of a batch.
+    pub slots: u32,
+}
+
+/// What is one member's own.
+#[derive(Clone, Serialize, Deserialize)]
+pub(super) struct MemberShare {
+    pub share: Share,
+    /// Of its elements; words of a row of their own.
+    pub targets: Words,
+    /// Rows to begin with.
+    pub restored: Option<RestoredRows>,
+}
+
+/// What is kept of rows in a member's chunks.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub(super) struct RestoredRows {
+    pub chunk_words: u32,
+    /// See [`KeptState`].
+    pub state: [u32; 3],
+    pub chunks: Vec<Words>,
+    /// Source, chunk and first word.
+    pub places: Vec<[u32; 3]>,
+}
+
+/// What the first member asks of another.
+#[derive(Clone, Serialize, Deserialize)]
+pub(super) enum Command {
+    /// Makes ready to draw sources of these kinds.
+    Prepare(Vec<RowKind>),
+    Submit {
+        sources: Vec<u32>,
+        kind: RowKind,
+    },
+    /// The oldest batch.
+    Take(RowKind),
+    Gather(Vec<LitRow>),
+    /// What its sources reflect.
+    Measure,
+    Irradiance,
+    Near(ByLight<Vec<Vec3>>),
+    Light,
+    Relight {
+        lit: LitSources,
+        more_eyes: bool,
+        /// Sources whose rows are not theirs any more.
+        dropped: Vec<u32>,
+        /// Nothing that was made to draw may be used again.
+        unprepared: bool,
+    },
+    /// Room for kept rows, and the device.
+    Room,
+    /// How far the chunks are filled.
+    State,
+    /// Words that were filled between two states.
+    Words([[u32; 3]; 2]),
+    /// What [`Self::Words`] gave, up to a state, and where rows lie in it.
+    Restore {
+        state: [u32; 3],
+        words: Words,
+        places: Vec<[u32; 3]>,
+    },
+    /// All that is kept.
+    Rows,
+}
+
+/// What a member answers.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) enum Reply {
+    Done,
+    /// Slots of a batch of common sources and of those of other kinds.
+    Prepared(Vec<(RowKind, usize)>),
+    Made(MadeParts),
+    /// `[own source]`
+    Reflected(Vec<Vec3>),
+    /// Direct and indirect, `[own element]`.
+    Irradiance([Vec<Vec3>; 2]),
+    Light([Vec<Vec3>; 2], Option<ReliefSums>),
+    /// Words of a chunk, and chunks; the device and its driver.
+    Room([u32; 2], [String; 2]),
+    State([u32; 3]),
+    Words(Words),
+    Rows(RestoredRows),
+}
+
+/// See the module.
+pub(super) struct Member {
+    pub device: Arc<Device>,
+    settings: Settings,
+    pub scene: SceneBuffers,
+    state: State,
+    pub relief: Option<ReliefBuffers>,
+    share: Share,
+    targets: Vec<CouplingTarget>,
+    fresh: FreshRows,
+    meso: Option<Buffer>,
+    occluders: Option<OccluderTree>,
+    kept: KeptRows,
+    kept_size: KeptSize,
+    makers: Option<Makers>,
+    pub gathering: Gathering,
+    exchange: Option<Box<dyn Exchange>>,
+    /// Where the rows of sources lie.
+    places: HashMap<u32, KeptRow>,
+}
+
+impl Member {
+    /// # Errors
+    /// A device that fails, or without the memory.
+    pub fn new(
+        device: &Arc<Device>,
+        data: &MemberData,
+        own: MemberShare,
+        exchange: Option<Box<dyn Exchange>>,
+    ) -> Result<Self> {
+        let MemberShare {
+            share,
+            targets,
+            restored,
+        } = own;
+        let settings = &data.settings;
+        let shape = share.shape;
+        let scene = SceneBuffers::new(device, &data.scene, shape)?;
+        let state = State::new(device, &scene)?;
+        let relief = (data.relief.as_ref())
+            .map(|relief| ReliefBuffers::new(device, relief))
+            .transpose()?;
+        let most = VISIBILITY_MEMORY.min(device.limits().heap_bytes / 3);
+        let size = KeptSize {
+            memory: settings.visibility_memory.unwrap_or(most),
+            sources: scene.source_count,
+            slots: data.slots,
+        };
+        let restored_size = restored.as_ref().map(|restored| RestoredSize {
+            chunk_words: restored.chunk_words,
+            chunks: restored.chunks.len(),
+        });
+        let kept = KeptRows::new(device, shape, size, restored_size)?;
+        let meso = match &data.relief {
+            Some(relief) if shape.meso.count > 0 => {
+                let all: &[MesoElement] = relief.elements.values();
+                let first = (shape.meso.first - relief.first_element) as usize;
+                let own = &all[first..first + shape.meso.count as usize];
+                Some(upload(device, "meso elements", own, BufferUse::Storage)?)
+            }
+            _ => None,
+        };
+        let near = data.near.as_ref();
+        let buffers = (&scene, &state, relief.as_ref());
+        let gathering = Gathering::new(device, buffers, near, &kept, &share, data.slots)?;
+        let mut member = Self {
+            device: Arc::clone(device),
+            fresh: FreshRows::new(device, shape, data.slots, Makers::sorts(settings))?,
+            occluders: (data.tree.as_ref())
+                .map(|tree| OccluderTree::new(device, tree))
+                .transpose()?,
+            settings: settings.clone(),
+            scene,
+            state,
+            relief,
+            share,
+            targets: targets.values().to_vec(),
+            meso,
+            kept,
+            kept_size: size,
+            makers: None,
+            gathering,
+            exchange,
+            places: HashMap::new(),
+        };
+        if let Some(restored) = restored {
+            let RestoredRows { state, chunks, .. } = &restored;
+            let chunks: Vec<&[u32]> = chunks.iter().map(Words::words).collect();
+            member.kept.restore(kept_state(*state), &chunks)?;
+            member.place(&restored.places);
+        }
+        Ok(member)
+    }
+
+    fn place(&mut self, places: &[[u32; 3]]) {
+        for &[source, chunk, first] in places {
+            let place = KeptRow {
+                chunk,
+                first,
+                scale: 1.0,
+            };
+            self.places.insert(source, place);
+        }
+    }
+
+    /// Does what is asked.
+    ///
+    /// # Errors
+    /// A device that fails; another member that does.
+    pub fn run(&mut self, command: Command) -> Result<Reply> {
+        match command {
+            Command::Prepare(kinds) => self.prepare(&kinds),
+            Command::Submit { sources, kind } => {
+                let exchange = self.exchange.as_deref_mut();
+                let Some(makers) = &mut self.makers else {
+                    return Err(unprepared());
+                };
+                makers
+                    .of(kind)
+                    .submit(&sources, exchange.map(|e| e as &mut dyn Exchange))?;
+                Ok(Reply::Done)
+            }
+            Command::Take(kind) => {
+                let made = match &mut self.makers {
+                    Some(makers) => makers.of(kind).take()?,
+                    None => return Err(unprepared()),
+                };
+                let made = made.unwrap_or_default();
+                for row in &made.rows {
+                    let [chunk, first] = row.place;
+                    self.place(&[[row.source, chunk, first]]);
+                }
+                Ok(Reply::Made(made))
+            }
+            Command::Gather(rows) => {
+                let place = |lit: LitRow| Some((lit, *self.places.get(&lit.source)?));
+                let rows: Vec<_> = rows.into_iter().filter_map(place).collect();
+                let exchange = self.exchange.as_deref_mut();
+                (self.gathering).run(&rows, exchange.map(|e| e as &mut dyn Exchange))?;
+                Ok(Reply::Done)
+            }
+            Command::Measure => Ok(Reply::Reflected(self.gathering.measure()?)),
+            Command::Irradiance => Ok(Reply::Irradiance(self.irradiance()?)),
+            Command::Near(light) => {
+                self.gathering.near(&light)?;
+                Ok(Reply::Done)
+            }
+            Command::Light => self.light(),
+            Command::Relight {
+                lit,
+                more_eyes,
+                dropped,
+                unprepared,
+            } => {
+                self.relight(&lit, more_eyes, &dropped)?;
+                if unprepared {
+                    self.makers = None;
+                }
+                Ok(Reply::Done)
+            }
+            Command::Room => {
+                let KeptRows { chunk_words, .. } = self.kept;
+                let candidate = self.device.candidate();
+                let device = [&candidate.name, &candidate.driver].map(String::clone);
+                Ok(Reply::Room([chunk_words, self.kept.chunk_count()], device))
+            }
+            Command::State => {
+                let state = self.kept.state_now(&self.device)?;
+                Ok(Reply::State(state_words(state)))
+            }
+            Command::Words(states) => {
+                let states = states.map(kept_state);
+                let words = self.kept.download_between(&self.device, states)?;
+                Ok(Reply::Words(words.into()))
+            }
+            Command::Restore {
+                state,
+                words,
+                places,
+            } => {
+                let from = self.kept.state_now(&self.device)?;
+                let states = [from, kept_state(state)];
+                if words.words().len() != self.kept.words_between(states) {
+                    return Err(Error::Device("rows that do not fit are restored".into()));
+                }
+                self.kept
+                    .restore_between(&self.device, states, words.words())?;
+                self.place(&places);
+                Ok(Reply::Done)
+            }
+            Command::Rows => self.rows(),
+        }
+    }
+
+    fn prepare(&mut self, kinds: &[RowKind]) -> Result<Reply> {
+        let parts = RowParts {
+            settings: &self.settings,
+            scene: &self.scene,
+            targets: &self.targets,
+            meso: self.meso.as_ref(),
+            fresh: &self.fresh,
+            occluders: self.occluders.as_ref(),
+            kept: &self.kept,
+            parcels: &self.share.parcels,
+            shares: self.exchange.is_some(),
+        };
+        let makers = match self.makers.take() {
+            Some(makers) if kinds.iter().all(|kind| is_made(&makers, *kind)) => makers,
+            _ => Makers::new(&self.device, &parts, kinds)?,
+        };
+        let makers = self.makers.insert(makers);
+        let mut slots = vec![(RowKind::Common, makers.all.slots())];
+        for kind in makers.kinds() {
+            slots.push((kind, makers.of(kind).slots()));
+        }
+        Ok(Reply::Prepared(slots))
+    }
+
+    fn irradiance(&self) -> Result<[Vec<Vec3>; 2]> {
+        let ranges = self.share.elements();
+        let of = |buffer: &Buffer| -> Result<Vec<Vec3>> {
+            let [plain, meso] = &ranges;
+            let mut light = download_from(&self.device, buffer, plain.start, plain.len())?;
+            light.extend(download_from::<Vec3>(
+                &self.device,
+                buffer,
+                meso.start,
+                meso.len(),
+            )?);
+            Ok(light)
+        };
+        Ok([of(&self.state.direct)?, of(&self.state.indirect)?])
+    }
+
+    fn light(&self) -> Result<Reply> {
+        let relief = match &self.relief {
+            Some(buffers) => {
+                let [_, meso] = self.share.elements();
+                Some(ReliefSums::download(&self.device, buffers, meso)?)
+            }
+            None => None,
+        };
+        Ok(Reply::Light(self.irradiance()?, relief))
+    }
+
+    /// Forgets all light.
+    fn relight(&mut self, lit: &LitSources, more_eyes: bool, dropped: &[u32]) -> Result<()> {
+        self.scene.write_sources(&self.device, lit, more_eyes)?;
+        Commands::run(&self.device, "no light", |cmd| {
+            self.state.buffers().for_each(|buffer| cmd.fill(buffer, 0));
+            let relief = self.relief.iter().flat_map(ReliefBuffers::light);
+            relief.for_each(|buffer| cmd.fill(buffer, 0));
+            Ok(())
+        })?;
+        let dropped: Vec<KeptRow> = (dropped.iter())
+            .filter_map(|source| self.places.remove(source))
+            .filter(|place| place.chunk < self.kept.chunk_count())
+            .collect();
+        let lasts = |place: &&KeptRow| place.chunk < self.kept.chunk_count();
+        let kept: Vec<KeptRow> = self.places.values().filter(lasts).copied().collect();
+        self.kept.forget(&dropped, &kept)
+    }
+
+    fn rows(&self) -> Result<Reply> {
+        let (state, chunks) = self.kept.download(&self.device)?;
+        let mut places: Vec<[u32; 3]> = (self.places.iter())
+            .map(|(&source, place)| [source, place.chunk, place.first])
+            .collect();
+        places.sort_unstable();
+        Ok(Reply::Rows(RestoredRows {
+            chunk_words: self.kept.chunk_words,
+            state: state_words(state),
+            chunks: chunks.into_iter().map(Words::from).collect(),
+            places,
+        }))
+    }
+
+    /// Words of a chunk of rows of this shape.
+    pub fn chunk_words(&self, shape: RowShape) -> u32 {
+        (KeptRows::chunk_bytes(&self.device, shape, self.kept_size) / 4) as u32
+    }
+
+    /// The item buffers of the last batch of common sources, `[row][slot][column]`.
+    pub fn items(&self) -> Result<Vec<u32>> {
+        match &self.makers {
+            Some(makers) => read_items(&self.device, makers.all.batch()),
+            None => Ok(Vec::new()),
+        }
+    }
+
+    /// The rows that were gathered last with their light, for comparison with the twins.
+    pub fn gathered_slots(&self, count: usize) -> Result<Vec<Slot>> {
+        self.gathering.slots(count)
+    }
+}
+
+fn is_made(makers: &Makers, kind: RowKind) -> bool {
+    kind == RowKind::Common || makers.kinds().contains(&kind)
+}
+
+fn unprepared() -> Error {
+    Error::Device("a batch is asked for before its passes are made".into())
+}
+
+pub(super) fn kept_state([chunk, used, rows]: [u32; 3]) -> KeptState {
+    KeptState { chunk, used, rows }
+}
+
+pub(super) fn state_words(state: KeptState) -> [u32; 3] {
+    [state.chunk, state.used, state.rows]
+}

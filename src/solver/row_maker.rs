@@ -1,0 +1,522 @@
+//! Makes the part of rows that is one member's: what its elements receive of a source, drawn,
+//! evaluated and coupled, whatever the light.
+//!
+//! Where there are several members, each draws its share of a batch's item buffers, and all give
+//! these to one another.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use super::coupling::CouplingRow;
+use super::drawing::Drawing;
+use super::estimate::Evaluate;
+use super::exchange::Exchange;
+use super::packed::{Drawn, pack, unpack};
+use super::rows::{MadeParts, RowPart, Stages};
+use super::{EmitterShadows, Settings};
+use crate::constants::{FACES, NONE, RECEIVE_LISTS};
+use crate::error::{Error, Result};
+use crate::math::hemicube::pixel_count;
+use crate::passes::batch::{Batch, Sight};
+use crate::passes::buffers::SceneBuffers;
+use crate::passes::couple::Couple;
+use crate::passes::fresh_rows::FreshRows;
+use crate::passes::keep::Keep;
+use crate::passes::kept_rows::KeptRows;
+use crate::passes::light_rows::LightRows;
+use crate::passes::occluder_tree::OccluderTree;
+use crate::passes::sum_factors::SumFactors;
+use crate::passes::types::{CouplingTarget, KeptRow, KeptState, ReceiverList, Slot};
+use crate::vk::{Buffer, BufferUse, Commands, Device, Stage, Timestamps};
+
+/// One more than the stages.
+const STAMPS: u32 = 7;
+
+/// What row makers of one device share.
+pub(super) struct RowParts<'a> {
+    pub settings: &'a Settings,
+    pub scene: &'a SceneBuffers,
+    pub targets: &'a [CouplingTarget],
+    /// Elements with a relief.
+    pub meso: Option<&'a Buffer>,
+    pub fresh: &'a FreshRows,
+    /// What hides places, for rays; the `pixel` estimator follows none.
+    pub occluders: Option<&'a OccluderTree>,
+    pub kept: &'a KeptRows,
+    /// See [`super::shares::Share::parcels`].
+    pub parcels: &'a [[u32; 2]],
+    /// Whether there are other members.
+    pub shares: bool,
+}
+
+/// How a row maker finds what its sources see.
+pub(super) enum Looks {
+    /// Hemicubes of so many pixels a side.
+    Hemicubes(u32),
+    Rays,
+    /// Rays to lights without surfaces.
+    Lights {
+        beams: bool,
+    },
+}
+
+/// Makes parts of rows of the sources that it is asked for, two batches at a time.
+pub(super) struct RowMaker {
+    commands: [Commands; SETS],
+    wanted: [Buffer; SETS],
+    readback: [Buffer; SETS],
+    timestamps: [Timestamps; SETS],
+    /// The batches under way, oldest first.
+    asked: VecDeque<Asked>,
+    /// Where there are other members that draw.
+    shared: Option<Shared>,
+    /// When the batch that was taken last ended, if another one waited for it.
+    ended: Option<f64>,
+    /// Which of the sets is submitted next.
+    next: usize,
+    layout: Layout,
+    lasting_chunks: u32,
+    batch: Batch,
+}
+
+struct Asked {
+    sources: Vec<u32>,
+    /// Of a batch that was shared out, what this member has drawn: its place in the batch and the
+    /// counts.
+    counts: Option<Vec<(usize, [[u32; 3]; FACES as usize])>>,
+    /// Seconds that culling and drawing took.
+    drawing: [f64; 2],
+    /// Bytes given to the others.
+    given: u64,
+}
+
+/// Draws a share of the item buffers, and takes in those of others.
+struct Shared {
+    draw: Commands,
+    wanted: Buffer,
+    stamps: Timestamps,
+    drawn: Buffer,
+    counts: Buffer,
+    /// All item buffers of a batch, as they lie in the image.
+    items: Buffer,
+    /// Pixels a side of a face.
+    face: usize,
+    slots: usize,
+}
+
+/// Batches under way at once: as many as there is room for rows without room.
+const SETS: usize = crate::passes::kept_rows::SCRATCH as usize;
+
+impl RowMaker {
+    pub fn new(device: &Arc<Device>, parts: &RowParts<'_>, looks: Looks) -> Result<Self> {
+        let RowParts {
+            settings,
+            scene,
+            fresh,
+            kept,
+            ..
+        } = *parts;
+        let (drawing, batch) = match looks {
+            Looks::Hemicubes(face) => {
+                let slots = fresh.slot_count;
+                let size = Drawing::fitting(device, scene, settings, slots, face);
+                let (drawing, batch) = Drawing::new(device, scene, settings.culling, &size)?;
+                let batch = match parts.occluders {
+                    Some(tree) => batch.with_rays(tree),
+                    None => batch,
+                };
+                (Some(drawing), batch)
+            }
+            Looks::Rays | Looks::Lights { .. } => {
+                let tree = parts.occluders.expect("rays have occluders").clone();
+                let sight = Sight::Rays(tree);
+                (None, Batch::new(device, fresh.slot_count, sight)?)
+            }
+        };
+        let evaluate = match looks {
+            Looks::Lights { beams } => {
+                let rows = LightRows::new(device, scene, &batch, fresh, parts.meso, beams)?;
+                Evaluate::Lights(rows)
+            }
+            _ => Evaluate::new(device, parts, &batch)?,
+        };
+        let couple = Couple::new(device, scene, &batch, fresh, parts.targets)?;
+        let keep = Keep::new(device, &batch.slots, batch.slot_count, fresh, kept)?;
+        let shared = match (&drawing, parts.shares) {
+            (Some(drawing), true) => Some(Shared::new(device, scene, drawing, &batch)?),
+            _ => None,
+        };
+        let words = |count: u32| 4 * u64::from(count);
+        let counts = match &batch.sight {
+            Sight::Hemicubes(hemicubes) if shared.is_none() => Some(&hemicubes.counts),
+            _ => None,
+        };
+        let list_bytes = u64::from(RECEIVE_LISTS) * size_of::<ReceiverList>() as u64;
+        let parts_of_rows = [
+            (Some(&batch.slots), size_of::<Slot>() as u64),
+            (Some(&keep.rows), size_of::<KeptRow>() as u64),
+            (Some(&couple.coupling), words(couple.word_count())),
+            (counts, words(3 * FACES)),
+            (Some(&fresh.facing_away), words(1)),
+            (
+                evaluate.sums().map(|of| &of.sums),
+                words(evaluate.sums().map_or(0, SumFactors::parcel_count)),
+            ),
+            (Some(&fresh.plain_lists.counts), list_bytes),
+            (Some(&fresh.meso_lists.counts), list_bytes),
+        ];
+        let layout = Layout::new(batch.slot_count.into(), parts_of_rows);
+        let make = |name, bytes, usage| {
+            let buffer = || Buffer::new(device, name, bytes, usage);
+            Ok::<_, crate::error::Error>([buffer()?, buffer()?])
+        };
+        let slot_bytes = u64::from(batch.slot_count) * size_of::<Slot>() as u64;
+        let wanted = make("wanted sources", slot_bytes, BufferUse::Upload)?;
+        let state_bytes = size_of::<KeptState>() as u64;
+        let readback_bytes = layout.bytes + state_bytes;
+        let readback = make("made rows", readback_bytes, BufferUse::Readback)?;
+        let stamps = || Timestamps::new(device, "row timestamps", STAMPS);
+        let timestamps = [stamps()?, stamps()?];
+        let record = |i: usize| {
+            Commands::record(device, "make rows", |cmd| {
+                let stamps = &timestamps[i];
+                let used = [Stage::Compute, Stage::Draw, Stage::Transfer];
+                cmd.reset_timestamps(stamps);
+                cmd.barrier(&used, &[Stage::Transfer]);
+                cmd.copy(&wanted[i], 0, &batch.slots, 0, slot_bytes);
+                cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
+                cmd.timestamp(stamps, 0);
+                match (&drawing, &shared) {
+                    (_, Some(shared)) => {
+                        shared.take_in(cmd, &batch);
+                        cmd.timestamp(stamps, 1);
+                    }
+                    (Some(drawing), None) => {
+                        drawing.record(cmd, scene, &batch, || cmd.timestamp(stamps, 1));
+                    }
+                    (None, None) => cmd.timestamp(stamps, 1),
+                }
+                cmd.timestamp(stamps, 2);
+                let mut stamp = 2;
+                evaluate.record(cmd, || {
+                    stamp += 1;
+                    cmd.timestamp(stamps, stamp);
+                });
+                cmd.timestamp(stamps, 5);
+                couple.record(cmd);
+                keep.record(cmd, i as u32);
+                cmd.timestamp(stamps, 6);
+                cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
+                layout.record(cmd, &readback[i]);
+                cmd.copy(&kept.state, 0, &readback[i], layout.bytes, state_bytes);
+                cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
+                Ok(())
+            })
+        };
+        Ok(Self {
+            commands: [record(0)?, record(1)?],
+            wanted,
+            readback,
+            timestamps,
+            asked: VecDeque::new(),
+            ended: None,
+            next: 0,
+            layout,
+            lasting_chunks: kept.chunk_count(),
+            shared,
+            batch,
+        })
+    }
+
+    /// Sources of a batch, at most.
+    pub fn slots(&self) -> usize {
+        self.batch.slot_count as usize
+    }
+
+    /// Begins a batch; two may be under way. Where there are other members, once all have drawn
+    /// their share.
+    ///
+    /// # Errors
+    /// A device that fails; another member that does.
+    pub fn submit(&mut self, sources: &[u32], exchange: Option<&mut dyn Exchange>) -> Result<()> {
+        assert!(sources.len() <= self.slots() && self.asked.len() < SETS);
+        let mut asked = Asked {
+            sources: sources.to_vec(),
+            counts: None,
+            drawing: [0.0; 2],
+            given: 0,
+        };
+        if let (Some(shared), Some(exchange)) = (&mut self.shared, exchange) {
+            shared.draw(&mut asked, exchange)?;
+        }
+        self.wanted[self.next].write(0, &slots_of(sources.iter().copied(), self.slots()));
+        self.commands[self.next].submit()?;
+        self.asked.push_back(asked);
+        self.next = (self.next + 1) % SETS;
+        Ok(())
+    }
+
+    /// Waits for the oldest batch under way; none if there is none.
+    pub fn take(&mut self) -> Result<Option<MadeParts>> {
+        let Some(asked) = self.asked.pop_front() else {
+            return Ok(None);
+        };
+        let i = (self.next + SETS - self.asked.len() - 1) % SETS;
+        self.commands[i].wait()?;
+        let row = |(slot, &source)| {
+            let from = &self.readback[i];
+            self.layout.read(slot, source, from, self.lasting_chunks)
+        };
+        let mut rows: Vec<RowPart> = (0..).zip(&asked.sources).map(row).collect();
+        for (at, counts) in asked.counts.into_iter().flatten() {
+            rows[at].counts = counts.to_vec();
+        }
+        let stamps = self.timestamps[i].seconds()?;
+        let stage = |s: usize| (stamps[s + 1] - stamps[s]).max(0.0);
+        let [cull, item_buffer, sort, rays, bin, keep] = std::array::from_fn(stage);
+        let idle = self.ended.map_or(0.0, |ended| (stamps[0] - ended).max(0.0));
+        self.ended = (stamps.last().copied()).filter(|_| !self.asked.is_empty());
+        let [culled, drawn] = asked.drawing;
+        let stages = Stages {
+            cull: cull + culled,
+            item_buffer: item_buffer + drawn,
+            sort,
+            rays,
+            bin,
+            keep,
+            idle,
+        };
+        let KeptState {
+            chunk,
+            used,
+            rows: kept,
+        } = self.readback[i].read(self.layout.bytes, 1)[0];
+        Ok(Some(MadeParts {
+            rows,
+            stages,
+            state: [chunk, used, kept],
+            given: asked.given,
+        }))
+    }
+
+    /// The last batch.
+    pub fn batch(&self) -> &Batch {
+        &self.batch
+    }
+}
+
+/// Slots of sources, and empty ones behind.
+fn slots_of(sources: impl Iterator<Item = u32>, count: usize) -> Vec<Slot> {
+    let sources = sources.chain(std::iter::repeat(NONE));
+    sources.take(count).map(Slot::of).collect()
+}
+
+impl Shared {
+    fn new(
+        device: &Arc<Device>,
+        scene: &SceneBuffers,
+        drawing: &Drawing,
+        batch: &Batch,
+    ) -> Result<Self> {
+        let hemicubes = batch.hemicubes();
+        let slots = batch.slot_count as usize;
+        let items = 4 * (pixel_count(hemicubes.face_size) * slots) as u64;
+        let slot_bytes = (slots * size_of::<Slot>()) as u64;
+        let counts = hemicubes.counts.bytes();
+        let buffer = |name, bytes, usage| Buffer::new(device, name, bytes, usage);
+        let wanted = buffer("sources to draw", slot_bytes, BufferUse::Upload)?;
+        let drawn = buffer("drawn items", items, BufferUse::Readback)?;
+        let counted = buffer("drawn counts", counts, BufferUse::Readback)?;
+        let stamps = Timestamps::new(device, "drawing timestamps", 3)?;
+        let draw = Commands::record(device, "draw items", |cmd| {
+            let used = [Stage::Compute, Stage::Draw, Stage::Transfer];
+            cmd.reset_timestamps(&stamps);
+            cmd.barrier(&used, &[Stage::Transfer]);
+            cmd.copy(&wanted, 0, &batch.slots, 0, slot_bytes);
+            cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
+            cmd.timestamp(&stamps, 0);
+            drawing.record(cmd, scene, batch, || cmd.timestamp(&stamps, 1));
+            cmd.timestamp(&stamps, 2);
+            cmd.copy_shader_image_to_buffer(&hemicubes.items, &drawn);
+            cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
+            cmd.copy(&hemicubes.counts, 0, &counted, 0, counts);
+            cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
+            Ok(())
+        })?;
+        Ok(Self {
+            items: buffer("items of all", items, BufferUse::Upload)?,
+            draw,
+            wanted,
+            stamps,
+            drawn,
+            counts: counted,
+            face: hemicubes.face_size as usize,
+            slots,
+        })
+    }
+
+    /// Draws every so many-th source of a batch, and gathers the item buffers of all.
+    fn draw(&mut self, asked: &mut Asked, exchange: &mut dyn Exchange) -> Result<()> {
+        let [member, members] = exchange.place();
+        let own = (asked.sources.iter().copied().enumerate())
+            .skip(member)
+            .step_by(members);
+        let own: Vec<(usize, u32)> = own.collect();
+        let mut drawn = Vec::new();
+        if !own.is_empty() {
+            let sources = own.iter().map(|(_, source)| *source);
+            self.wanted.write(0, &slots_of(sources, self.slots));
+            self.draw.submit()?;
+            self.draw.wait()?;
+            let seconds = self.stamps.intervals()?;
+            asked.drawing = [seconds[0], seconds[1]];
+            let items: Vec<u32> = self
+                .drawn
+                .read(0, pixel_count(self.face as u32) * self.slots);
+            let count = own.len();
+            let counts: Vec<[[u32; 3]; FACES as usize]> = self.counts.read(0, count);
+            let one = |(slot, counts)| Drawn {
+                counts,
+                items: self
+                    .columns(slot)
+                    .flat_map(|at| items[at].to_vec())
+                    .collect(),
+            };
+            drawn = counts.iter().copied().enumerate().map(one).collect();
+            asked.counts = Some(own.iter().map(|(at, _)| *at).zip(counts).collect());
+        } else {
+            asked.counts = Some(Vec::new());
+        }
+        let given = pack(drawn.iter(), self.face);
+        asked.given = given.len() as u64;
+        let all = exchange.all_gather(given)?;
+        let pixels = pixel_count(self.face as u32);
+        let mut items = vec![NONE; pixels * self.slots];
+        for (member, given) in all.iter().enumerate() {
+            let of = unpack(given, pixels, self.face)?;
+            let slots = (member..asked.sources.len()).step_by(members);
+            if of.len() != slots.len() {
+                let what = "a device of several sent other item buffers than it was asked for";
+                return Err(Error::Device(what.into()));
+            }
+            for (slot, one) in slots.zip(of) {
+                for (at, row) in self.columns(slot).zip(one.items.chunks(self.face)) {
+                    items[at].copy_from_slice(row);
+                }
+            }
+        }
+        self.items.write(0, &items);
+        Ok(())
+    }
+
+    /// Where the rows of a slot lie in an image.
+    fn columns(&self, slot: usize) -> impl Iterator<Item = std::ops::Range<usize>> + use<> {
+        let (face, wide) = (self.face, self.face * self.slots);
+        (0..3 * face).map(move |row| row * wide + slot * face..row * wide + (slot + 1) * face)
+    }
+
+    /// Puts the item buffers of all into the image.
+    fn take_in(&self, cmd: &Commands, batch: &Batch) {
+        cmd.upload_texture(&self.items, &batch.hemicubes().items, 4);
+    }
+}
+
+/// Where the parts of rows lie in a readback buffer: each part of all slots before the next.
+struct Layout {
+    slots: u64,
+    parts: [Part; PARTS],
+    bytes: u64,
+}
+
+struct Part {
+    /// None of a part that is not read.
+    from: Option<Buffer>,
+    /// Of a slot.
+    bytes: u64,
+    at: u64,
+}
+
+const PARTS: usize = 8;
+const SLOT: usize = 0;
+const ROW: usize = 1;
+const COUPLING: usize = 2;
+const COUNTS: usize = 3;
+const AWAY: usize = 4;
+const SUMS: usize = 5;
+const LISTS: usize = 6;
+const MESO_LISTS: usize = 7;
+
+impl Layout {
+    /// Of these buffers, with the bytes of a slot.
+    fn new(slots: u64, parts: [(Option<&Buffer>, u64); PARTS]) -> Self {
+        let mut end = 0;
+        let parts = parts.map(|(from, bytes)| {
+            let (bytes, at) = (if from.is_some() { bytes } else { 0 }, end);
+            end += slots * bytes;
+            let from = from.cloned();
+            Part { from, bytes, at }
+        });
+        Self {
+            slots,
+            parts,
+            bytes: end,
+        }
+    }
+
+    fn record(&self, cmd: &Commands, to: &Buffer) {
+        for Part { from, bytes, at } in &self.parts {
+            if let Some(from) = from {
+                cmd.copy(from, 0, to, *at, bytes * self.slots);
+            }
+        }
+    }
+
+    fn read(&self, slot: u64, source: u32, from: &Buffer, lasting_chunks: u32) -> RowPart {
+        let at = |part: usize| self.parts[part].at + slot * self.parts[part].bytes;
+        let bytes = |part: usize| self.parts[part].bytes as usize;
+        let drawn: Slot = from.read(at(SLOT), 1)[0];
+        assert_eq!(drawn.source, source, "a slot holds what was asked for");
+        let coupling: Vec<f32> = from.read(at(COUPLING), bytes(COUPLING) / 4);
+        let place: KeptRow = from.read(at(ROW), 1)[0];
+        RowPart {
+            source,
+            sums: from.read(at(SUMS), bytes(SUMS) / 4),
+            coupling: CouplingRow::new(&coupling, 1.0),
+            place: [place.chunk, place.first],
+            has_room: place.chunk < lasting_chunks,
+            counts: from.read(at(COUNTS), bytes(COUNTS) / size_of::<[u32; 3]>()),
+            facing_away: from.read(at(AWAY), 1)[0],
+            listed: std::array::from_fn(|list| {
+                let of = |part| {
+                    let lists: Vec<ReceiverList> = from.read(at(part), RECEIVE_LISTS as usize);
+                    u64::from(lists[list].count)
+                };
+                of(LISTS) + of(MESO_LISTS)
+            }),
+        }
+    }
+}
+
+/// Whether strong emitters are looked at with more care than all others.
+pub(super) fn looks_closer(device: &Device, settings: &Settings) -> bool {
+    emitter_looks(device, settings).is_some()
+}
+
+/// Pixels a side of the hemicubes of strong emitters, if they are drawn by hemicubes.
+pub(super) fn emitter_face(device: &Device, settings: &Settings) -> u32 {
+    match emitter_looks(device, settings) {
+        Some(Looks::Hemicubes(face)) => face,
+        _ => settings.hemicube,
+    }
+}
+
+/// What strong emitters are looked at with, if not as all others are.
+pub(super) fn emitter_looks(device: &Device, settings: &Settings) -> Option<Looks> {
+    match settings.emitter_shadows() {
+        EmitterShadows::Rays => Some(Looks::Rays),
+        EmitterShadows::Hemicubes(face) => {
+            let face = face.min(device.limits().max_image_side / 6 * 2);
+            (face > settings.hemicube).then_some(Looks::Hemicubes(face))
+        }
+    }
+}
