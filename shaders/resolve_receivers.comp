@@ -30,35 +30,55 @@ float weight_of(Eye place, Source s, vec3 p, vec3 n) {
     return max(dot(d, n), 0.0) * max(facing, 0.0) / (square * square);
 }
 
+// Invocations an element, each of which looks from some of the places: one alone would go through more
+// turns of loops than a software device allows, and see what it does not come to.
+const uint CROSSED_BY = EYES < CROSSED_LANES ? EYES : CROSSED_LANES;
+const uint LANES_EACH = LIST == RECEIVE_CROSSED ? CROSSED_BY : 1;
+const uint FROM = LIST == RECEIVE_CROSSED ? EYES / LANES_EACH : 1;
+const uint ELEMENTS = GROUP / LANES_EACH;
+
+// Weight of the places that are open, and of all, of each invocation.
+shared vec2 weights[GROUP];
+
 void main() {
     uint list = first_slot * RECEIVE_LISTS + LIST;
     uint count = lists[list].count;
-    // The lanes past the end do as the last one does.
-    uint i = listed[list * element_count + min(gl_GlobalInvocationID.x, count - 1)];
-    uint e = first_element + i;
     uint source = slots[first_slot].source;
     Source s = load_source(source);
-    vec4 ball[RAYS] = vec4[](fetch(balls, e));
-    vec3 n[RAYS] = vec3[](fetch(planes, e).xyz);
-    uint from = LIST == RECEIVE_CROSSED ? EYES : 1;
     uint first_eye = eye_starts[source];
     uint stride = (eye_starts[source + 1] - first_eye) / EYES;
-    float open_sum = 0.0;
-    float sum = 0.0;
-    Source eye = s;
-    for (uint k = 0; k < from; k++) {
-        float weight = 1.0;
-        if (LIST == RECEIVE_CROSSED) {
-            Eye place = load_eye(eyes[first_eye + k * stride + stride / 2]);
-            eye.eye = place.at;
-            weight = weight_of(place, s, ball[0].xyz, n[0]);
+    uint lane = gl_LocalInvocationIndex % LANES_EACH;
+    for (uint at = ELEMENTS * gl_WorkGroupID.x; at < count; at += ELEMENTS * gl_NumWorkGroups.x) {
+        // The lanes past the end do as the last one does.
+        uint of = at + gl_LocalInvocationIndex / LANES_EACH;
+        uint i = listed[list * element_count + min(of, count - 1)];
+        uint e = first_element + i;
+        vec4 ball[RAYS] = vec4[](fetch(balls, e));
+        vec3 n[RAYS] = vec3[](fetch(planes, e).xyz);
+        vec2 sum = vec2(0.0);
+        Source eye = s;
+        for (uint k = 0; k < FROM; k++) {
+            float weight = 1.0;
+            if (LIST == RECEIVE_CROSSED) {
+                uint place_at = LANES_EACH * k + lane;
+                Eye place = load_eye(eyes[first_eye + place_at * stride + stride / 2]);
+                eye.eye = place.at;
+                weight = weight_of(place, s, ball[0].xyz, n[0]);
+            }
+            bool open[RAYS] = bool[](weight > 0.0 && of < count);
+            look(eye, ball, n, open);
+            sum += vec2(open[0] ? weight : 0.0, weight);
         }
-        bool open[RAYS] = bool[](weight > 0.0 && gl_GlobalInvocationID.x < count);
-        look(eye, ball, n, open);
-        open_sum += open[0] ? weight : 0.0;
-        sum += weight;
+        weights[gl_LocalInvocationIndex] = sum;
+        barrier();
+        vec2 all = vec2(0.0);
+        for (uint k = 0; k < LANES_EACH && lane == 0; k++) {
+            all += weights[gl_LocalInvocationIndex + k];
+        }
+        bool near;
+        uint kind = kind_of(s, ball[0], n[0], near);
+        float share = all.x / max(all.y, LEAST_WEIGHT);
+        append(first_slot, kind, lane == 0 && all.x > 0.0, with_share(i, share));
+        barrier();
     }
-    bool near;
-    uint kind = kind_of(s, ball[0], n[0], near);
-    append(first_slot, kind, open_sum > 0.0, with_share(i, open_sum / max(sum, LEAST_WEIGHT)));
 }

@@ -38,6 +38,11 @@ impl Write for Stderr {
     }
 }
 
+/// Says what has ended the program.
+pub fn tell_error(error: &crate::error::Error) {
+    let _ = writeln!(Stderr, "mesolux: {error}");
+}
+
 /// `println!`, without a panic where stdout is closed or full: see [`crate::console`].
 #[macro_export]
 macro_rules! say {

@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 use mesolux::bake;
 use mesolux::math::directions::Directions;
 use mesolux::meso::{Options, Transport};
-use mesolux::scene::Scene;
+use mesolux::scene::{LoadOptions, Scene};
 use mesolux::solver::{Estimator, Report, Settings, Solver, StopReason, Visibility, open_devices};
 use mesolux::vk::Device;
 
@@ -268,6 +268,27 @@ fn several_devices_keep_and_relight_as_one() {
         [1, 2].map(|count| solve(&all[..count], &relit, &settings, Some(&made[1])));
     assert_eq!(counts(alone.report()), counts(together.report()));
     assert!(bits(&alone) == bits(&together));
+    assert_silent();
+}
+
+/// Nor where a place is looked at from many places of an emitter in a large scene, which takes more
+/// turns of a shader's loops than lavapipe lets one invocation make.
+#[test]
+#[ignore = "long: runs by scripts/test --all"]
+fn so_they_do_with_a_hundred_thousand_elements() {
+    let options = LoadOptions {
+        patches: Some(100_000),
+        ..LoadOptions::default()
+    };
+    let scene = mesolux::scene::load("cornell", &options).expect("it is built in");
+    let settings = Settings {
+        shots: Some(64),
+        ..Settings::default()
+    };
+    let all = devices(2);
+    let [one, two] = [1, 2].map(|count| bits(&solve(&all[..count], &scene, &settings, None)));
+    let other = one.iter().zip(&two).filter(|(a, b)| a != b).count();
+    assert_eq!(other, 0, "of {} numbers", one.len());
     assert_silent();
 }
 

@@ -1,5 +1,12 @@
 // How elements receive from a source, and their lists. Including files have shared/receivers.glsl.
 
+// Workgroups for so many elements of a list: those that a silhouette may cut take several invocations
+// each. A device has no more than 65,535, which go on with those that are left.
+uint groups_of(uint which, uint count) {
+    uint each = which == RECEIVE_CROSSED ? CROSSED_LANES : 1;
+    return min((count * each + GROUP - 1) / GROUP, 65535);
+}
+
 // Makes room in one list for all lanes.
 void append_one(uint slot, uint which, bool mine, uint listed_word) {
     uvec4 lanes = subgroupBallot(mine);
@@ -11,7 +18,7 @@ void append_one(uint slot, uint which, bool mine, uint listed_word) {
     uint first = 0;
     if (subgroupElect()) {
         first = atomicAdd(lists[list].count, count);
-        atomicMax(lists[list].groups_x, (first + count + GROUP - 1) / GROUP);
+        atomicMax(lists[list].groups_x, groups_of(which, first + count));
     }
     first = subgroupBroadcastFirst(first);
     if (mine) {

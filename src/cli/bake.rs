@@ -109,6 +109,10 @@ pub fn run(options: &Options) -> Result<()> {
         }),
         _ => open().and_then(|device| ranks.serve(&device)),
     };
+    if let (Err(error), true) = (&done, ranks.is_broken()) {
+        mesolux::console::tell_error(error);
+        ranks.abort();
+    }
     ranks.end();
     done
 }

@@ -28,7 +28,7 @@ mod solve_options;
 #[cfg(feature = "window")]
 mod view;
 
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -383,7 +383,7 @@ pub fn main() -> ExitCode {
     match done.and_then(|()| lost()) {
         Ok(()) => progress::stopped_by().map_or(ExitCode::SUCCESS, ExitCode::from),
         Err(error) => {
-            let _ = writeln!(console::Stderr, "mesolux: {error}");
+            console::tell_error(&error);
             ExitCode::from(2)
         }
     }

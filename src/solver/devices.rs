@@ -10,7 +10,7 @@ use super::team::Others;
 use super::threads::Threads;
 use super::{Estimator, Settings, choose_device, open_device};
 use crate::error::{Error, Result};
-use crate::vk::{Candidate, Device, Instance};
+use crate::vk::{Candidate, Device, Instance, SOFTWARE};
 
 /// Opens the devices asked for: one as [`open_device`] does, or several, divided by commas. One
 /// that is named twice is opened twice: a software device has threads of its own each time.
@@ -40,6 +40,11 @@ pub fn open_devices(wanted: Option<&str>, validation: bool) -> Result<Vec<Arc<De
         .map(|name| open_device(Some(name), validation))
         .collect()
 }
+
+/// What the host does, over what a software device does of all members together: measured with
+/// 100,000 elements and a core a device.
+const HOST_WORK: f64 = 0.01;
+const LEAST_WEIGHT: f64 = 0.2;
 
 /// Where `mpirun` says how many processes there are: Open MPI, MPICH, and Slurm by PMIx.
 const SIZES: [&str; 3] = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_SIZE"];
@@ -135,6 +140,17 @@ impl Crew {
             return ranks.count();
         }
         self.devices.len()
+    }
+
+    /// How much each member is to find: the first host also solves, and a software device computes
+    /// on its cores.
+    pub(super) fn weights(&self) -> Result<Vec<f64>> {
+        let members = self.members();
+        let mut weights = vec![1.0; members];
+        if self.first()?.candidate().kind == SOFTWARE {
+            weights[0] = (1.0 - HOST_WORK * members as f64).max(LEAST_WEIGHT);
+        }
+        Ok(weights)
     }
 
     /// Starts the other members; none where the first is alone.

@@ -1,34 +1,54 @@
 //! How the members of a team give each other what all need.
 
+use std::collections::HashMap;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 
 use crate::error::{Error, Result};
 
-/// A member's way to all others.
+/// What is given: rounds of one kind follow one another, whatever is given of the other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) enum Gift {
+    /// Item buffers.
+    Items,
+    /// What sources with a relief send by direction.
+    Exits,
+}
+
+/// What each member has given, `[member]`.
+pub(super) type Gifts = Vec<Vec<u8>>;
+
+/// A member's way to all others. Each gives something in each round; nobody waits for others to
+/// give, but only to collect.
 pub(super) trait Exchange: Send {
     /// Its number, and how many there are.
     fn place(&self) -> [usize; 2];
 
-    /// What each member gives, in their order; every one must call this as often.
+    /// Gives something to all in the next round.
     ///
     /// # Errors
     /// Another member has failed.
-    fn all_gather(&mut self, given: Vec<u8>) -> Result<Arc<Vec<Vec<u8>>>>;
+    fn give(&mut self, gift: Gift, given: Vec<u8>) -> Result<()>;
+
+    /// What each has given in the oldest round that was not collected.
+    ///
+    /// # Errors
+    /// As [`Self::give`].
+    fn collect(&mut self, gift: Gift) -> Result<Gifts>;
 }
 
 /// Where the threads of a process meet.
 pub(super) struct Meeting {
     members: usize,
-    round: Mutex<Round>,
+    table: Mutex<Table>,
     changed: Condvar,
 }
 
 #[derive(Default)]
-struct Round {
-    given: Vec<Option<Vec<u8>>>,
-    /// What was given in the round that has ended, until all have taken it.
-    all: Option<Arc<Vec<Vec<u8>>>>,
-    taken: usize,
+struct Table {
+    /// `[member]`
+    rounds: HashMap<(Gift, u64), Vec<Option<Vec<u8>>>>,
+    /// How many have collected a round.
+    collected: HashMap<(Gift, u64), usize>,
     /// A member has failed: nobody is waited for.
     closed: bool,
 }
@@ -37,10 +57,7 @@ impl Meeting {
     pub fn new(members: usize) -> Arc<Self> {
         Arc::new(Self {
             members,
-            round: Mutex::new(Round {
-                given: vec![None; members],
-                ..Round::default()
-            }),
+            table: Mutex::default(),
             changed: Condvar::new(),
         })
     }
@@ -50,21 +67,19 @@ impl Meeting {
         Seat {
             meeting: Arc::clone(self),
             member,
+            given: HashMap::new(),
+            collected: HashMap::new(),
         }
     }
 
     /// A member has failed: nobody waits any more.
     pub fn close(&self) {
-        self.round().closed = true;
+        self.table().closed = true;
         self.changed.notify_all();
     }
 
-    fn round(&self) -> MutexGuard<'_, Round> {
-        self.round.lock().unwrap_or_else(|e| e.into_inner())
-    }
-
-    fn wait<'a>(&self, round: MutexGuard<'a, Round>) -> MutexGuard<'a, Round> {
-        self.changed.wait(round).unwrap_or_else(|e| e.into_inner())
+    fn table(&self) -> MutexGuard<'_, Table> {
+        self.table.lock().unwrap_or_else(|e| e.into_inner())
     }
 }
 
@@ -72,6 +87,9 @@ impl Meeting {
 pub(super) struct Seat {
     meeting: Arc<Meeting>,
     member: usize,
+    /// Rounds so far.
+    given: HashMap<Gift, u64>,
+    collected: HashMap<Gift, u64>,
 }
 
 impl Drop for Seat {
@@ -85,39 +103,55 @@ pub(super) fn other_failed() -> Error {
     Error::Device("a device of several has failed".into())
 }
 
+/// The next number of a row.
+fn next(numbers: &mut HashMap<Gift, u64>, gift: Gift) -> u64 {
+    let next = numbers.entry(gift).or_default();
+    *next += 1;
+    *next
+}
+
 impl Exchange for Seat {
     fn place(&self) -> [usize; 2] {
         [self.member, self.meeting.members]
     }
 
-    fn all_gather(&mut self, given: Vec<u8>) -> Result<Arc<Vec<Vec<u8>>>> {
+    fn give(&mut self, gift: Gift, given: Vec<u8>) -> Result<()> {
+        let key = (gift, next(&mut self.given, gift));
+        let mut table = self.meeting.table();
+        let members = self.meeting.members;
+        let round = table
+            .rounds
+            .entry(key)
+            .or_insert_with(|| vec![None; members]);
+        round[self.member] = Some(given);
+        self.meeting.changed.notify_all();
+        Ok(())
+    }
+
+    fn collect(&mut self, gift: Gift) -> Result<Gifts> {
+        let key = (gift, next(&mut self.collected, gift));
         let meeting = &self.meeting;
-        let mut round = meeting.round();
-        // The round before may not have been taken by all.
-        while round.all.is_some() && !round.closed {
-            round = meeting.wait(round);
+        let mut table = meeting.table();
+        loop {
+            let round = table.rounds.get(&key);
+            let all = round.and_then(|round| round.iter().cloned().collect::<Option<Gifts>>());
+            if let Some(all) = all {
+                let collected = table.collected.entry(key).or_default();
+                *collected += 1;
+                if *collected == meeting.members {
+                    table.rounds.remove(&key);
+                    table.collected.remove(&key);
+                }
+                return Ok(all);
+            }
+            if table.closed {
+                return Err(other_failed());
+            }
+            table = meeting
+                .changed
+                .wait(table)
+                .unwrap_or_else(|e| e.into_inner());
         }
-        if round.closed {
-            return Err(other_failed());
-        }
-        round.given[self.member] = Some(given);
-        if round.given.iter().all(Option::is_some) {
-            let all = round.given.iter_mut().filter_map(Option::take).collect();
-            round.all = Some(Arc::new(all));
-            meeting.changed.notify_all();
-        }
-        while round.all.is_none() && !round.closed {
-            round = meeting.wait(round);
-        }
-        let Some(all) = round.all.clone() else {
-            return Err(other_failed());
-        };
-        round.taken += 1;
-        if round.taken == meeting.members {
-            (round.all, round.taken) = (None, 0);
-            meeting.changed.notify_all();
-        }
-        Ok(all)
     }
 }
 
@@ -125,18 +159,29 @@ impl Exchange for Seat {
 mod tests {
     use super::*;
 
+    /// Two rounds are given before the first is collected, and another kind between.
     #[test]
-    fn all_get_what_each_gives_in_every_round() {
+    fn all_collect_what_each_gives_round_by_round() {
         let meeting = Meeting::new(3);
         let given = |member: usize, round: usize| vec![member as u8; round % 5];
+        let exits = |member: usize, round: usize| vec![member as u8, round as u8];
         std::thread::scope(|scope| {
             for member in 0..3 {
                 let mut seat = meeting.seat(member);
                 scope.spawn(move || {
+                    seat.give(Gift::Items, given(member, 0))
+                        .expect("it is given");
                     for round in 0..200 {
-                        let all = seat.all_gather(given(member, round)).expect("all come");
-                        let expected: Vec<_> = (0..3).map(|of| given(of, round)).collect();
-                        assert_eq!(*all, expected, "round {round}");
+                        seat.give(Gift::Items, given(member, round + 1))
+                            .expect("it is given");
+                        seat.give(Gift::Exits, exits(member, round))
+                            .expect("it is given");
+                        let all = seat.collect(Gift::Items).expect("all give");
+                        let expected: Gifts = (0..3).map(|of| given(of, round)).collect();
+                        assert_eq!(all, expected, "round {round}");
+                        let all = seat.collect(Gift::Exits).expect("all give");
+                        let expected: Gifts = (0..3).map(|of| exits(of, round)).collect();
+                        assert_eq!(all, expected, "round {round}");
                     }
                 });
             }
@@ -147,7 +192,10 @@ mod tests {
     fn nobody_waits_for_one_that_has_failed() {
         let meeting = Meeting::new(2);
         let (mut first, second) = (meeting.seat(0), meeting.seat(1));
-        let waiting = std::thread::spawn(move || first.all_gather(vec![1]).is_err());
+        let waiting = std::thread::spawn(move || {
+            first.give(Gift::Items, vec![1]).expect("it is given");
+            first.collect(Gift::Items).is_err()
+        });
         drop(second);
         assert!(waiting.join().expect("it ends"));
     }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::exchange::Exchange;
+use super::exchange::{Exchange, Gift};
 use super::near::ByLight;
 use super::shares::Share;
 use crate::error::{Error, Result};
@@ -193,7 +193,8 @@ impl Gathering {
             }
         }
         let size = of_slot * size_of::<[f32; 4]>();
-        for given in exchange.all_gather(given)?.iter() {
+        exchange.give(Gift::Exits, given)?;
+        for given in exchange.collect(Gift::Exits)? {
             for one in given.chunks(4 + size) {
                 let (slot, sent) = one.split_first_chunk::<4>().ok_or_else(strange)?;
                 let first = u32::from_le_bytes(*slot) as usize * of_slot;

@@ -64,11 +64,19 @@ pub(super) struct RestoredRows {
     pub places: Vec<[u32; 3]>,
 }
 
+impl Command {
+    /// Whether the first waits for what the others answer.
+    pub fn is_answered(&self) -> bool {
+        !matches!(self, Self::Submit { .. })
+    }
+}
+
 /// What the first member asks of another.
 #[derive(Clone, Serialize, Deserialize)]
 pub(super) enum Command {
     /// Makes ready to draw sources of these kinds.
     Prepare(Vec<RowKind>),
+    /// Begins a batch. Not answered: the first goes on meanwhile.
     Submit {
         sources: Vec<u32>,
         kind: RowKind,
@@ -139,6 +147,8 @@ pub(super) struct Member {
     kept: KeptRows,
     kept_size: KeptSize,
     makers: Option<Makers>,
+    /// Of what kind the batches under way are.
+    drawing: RowKind,
     pub gathering: Gathering,
     exchange: Option<Box<dyn Exchange>>,
     /// Where the rows of sources lie.
@@ -205,6 +215,7 @@ impl Member {
             kept,
             kept_size: size,
             makers: None,
+            drawing: RowKind::Common,
             gathering,
             exchange,
             places: HashMap::new(),
@@ -241,16 +252,18 @@ impl Member {
                 let Some(makers) = &mut self.makers else {
                     return Err(unprepared());
                 };
-                makers
-                    .of(kind)
-                    .submit(&sources, exchange.map(|e| e as &mut dyn Exchange))?;
+                self.drawing = kind;
+                let maker = makers.of(kind);
+                maker.submit(&sources, exchange.map(|e| e as &mut dyn Exchange))?;
                 Ok(Reply::Done)
             }
             Command::Take(kind) => {
-                let made = match &mut self.makers {
-                    Some(makers) => makers.of(kind).take()?,
-                    None => return Err(unprepared()),
+                let exchange = self.exchange.as_deref_mut();
+                let Some(makers) = &mut self.makers else {
+                    return Err(unprepared());
                 };
+                let maker = makers.of(kind);
+                let made = maker.take(exchange.map(|e| e as &mut dyn Exchange))?;
                 let made = made.unwrap_or_default();
                 for row in &made.rows {
                     let [chunk, first] = row.place;
@@ -316,6 +329,20 @@ impl Member {
             }
             Command::Rows => self.rows(),
         }
+    }
+
+    /// Goes on with what will be asked next, since nothing is asked now. Whether there was something
+    /// to do.
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    pub fn go_on(&mut self) -> Result<bool> {
+        let exchange = self.exchange.as_deref_mut();
+        let Some(makers) = &mut self.makers else {
+            return Ok(false);
+        };
+        let maker = makers.of(self.drawing);
+        maker.go_on(exchange.map(|e| e as &mut dyn Exchange))
     }
 
     fn prepare(&mut self, kinds: &[RowKind]) -> Result<Reply> {

@@ -4,21 +4,22 @@
 //! scene, until the first has ended. All calls of MPI are made by one thread a process. It waits for
 //! what is asked without using its core, since a software device may need it.
 
+use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use mpi::datatype::PartitionMut;
+use mpi::environment::Universe;
 use mpi::topology::SimpleCommunicator;
-use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Root, Source};
-use mpi::{Count, Rank, Threading};
+use mpi::traits::{Communicator, Destination, Root, Source};
+use mpi::{Rank, Tag, Threading};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::devices::started_together;
-use super::exchange::Exchange;
+use super::exchange::{Exchange, Gift, Gifts};
 use super::member::{Command, Member, MemberData, MemberShare, Reply};
 use super::team::Others;
 use crate::error::{Error, Result};
@@ -38,15 +39,20 @@ pub struct Ranks {
 /// What the thread that calls MPI is asked.
 enum Request {
     Send(usize, Vec<u8>),
-    Receive(usize, Sender<Vec<u8>>),
+    Receive(usize, Tag, Sender<Vec<u8>>),
+    /// Whether a message from a process has come.
+    Has(usize, Sender<bool>),
+    /// To all others.
+    Give(Tag, Vec<u8>),
+
     /// To all others, or from the first.
     Broadcast(Vec<u8>, Sender<Vec<u8>>),
-    AllGather(Vec<u8>, Sender<Vec<Vec<u8>>>),
     Abort,
     End,
 }
 
-const TAG: i32 = 1;
+/// Of what is asked and answered; those of gifts follow.
+const ASKED: Tag = 1;
 
 /// Bytes of a message, at most: MPI counts them in 31 bits.
 const PIECE: usize = 1 << 28;
@@ -54,6 +60,17 @@ const PIECE: usize = 1 << 28;
 /// Between two looks for a message.
 const SHORTEST_WAIT: Duration = Duration::from_micros(20);
 const LONGEST_WAIT: Duration = Duration::from_micros(500);
+
+/// Between two calls of MPI while nothing is asked, once nothing was given for so long.
+const PROGRESS: Duration = Duration::from_millis(1);
+const SOON: Duration = Duration::from_millis(20);
+
+/// Bytes that may be given and not yet taken, of which a gift may take a share: there are two rounds
+/// of each kind at most.
+const ROOM: usize = 1 << 30;
+const MOST_GIVEN: usize = ROOM / 8;
+/// What it takes to send anything.
+const LEAST_GIVEN: usize = 1 << 10;
 
 impl Ranks {
     /// Joins the other processes; none where this one was started alone.
@@ -67,14 +84,15 @@ impl Ranks {
         let (requests, asked) = channel();
         let (joined, place) = channel();
         let thread = thread::spawn(move || {
-            let Some((universe, _)) = mpi::initialize_with_threading(Threading::Funneled) else {
+            let Some((mut universe, _)) = mpi::initialize_with_threading(Threading::Funneled)
+            else {
                 return;
             };
             let world = universe.world();
             let local = world.split_shared(world.rank()).rank();
             let place = [world.rank(), world.size(), local].map(|number| number as usize);
             if joined.send(place).is_ok() {
-                answer(&world, &asked);
+                answer(&mut universe, &asked);
             }
         });
         let Ok([rank, count, local]) = place.recv() else {
@@ -114,7 +132,7 @@ impl Ranks {
         while !self.receive(0)?.is_empty() {
             let data: MemberData = read(&self.broadcast(Vec::new())?)?;
             let own: MemberShare = read(&self.receive(0)?)?;
-            let exchange = Box::new(RankExchange(Arc::clone(self)));
+            let exchange = Box::new(RankExchange::new(self));
             let made = Member::new(device, &data, own, Some(exchange));
             drop(data);
             let mut member = match made {
@@ -126,22 +144,41 @@ impl Ranks {
             };
             self.answer(Ok(Reply::Done))?;
             loop {
+                // While nothing is asked, it goes on with what will be.
+                if !self.has_come(0)? && self.or_all_end(member.go_on()) {
+                    continue;
+                }
                 let asked = self.receive(0)?;
                 if asked.is_empty() {
                     break;
                 }
                 let command: Command = read(&asked)?;
+                let is_answered = command.is_answered();
                 // Others wait for what this one gives them then.
                 let is_awaited = matches!(command, Command::Submit { .. } | Command::Gather(_));
-                let answer = member.run(command);
-                if let (Err(error), true) = (&answer, is_awaited) {
-                    tracing::error!("rank {}: {error}", self.rank);
-                    self.abort();
+                let mut answer = member.run(command);
+                if is_awaited {
+                    answer = Ok(self.or_all_end(answer));
                 }
-                self.answer(answer)?;
+                if is_answered {
+                    self.answer(answer)?;
+                }
             }
         }
         Ok(())
+    }
+
+    /// What has been done; or all processes end, after a line that says why.
+    fn or_all_end<T>(&self, done: Result<T>) -> T {
+        done.unwrap_or_else(|error| {
+            tracing::error!("rank {}: {error}", self.rank);
+            self.abort()
+        })
+    }
+
+    /// Whether others may wait for one that has failed: only [`Self::abort`] ends them then.
+    pub fn is_broken(&self) -> bool {
+        self.broken.load(Ordering::Relaxed)
     }
 
     fn answer(&self, answer: Result<Reply>) -> Result<()> {
@@ -152,7 +189,7 @@ impl Ranks {
 
     /// Lets the other processes end, and leaves them.
     pub fn end(&self) {
-        if self.broken.load(Ordering::Relaxed) {
+        if self.is_broken() {
             self.abort();
         }
         for rank in 1..self.count {
@@ -186,9 +223,20 @@ impl Ranks {
     }
 
     fn receive(&self, from: usize) -> Result<Vec<u8>> {
+        self.receive_with(from, ASKED)
+    }
+
+    fn receive_with(&self, from: usize, tag: Tag) -> Result<Vec<u8>> {
         let (send, message) = channel();
-        self.ask(Request::Receive(from, send))?;
+        self.ask(Request::Receive(from, tag, send))?;
         message.recv().map_err(|_| left())
+    }
+
+    /// Whether a message from a process has come.
+    fn has_come(&self, from: usize) -> Result<bool> {
+        let (send, has) = channel();
+        self.ask(Request::Has(from, send))?;
+        has.recv().map_err(|_| left())
     }
 
     fn broadcast(&self, message: Vec<u8>) -> Result<Vec<u8>> {
@@ -213,18 +261,41 @@ fn read<T: DeserializeOwned>(message: &[u8]) -> Result<T> {
 }
 
 /// Calls MPI for what is asked, until it is to end.
-fn answer(world: &SimpleCommunicator, asked: &Receiver<Request>) {
-    while let Ok(request) = asked.recv() {
+fn answer(universe: &mut Universe, asked: &Receiver<Request>) {
+    let world = universe.world();
+    // Pages of it that nothing is written to take no memory.
+    universe.set_buffer_size(ROOM);
+    let mut given = None;
+    loop {
+        // What was given goes on its way while MPI is called, and others wait for it at first.
+        let is_new = given.is_some_and(|given: Instant| given.elapsed() < SOON);
+        let wait = if is_new { SHORTEST_WAIT } else { PROGRESS };
+        let request = match asked.recv_timeout(wait) {
+            Ok(request) => request,
+            Err(RecvTimeoutError::Disconnected) => return,
+            Err(RecvTimeoutError::Timeout) => {
+                let _ = world.any_process().immediate_probe_with_tag(ASKED);
+                continue;
+            }
+        };
         match request {
             Request::Send(to, message) => {
                 let to = world.process_at_rank(to as Rank);
                 let length = (message.len() as u64).to_le_bytes();
-                to.send_with_tag(&length[..], TAG);
+                to.send_with_tag(&length[..], ASKED);
                 for piece in message.chunks(PIECE) {
-                    to.send_with_tag(piece, TAG);
+                    to.send_with_tag(piece, ASKED);
                 }
             }
-            Request::Receive(from, to) => drop(to.send(receive(world, from))),
+            Request::Receive(from, tag, to) => drop(to.send(receive(&world, from, tag))),
+            Request::Has(from, to) => {
+                let from = world.process_at_rank(from as Rank);
+                let _ = to.send(from.immediate_probe_with_tag(ASKED).is_some());
+            }
+            Request::Give(tag, message) => {
+                give(&world, tag, &message);
+                given = Some(Instant::now());
+            }
             Request::Broadcast(mut message, to) => {
                 let first = world.process_at_rank(0);
                 let mut length = message.len() as u64;
@@ -235,7 +306,6 @@ fn answer(world: &SimpleCommunicator, asked: &Receiver<Request>) {
                 }
                 drop(to.send(message));
             }
-            Request::AllGather(given, to) => drop(to.send(all_gather(world, &given))),
             Request::Abort => world.abort(2),
             Request::End => return,
         }
@@ -244,70 +314,74 @@ fn answer(world: &SimpleCommunicator, asked: &Receiver<Request>) {
 
 /// The next message from a process. Looks for it again and again: the calls of MPI that wait use
 /// their core.
-fn receive(world: &SimpleCommunicator, from: usize) -> Vec<u8> {
+fn receive(world: &SimpleCommunicator, from: usize, tag: Tag) -> Vec<u8> {
     let from = world.process_at_rank(from as Rank);
     let mut wait = SHORTEST_WAIT;
-    while from.immediate_probe_with_tag(TAG).is_none() {
+    while from.immediate_probe_with_tag(tag).is_none() {
         thread::sleep(wait);
         wait = (2 * wait).min(LONGEST_WAIT);
     }
     let mut length = [0u8; 8];
-    from.receive_into_with_tag(&mut length[..], TAG);
+    from.receive_into_with_tag(&mut length[..], tag);
     let mut message = vec![0; u64::from_le_bytes(length) as usize];
     for piece in message.chunks_mut(PIECE) {
-        from.receive_into_with_tag(piece, TAG);
+        from.receive_into_with_tag(piece, tag);
     }
     message
 }
 
-fn all_gather(world: &SimpleCommunicator, given: &[u8]) -> Vec<Vec<u8>> {
-    let mut lengths = vec![0u64; world.size() as usize];
-    world.all_gather_into(&(given.len() as u64), &mut lengths[..]);
-    let mut all: Vec<Vec<u8>> = lengths.iter().map(|_| Vec::new()).collect();
-    let mut first = 0;
-    // What is left of each, as much as one call may take.
-    let most = PIECE / all.len();
-    while lengths.iter().any(|&length| first < length as usize) {
-        let part = |length: u64| (length as usize).saturating_sub(first).min(most);
-        let counts: Vec<Count> = lengths
-            .iter()
-            .map(|&length| part(length) as Count)
-            .collect();
-        let starts = counts.iter().scan(0, |end, count| {
-            let start = *end;
-            *end += count;
-            Some(start)
-        });
-        let starts: Vec<Count> = starts.collect();
-        let mut received = vec![0u8; counts.iter().map(|&count| count as usize).sum()];
-        let own = part(given.len() as u64);
-        let from = first.min(given.len());
-        {
-            let mut parts = PartitionMut::new(&mut received[..], &counts[..], &starts[..]);
-            world.all_gather_varcount_into(&given[from..from + own], &mut parts);
+/// Sends to all others, without waiting for them.
+fn give(world: &SimpleCommunicator, tag: Tag, message: &[u8]) {
+    let length = (message.len() as u64).to_le_bytes();
+    for rank in (0..world.size()).filter(|&rank| rank != world.rank()) {
+        let to = world.process_at_rank(rank);
+        to.buffered_send_with_tag(&length[..], tag);
+        for piece in message.chunks(PIECE) {
+            to.buffered_send_with_tag(piece, tag);
         }
-        let mut rest = &received[..];
-        for (all, &count) in all.iter_mut().zip(&counts) {
-            let (part, after) = rest.split_at(count as usize);
-            all.extend_from_slice(part);
-            rest = after;
-        }
-        first += most;
     }
-    all
 }
 
-struct RankExchange(Arc<Ranks>);
+struct RankExchange {
+    ranks: Arc<Ranks>,
+    /// What this one has given and not collected, of each kind.
+    own: [VecDeque<Vec<u8>>; 2],
+}
+
+impl RankExchange {
+    fn new(ranks: &Arc<Ranks>) -> Self {
+        Self {
+            ranks: Arc::clone(ranks),
+            own: Default::default(),
+        }
+    }
+}
+
+fn tag_of(gift: Gift) -> Tag {
+    ASKED + 1 + gift as Tag
+}
 
 impl Exchange for RankExchange {
     fn place(&self) -> [usize; 2] {
-        [self.0.rank, self.0.count]
+        [self.ranks.rank, self.ranks.count]
     }
 
-    fn all_gather(&mut self, given: Vec<u8>) -> Result<Arc<Vec<Vec<u8>>>> {
-        let (send, all) = channel();
-        self.0.ask(Request::AllGather(given, send))?;
-        all.recv().map(Arc::new).map_err(|_| left())
+    fn give(&mut self, gift: Gift, given: Vec<u8>) -> Result<()> {
+        if (given.len() + LEAST_GIVEN) * (self.ranks.count - 1) > MOST_GIVEN {
+            let what = "item buffers are too large to be sent: fewer pixels by --hemicube";
+            return Err(Error::Usage(what.into()));
+        }
+        self.own[gift as usize].push_back(given.clone());
+        self.ranks.ask(Request::Give(tag_of(gift), given))
+    }
+
+    fn collect(&mut self, gift: Gift) -> Result<Gifts> {
+        let own = self.own[gift as usize].pop_front().unwrap_or_default();
+        let of = |rank| match rank == self.ranks.rank {
+            true => Ok(own.clone()),
+            false => self.ranks.receive_with(rank, tag_of(gift)),
+        };
+        (0..self.ranks.count).map(of).collect()
     }
 }
 
@@ -331,7 +405,7 @@ impl OnRanks {
         for (rank, own) in (1..).zip(own) {
             ranks.send(rank, written(&own)?)?;
         }
-        let seat = Box::new(RankExchange(Arc::clone(ranks)));
+        let seat = Box::new(RankExchange::new(ranks));
         Ok((Self(Arc::clone(ranks)), seat))
     }
 }
@@ -355,13 +429,17 @@ impl Others for OnRanks {
     fn answers(&mut self) -> Vec<Result<Reply>> {
         let ranks = &self.0;
         // Those that wait for one that has failed do not answer.
-        let is_broken = ranks.broken.load(Ordering::Relaxed);
-        let from = if is_broken { ranks.count } else { 1 };
+        let from = if ranks.is_broken() { ranks.count } else { 1 };
         let answer = |rank| {
             let answer: std::result::Result<Reply, String> = read(&ranks.receive(rank)?)?;
             answer.map_err(Error::Device)
         };
         (from..ranks.count).map(answer).collect()
+    }
+
+    fn have_answered(&mut self) -> bool {
+        let ranks = &self.0;
+        (1..ranks.count).all(|rank| ranks.has_come(rank).unwrap_or(true))
     }
 
     fn close(&mut self) {
@@ -371,7 +449,7 @@ impl Others for OnRanks {
 
 impl Drop for OnRanks {
     fn drop(&mut self) {
-        if !self.0.broken.load(Ordering::Relaxed) {
+        if !self.0.is_broken() {
             for rank in 1..self.0.count {
                 let _ = self.0.send(rank, Vec::new());
             }

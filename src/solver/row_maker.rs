@@ -10,7 +10,7 @@ use std::sync::Arc;
 use super::coupling::CouplingRow;
 use super::drawing::Drawing;
 use super::estimate::Evaluate;
-use super::exchange::Exchange;
+use super::exchange::{Exchange, Gift};
 use super::packed::{Drawn, pack, unpack};
 use super::rows::{MadeParts, RowPart, Stages};
 use super::{EmitterShadows, Settings};
@@ -66,7 +66,9 @@ pub(super) struct RowMaker {
     wanted: [Buffer; SETS],
     readback: [Buffer; SETS],
     timestamps: [Timestamps; SETS],
-    /// The batches under way, oldest first.
+    /// Batches of which the item buffers are given away, oldest first.
+    given: VecDeque<Asked>,
+    /// Batches under way on the device, oldest first.
     asked: VecDeque<Asked>,
     /// Where there are other members that draw.
     shared: Option<Shared>,
@@ -218,6 +220,7 @@ impl RowMaker {
             wanted,
             readback,
             timestamps,
+            given: VecDeque::new(),
             asked: VecDeque::new(),
             ended: None,
             next: 0,
@@ -233,13 +236,13 @@ impl RowMaker {
         self.batch.slot_count as usize
     }
 
-    /// Begins a batch; two may be under way. Where there are other members, once all have drawn
-    /// their share.
+    /// Begins a batch; two may be under way. Where there are other members, this one draws its share
+    /// of the item buffers and gives them away; [`Self::go_on`] does the rest.
     ///
     /// # Errors
     /// A device that fails; another member that does.
     pub fn submit(&mut self, sources: &[u32], exchange: Option<&mut dyn Exchange>) -> Result<()> {
-        assert!(sources.len() <= self.slots() && self.asked.len() < SETS);
+        assert!(sources.len() <= self.slots() && self.asked.len() + self.given.len() < SETS);
         let mut asked = Asked {
             sources: sources.to_vec(),
             counts: None,
@@ -248,8 +251,34 @@ impl RowMaker {
         };
         if let (Some(shared), Some(exchange)) = (&mut self.shared, exchange) {
             shared.draw(&mut asked, exchange)?;
+            self.given.push_back(asked);
+            return Ok(());
         }
-        self.wanted[self.next].write(0, &slots_of(sources.iter().copied(), self.slots()));
+        self.evaluate(asked)
+    }
+
+    /// Goes on with the oldest batch of which the item buffers are given away, once all others have
+    /// given theirs. Whether there was one.
+    ///
+    /// # Errors
+    /// As [`Self::submit`].
+    pub fn go_on(&mut self, exchange: Option<&mut dyn Exchange>) -> Result<bool> {
+        let (Some(shared), Some(exchange)) = (&mut self.shared, exchange) else {
+            return Ok(false);
+        };
+        let Some(asked) = self.given.pop_front() else {
+            return Ok(false);
+        };
+        // The item buffers of the batch before may still be read.
+        self.commands[(self.next + SETS - 1) % SETS].wait()?;
+        shared.collect(&asked, exchange)?;
+        self.evaluate(asked)?;
+        Ok(true)
+    }
+
+    fn evaluate(&mut self, asked: Asked) -> Result<()> {
+        let slots = slots_of(asked.sources.iter().copied(), self.slots());
+        self.wanted[self.next].write(0, &slots);
         self.commands[self.next].submit()?;
         self.asked.push_back(asked);
         self.next = (self.next + 1) % SETS;
@@ -257,7 +286,13 @@ impl RowMaker {
     }
 
     /// Waits for the oldest batch under way; none if there is none.
-    pub fn take(&mut self) -> Result<Option<MadeParts>> {
+    ///
+    /// # Errors
+    /// As [`Self::submit`].
+    pub fn take(&mut self, exchange: Option<&mut dyn Exchange>) -> Result<Option<MadeParts>> {
+        if self.asked.is_empty() {
+            self.go_on(exchange)?;
+        }
         let Some(asked) = self.asked.pop_front() else {
             return Ok(None);
         };
@@ -355,7 +390,7 @@ impl Shared {
         })
     }
 
-    /// Draws every so many-th source of a batch, and gathers the item buffers of all.
+    /// Draws every so many-th source of a batch, and gives the item buffers away.
     fn draw(&mut self, asked: &mut Asked, exchange: &mut dyn Exchange) -> Result<()> {
         let [member, members] = exchange.place();
         let own = (asked.sources.iter().copied().enumerate())
@@ -389,7 +424,13 @@ impl Shared {
         }
         let given = pack(drawn.iter(), self.face);
         asked.given = given.len() as u64;
-        let all = exchange.all_gather(given)?;
+        exchange.give(Gift::Items, given)
+    }
+
+    /// Brings the item buffers of all to the device.
+    fn collect(&mut self, asked: &Asked, exchange: &mut dyn Exchange) -> Result<()> {
+        let [_, members] = exchange.place();
+        let all = exchange.collect(Gift::Items)?;
         let pixels = pixel_count(self.face as u32);
         let mut items = vec![NONE; pixels * self.slots];
         for (member, given) in all.iter().enumerate() {

@@ -74,8 +74,11 @@ impl Parcels {
         self.list.len()
     }
 
-    /// Shares of `members` members: as many elements of each kind, but for whole parcels.
-    pub fn shares(&self, members: usize) -> Vec<Share> {
+    /// A share for each of these weights: so much of the elements of each kind, but for whole
+    /// parcels.
+    pub fn shares(&self, weights: &[f64]) -> Vec<Share> {
+        let all: f64 = weights.iter().sum();
+        let members = weights.len();
         let kinds = [
             (self.whole.plain, 0..self.plain),
             (self.whole.meso, self.plain..self.list.len()),
@@ -83,8 +86,8 @@ impl Parcels {
         let share = |m: usize| {
             let cut = |(span, numbers): &(Span, Range<usize>)| {
                 let border = |m: usize| {
-                    let at =
-                        span.first + (u64::from(span.count) * m as u64 / members as u64) as u32;
+                    let before: f64 = weights[..m].iter().sum();
+                    let at = span.first + (f64::from(span.count) * before / all) as u32;
                     let of_kind = &self.list[numbers.clone()];
                     numbers.start + of_kind.partition_point(|parcel| parcel.end <= at)
                 };
@@ -161,7 +164,8 @@ mod tests {
             let parcels = Parcels::new(list.iter().cloned(), whole);
             assert!(parcels.list.iter().map(|p| p.len()).sum::<usize>() == elements as usize);
             for members in 1..6 {
-                let shares = parcels.shares(members);
+                let weights: Vec<f64> = (0..members).map(|m| 1.0 + 0.3 * m as f64).collect();
+                let shares = parcels.shares(&weights);
                 for e in 0..elements {
                     let of = shares.iter().filter(|share| share.shape.has(e)).count();
                     assert_eq!(of, 1, "element {e} of {elements}, {members} members");

@@ -415,12 +415,14 @@ impl Spine {
     /// Sends through rows what they have to send. Whether `go_on` never said no.
     fn gather(
         &mut self,
-        rows: Vec<LitRow>,
+        mut rows: Vec<LitRow>,
         report: &mut Report,
         go_on: &mut dyn FnMut() -> bool,
     ) -> Result<bool> {
         let start = Instant::now();
         self.brought |= !rows.is_empty();
+        // Those that send by direction come first: shaders add them up apart from the others.
+        rows.sort_by_key(|lit| !self.ledger.sources[lit.source as usize].relief);
         let mut whole = true;
         for some in rows.chunks(self.team.most_rows()) {
             self.team.gather(some)?;

@@ -46,6 +46,9 @@ pub(super) trait Others: Send {
     /// What each answers.
     fn answers(&mut self) -> Vec<Result<Reply>>;
 
+    /// Whether no answer is waited for.
+    fn have_answered(&mut self) -> bool;
+
     /// None of them waits for another any more.
     fn close(&mut self);
 }
@@ -92,7 +95,8 @@ pub(super) struct Taken {
 }
 
 impl Team {
-    /// A member a device of the crew. `restored`: the rows that each is to begin with, by their shares.
+    /// A member a device of the crew. `restored`: the rows that each is to begin with, by their
+    /// shares.
     ///
     /// # Errors
     /// A device that fails, or without the memory.
@@ -101,10 +105,12 @@ impl Team {
         on: &Problem,
         scene: SceneData,
         targets: &Targets,
-        restored: impl Fn(&[Arc<Share>]) -> Option<Vec<RestoredRows>>,
+        restored: impl FnOnce(&[Arc<Share>]) -> Option<Vec<RestoredRows>>,
     ) -> Result<Self> {
-        let parcels = Parcels::new(on.sources.list.iter().map(Source::members), scene.shape);
-        let shares = parcels.shares(crew.members());
+        let data = Arc::new(on.member_data(scene));
+        let members = on.sources.list.iter().map(Source::members);
+        let parcels = Parcels::new(members, data.scene.shape);
+        let shares = parcels.shares(&crew.weights()?);
         let shares: Vec<Arc<Share>> = shares.into_iter().map(Arc::new).collect();
         let mut restored = restored(&shares).map(Vec::into_iter);
         let mut own = Vec::new();
@@ -118,7 +124,6 @@ impl Team {
                 restored: restored.as_mut().and_then(Iterator::next),
             });
         }
-        let data = Arc::new(on.member_data(scene));
         let mut own = own.into_iter();
         let of_first = own.next().expect("a team has a member");
         let device = crew.first()?;
@@ -185,12 +190,20 @@ impl Team {
 
     /// What the first answers, and the others, which have been asked.
     fn with_answers(&self, others: &mut Box<dyn Others>, of_first: Command) -> Result<Vec<Reply>> {
-        let own = self.first().run(of_first);
+        let is_answered = of_first.is_answered();
+        let mut first = self.first();
+        let mut own = first.run(of_first);
+        if own.is_ok() && is_answered && !others.have_answered() {
+            // Why not is told when it is asked for.
+            own = own.and_then(|reply| first.go_on().map(|_| reply));
+        }
         if own.is_err() {
             others.close();
         }
         let mut replies = vec![own];
-        replies.extend(others.answers());
+        if is_answered || replies[0].is_err() {
+            replies.extend(others.answers());
+        }
         first_error(replies)
     }
 

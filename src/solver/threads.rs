@@ -1,7 +1,8 @@
 //! Members on threads of this process, a device each.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::thread::{self, JoinHandle};
 
 use super::exchange::{Meeting, Seat, other_failed};
@@ -19,6 +20,8 @@ pub(super) struct Threads {
 struct OnThread {
     commands: Sender<Command>,
     replies: Receiver<Result<Reply>>,
+    /// Answers that have come and were not asked for.
+    come: VecDeque<Result<Reply>>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -39,6 +42,7 @@ impl Threads {
             OnThread {
                 commands,
                 replies,
+                come: VecDeque::new(),
                 thread: Some(thread::spawn(work)),
             }
         };
@@ -65,16 +69,39 @@ fn work(
         Ok(member) => member,
         Err(error) => return drop(answers.send(Err(error))),
     };
-    let mut answer = Ok(Reply::Done);
-    while answers.send(answer).is_ok() {
-        let Ok(command) = asked.recv() else {
-            return;
+    let mut answer = Some(Ok(Reply::Done));
+    loop {
+        let is_asked = match answer.take() {
+            Some(answer) => answers.send(answer).is_ok(),
+            None => true,
         };
-        answer = member.run(command);
-        if answer.is_err() {
-            // Its place is left first, so that nobody waits for it.
-            drop(member);
-            return drop(answers.send(answer));
+        if !is_asked {
+            return;
+        }
+        // While nothing is asked, it goes on with what will be.
+        let command = match asked.try_recv() {
+            Ok(command) => command,
+            Err(TryRecvError::Disconnected) => return,
+            Err(TryRecvError::Empty) => match member.go_on() {
+                Ok(true) => continue,
+                Ok(false) => match asked.recv() {
+                    Ok(command) => command,
+                    Err(_) => return,
+                },
+                Err(error) => {
+                    drop(member);
+                    return drop(answers.send(Err(error)));
+                }
+            },
+        };
+        let is_answered = command.is_answered();
+        match member.run(command) {
+            Ok(reply) => answer = is_answered.then_some(Ok(reply)),
+            Err(error) => {
+                // Its place is left first, so that nobody waits for it.
+                drop(member);
+                return drop(answers.send(Err(error)));
+            }
         }
     }
 }
@@ -93,11 +120,21 @@ impl Others for Threads {
     }
 
     fn answers(&mut self) -> Vec<Result<Reply>> {
-        let answer = |member: &OnThread| {
-            let answer = member.replies.recv();
-            answer.unwrap_or_else(|_| Err(other_failed()))
+        let answer = |member: &mut OnThread| match member.come.pop_front() {
+            Some(answer) => answer,
+            None => {
+                let answer = member.replies.recv();
+                answer.unwrap_or_else(|_| Err(other_failed()))
+            }
         };
-        self.members.iter().map(answer).collect()
+        self.members.iter_mut().map(answer).collect()
+    }
+
+    fn have_answered(&mut self) -> bool {
+        self.members.iter_mut().all(|member| {
+            member.come.extend(member.replies.try_iter());
+            !member.come.is_empty()
+        })
     }
 
     fn close(&mut self) {

@@ -71,6 +71,9 @@ pub struct Candidate {
     rank: u8,
 }
 
+/// The kind of a device that computes on the cores of its host.
+pub const SOFTWARE: &str = "software";
+
 /// The layers and extensions of this machine.
 struct Installed {
     layers: Vec<vk::LayerProperties>,
@@ -229,7 +232,7 @@ impl Instance {
             vk::PhysicalDeviceType::DISCRETE_GPU => ("discrete GPU", 0),
             vk::PhysicalDeviceType::INTEGRATED_GPU => ("integrated GPU", 1),
             vk::PhysicalDeviceType::VIRTUAL_GPU => ("virtual GPU", 2),
-            vk::PhysicalDeviceType::CPU => ("software", 4),
+            vk::PhysicalDeviceType::CPU => (SOFTWARE, 4),
             _ => ("other", 3),
         };
         let v = base.api_version;

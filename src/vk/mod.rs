@@ -39,7 +39,7 @@ pub use descriptors::{Bind, Binding, DescriptorSet, Sampled};
 pub use device::{Device, Left, Limits, PartTimes, left};
 pub use graphics::{Blending, GraphicsPipeline, GraphicsState, Sides, VertexAttribute};
 pub use image::{Image, ImageUse};
-pub use instance::{Candidate, Instance, validation_log, validation_messages};
+pub use instance::{Candidate, Instance, SOFTWARE, validation_log, validation_messages};
 pub use render_pass::{AfterPass, Attachment, Framebuffer, RenderPass};
 pub use sampler::Sampler;
 pub use shader::{

@@ -10,6 +10,7 @@ mod eyes;
 mod far;
 mod group;
 mod lit;
+mod scatter;
 mod single;
 
 use std::sync::Arc;
@@ -31,6 +32,7 @@ use far::far;
 pub(crate) use far::{FAR, far_power};
 use group::group;
 use lit::Lit;
+use scatter::scatter;
 use single::{halves, part, point};
 
 /// Where groups are cut.
@@ -276,7 +278,9 @@ pub fn group_by(
     let lit = asked
         .then(|| Lit::new(elements, &connections, lit_by))
         .flatten();
-    let groups = cut(elements, &connections, &limits, lit.as_ref());
+    let mut groups = cut(elements, &connections, &limits, lit.as_ref());
+    let order = groups.order.clone();
+    scatter(&mut groups, |place| elements.is_meso(order[place] as usize));
     elements.permute(&groups.order);
     let connections = connections.permute(&groups.order);
     let mut sources = Sources {
