@@ -39,7 +39,7 @@ impl Write for Stderr {
 }
 
 /// Says what has ended the program.
-pub fn tell_error(error: &crate::error::Error) {
+pub fn tell_error(error: &dyn std::fmt::Display) {
     let _ = writeln!(Stderr, "mesolux: {error}");
 }
 

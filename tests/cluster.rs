@@ -82,11 +82,8 @@ fn path(folder: &Path, name: &str) -> (PathBuf, String) {
 fn processes_give_the_bytes_of_one() {
     let folder = tempfile::tempdir().expect("a folder");
     for (scene, more) in [
-        ("cornell", &["--patches", "2500"][..]),
-        (
-            "cornell-relief",
-            &["--patches", "1500", "--directions", "16"][..],
-        ),
+        ("cornell", &["--patches", "3000"][..]),
+        ("brick-corner", &["--directions", "16"][..]),
     ] {
         let mut alone = None;
         for processes in 1..5 {
@@ -122,7 +119,7 @@ fn kept_rows_of_one_are_shared_out() {
     let scene = [
         "cornell",
         "--patches",
-        "1500",
+        "3000",
         "--hemicube",
         "32",
         "--no-cache",
