@@ -106,10 +106,11 @@ impl Part {
 
     /// Whether every member's chunks hold so many words, and all rows lie in them.
     fn is_in_chunks(&self) -> bool {
-        let is_filled = |((([from, to], &[words, chunks]), held), member): (
-            (([KeptState; 2], &[u32; 2]), &Vec<u32>),
-            usize,
-        )| {
+        let is_filled = |member: usize| {
+            let Some([from, to]) = self.filled().nth(member) else {
+                return false;
+            };
+            let [words, chunks] = self.header.room[member];
             let at = |state: KeptState| {
                 u64::from(state.chunk) * u64::from(words) + u64::from(state.used)
             };
@@ -120,11 +121,10 @@ impl Part {
                 && from.used <= words
                 && to.used <= words
                 && (to.chunk < chunks || to.used == 0)
-                && at(to) - at(from) == held.len() as u64
+                && at(to) - at(from) == self.chunk_words[member].len() as u64
                 && rows.all(|row| row.places.get(member).is_none_or(is_kept))
         };
-        let members = self.filled().zip(&self.header.room).zip(&self.chunk_words);
-        members.zip(0..).all(is_filled)
+        (0..self.header.room.len()).all(is_filled)
     }
 }
 
