@@ -61,7 +61,7 @@ pub struct Settings {
     pub places: u32,
     /// Stops when the error bound is no more than this.
     pub residual: f64,
-    /// Stops after this time; that of [`crate::bake::solve_on`] begins with the set-up.
+    /// Stops after this time; that of [`crate::bake::solve_by`] begins with the set-up.
     pub budget: Option<Duration>,
     /// Stops after this many shots.
     pub shots: Option<u32>,
@@ -94,7 +94,7 @@ pub struct Settings {
     pub coupling_memory: u64,
     /// How relief takes part; see [`crate::bake::elements`].
     pub relief: meso::Options,
-    /// Where a long bake keeps its rows while it runs; see [`crate::bake::solve_on`].
+    /// Where a long bake keeps its rows while it runs; see [`crate::bake::solve_by`].
     pub checkpoints: Option<Checkpoints>,
 }
 
