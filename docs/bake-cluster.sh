@@ -3,8 +3,8 @@
 #
 #   sbatch --nodes=4 docs/bake-cluster.sh SCENE -o OUT.safetensors --quality high
 #
-# MESOLUX (mesolux) names the program, built with --features mpi; the arguments go to the bake. The same
-# command goes on from the checkpoint of one that was ended. See docs/clusters.md.
+# MESOLUX (mesolux) names the program, built with --features mpi; the arguments go to the bake. The
+# same command goes on from the checkpoint of one that was ended. See docs/clusters.md.
 #SBATCH --job-name=mesolux
 #SBATCH --ntasks-per-node=4
 #SBATCH --gpus-per-task=1

@@ -4,10 +4,9 @@
     docs/cluster-model.py            the tables of docs/clusters.md
     docs/cluster-model.py N E        of N ranks and E elements
 
-A rank has one device. What all ranks need of the scene is sent once. Of each source drawn, one of the
-ranks draws the item buffer, all receive it, and each finds the form factors to its share of the
-elements; the first rank receives the coupling, solves, and asks for the next batch.
-"""
+A rank has one device. What all ranks need of the scene is sent once. Of each source drawn, one of
+the ranks draws the item buffer, all receive it, and each finds the form factors to its share of the
+elements; the first rank receives the coupling, solves, and asks for the next batch. """
 
 import sys
 

@@ -1,9 +1,8 @@
 // Couples the drawn sources of a batch to all sources: what a source's row brings to the members of
 // each target, as a mean by weights w_j, of which those of a target sum to its area A_t. A target
 // of one reflectance has one word, Σ w_j F_js / A_t, which the host multiplies by the reflectance;
-// any other has three, Σ ρ_j w_j F_js / A_t. One invocation a target, whose elements are all of this
-// row, and slot.
-// src/reference/couple.rs is the same in f64.
+// any other has three, Σ ρ_j w_j F_js / A_t. One invocation a target, whose elements are all of
+// this row, and slot. src/reference/couple.rs is the same in f64.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/types.glsl"

@@ -30,8 +30,8 @@ float weight_of(Eye place, Source s, vec3 p, vec3 n) {
     return max(dot(d, n), 0.0) * max(facing, 0.0) / (square * square);
 }
 
-// Invocations an element, each of which looks from some of the places: one alone would go through more
-// turns of loops than a software device allows, and see what it does not come to.
+// Invocations an element, each of which looks from some of the places: one alone would go through
+// more turns of loops than a software device allows, and see what it does not come to.
 const uint CROSSED_BY = EYES < CROSSED_LANES ? EYES : CROSSED_LANES;
 const uint LANES_EACH = LIST == RECEIVE_CROSSED ? CROSSED_BY : 1;
 const uint FROM = LIST == RECEIVE_CROSSED ? EYES / LANES_EACH : 1;

@@ -28,13 +28,17 @@ fn bake(processes: usize, arguments: &[&str]) -> Command {
         }
     };
     command.arg("bake").args(arguments);
-    // Tests may run as root, in a container.
+    environment(&mut command);
+    command
+}
+
+/// Tests may run as root, in a container.
+fn environment(command: &mut Command) -> &mut Command {
     command
         .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
-        .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1");
-    command.env("OMPI_MCA_btl_vader_single_copy_mechanism", "none");
-    command.env("LP_NUM_THREADS", "1");
-    command
+        .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
+        .env("OMPI_MCA_btl_vader_single_copy_mechanism", "none")
+        .env("LP_NUM_THREADS", "1")
 }
 
 fn run(processes: usize, arguments: &[&str]) -> Output {
@@ -167,6 +171,37 @@ fn a_source_takes_no_more_than_100_kb_on_the_wire() {
     assert!(sent <= 100_000, "{sent}");
 }
 
+/// The batch script starts as many processes as Slurm says. Without Slurm it runs on this machine.
+#[test]
+fn the_batch_script_bakes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (out, text) = path(folder.path(), "out.safetensors");
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/bake-cluster.sh");
+    let scene = [
+        "cornell",
+        "--patches",
+        "3000",
+        "--hemicube",
+        "32",
+        "--no-cache",
+        "--json",
+    ];
+    let output = environment(&mut Command::new(script))
+        .env("MESOLUX", MESOLUX)
+        .env("SLURM_NTASKS_PER_NODE", "2")
+        .env("OMPI_MCA_rmaps_base_oversubscribe", "1")
+        .args(scene)
+        .args(["-o", &text])
+        .output()
+        .expect("it is started");
+    check(&output);
+    let others = report(&output)["other_devices"]
+        .as_array()
+        .map_or(0, Vec::len);
+    assert_eq!(others, 1);
+    assert!(out.exists());
+}
+
 /// The process of an `mpirun` that has this rank.
 fn of_rank(mpirun: &Child, rank: usize) -> Option<u32> {
     let wanted = format!("OMPI_COMM_WORLD_RANK={rank}");
@@ -237,7 +272,7 @@ fn a_process_that_is_killed_ends_all_and_loses_what_followed_the_checkpoint() {
     }
 }
 
-/// Whoever finds an error, it is told once, and nobody waits.
+/// An error of any process is printed once, and no process waits for another.
 #[test]
 fn errors_are_told_once_and_end_all() {
     let folder = tempfile::tempdir().expect("a folder");

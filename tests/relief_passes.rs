@@ -287,7 +287,7 @@ fn near_parts_bring_light_as_their_twin() {
         Ok(())
     })
     .expect("it runs");
-    let count = buffers.element_count as usize;
+    let count = buffers.shape.element_count as usize;
     let moments: Vec<[Vec3; 3]> =
         download(&device, &buffers.moments_indirect, count * k as usize).expect("it comes");
     let coefficients: Vec<Vec4> =

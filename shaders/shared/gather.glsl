@@ -74,8 +74,8 @@ layout(push_constant, scalar) uniform Parameters {
     uint relief_source_count;
     uvec2 cells;              // of the directions' square
     uvec2 kept_cells;         // of the square of the slots that elements with a relief keep
-    // Rows that are added up together may lie in several chunks, a dispatch each. 1: it goes on from
-    // the sums of the dispatch before; 1: it leaves them to the next.
+    // Rows that are added up together may lie in several chunks, a dispatch each. 1: it goes on
+    // from the sums of the dispatch before; 1: it leaves them to the next.
     uint continues;
     uint is_continued;
     uint first_meso;          // of the elements with a relief, the first of the dispatch

@@ -1,7 +1,7 @@
 // How elements receive from a source, and their lists. Including files have shared/receivers.glsl.
 
-// Workgroups for so many elements of a list: those that a silhouette may cut take several invocations
-// each. A device has no more than 65,535, which go on with those that are left.
+// Workgroups for so many elements of a list: those that a silhouette may cut take several
+// invocations each. A device has no more than 65,535, which go on with those that are left.
 uint groups_of(uint which, uint count) {
     uint each = which == RECEIVE_CROSSED ? CROSSED_LANES : 1;
     return min((count * each + GROUP - 1) / GROUP, 65535);

@@ -233,7 +233,8 @@ void main() {
                 bool found = wanted[j] && (near[j] || seen[j]) && !crossed[j];
                 append(slot, kind[j], found, with_share(i, 1.0));
                 append_one(slot, RECEIVE_CROSSED, crossed[j], i);
-                of_slot += subgroupBallotBitCount(subgroupBallot(is_own(i) && kind[j] == RECEIVE_KINDS));
+                bool away = is_own(i) && kind[j] == RECEIVE_KINDS;
+                of_slot += subgroupBallotBitCount(subgroupBallot(away));
             }
 #else
             for (uint j = 0; j < SORT_ELEMENTS; j++) {
@@ -258,7 +259,8 @@ void main() {
                     append_one(slot, RECEIVE_DOUBTFUL, sight == DOUBTFUL && !crossed, i);
                 }
                 append_one(slot, RECEIVE_CROSSED, crossed, i);
-                of_slot += subgroupBallotBitCount(subgroupBallot(is_own(i) && kind == RECEIVE_KINDS));
+                bool away = is_own(i) && kind == RECEIVE_KINDS;
+                of_slot += subgroupBallotBitCount(subgroupBallot(away));
             }
 #endif
             if (subgroupElect()) {

@@ -109,7 +109,9 @@ pub fn run(options: &Options) -> Result<()> {
         }),
         _ => open().and_then(|device| ranks.serve(&device)),
     };
-    if let (Err(error), true) = (&done, ranks.is_broken()) {
+    // Only the first is waited for by nobody.
+    let is_awaited = ranks.is_broken() || ranks.rank() > 0;
+    if let (Err(error), true) = (&done, is_awaited) {
         mesolux::console::tell_error(error);
         ranks.abort();
     }

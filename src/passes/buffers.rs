@@ -1,6 +1,7 @@
 //! What the passes share on the device: the scene, the state of the solution, and the batch under
 //! way.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use bytemuck::Pod;
@@ -210,52 +211,36 @@ pub fn upload_words(
 
 /// The first `count` values of a device buffer; everything submitted before is done first.
 pub fn download<T: Pod>(device: &Arc<Device>, buffer: &Buffer, count: usize) -> Result<Vec<T>> {
-    let [values] = download_all(device, [buffer], count)?;
+    let [values] = download_parts(device, [(buffer, 0..count)])?;
     Ok(values)
 }
 
-/// As [`download`], `count` values from the `first` on.
-pub fn download_from<T: Pod>(
+/// As [`download`], values of several buffers, by their numbers.
+pub fn download_parts<T: Pod, const N: usize>(
     device: &Arc<Device>,
-    buffer: &Buffer,
-    first: usize,
-    count: usize,
-) -> Result<Vec<T>> {
-    let size = size_of::<T>() as u64;
-    let bytes = count as u64 * size;
-    if count == 0 {
-        return Ok(Vec::new());
-    }
-    let readback = Buffer::new(device, "readback", bytes, BufferUse::Readback)?;
-    Commands::run(device, "download", |cmd| {
-        cmd.barrier(&[Stage::Compute, Stage::Transfer], &[Stage::Transfer]);
-        cmd.copy(buffer, first as u64 * size, &readback, 0, bytes);
-        cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
-        Ok(())
-    })?;
-    Ok(readback.read(0, count))
-}
-
-/// As [`download`], of several buffers.
-pub fn download_all<T: Pod, const N: usize>(
-    device: &Arc<Device>,
-    buffers: [&Buffer; N],
-    count: usize,
+    parts: [(&Buffer, Range<usize>); N],
 ) -> Result<[Vec<T>; N]> {
-    let bytes = (count * size_of::<T>()) as u64;
-    let readback = Buffer::new(device, "readback", N as u64 * bytes, BufferUse::Readback)?;
+    let size = size_of::<T>() as u64;
+    let all: usize = parts.iter().map(|(_, range)| range.len()).sum();
+    let readback = Buffer::new(device, "readback", all as u64 * size, BufferUse::Readback)?;
     Commands::run(device, "download", |cmd| {
         cmd.barrier(
             &[Stage::Compute, Stage::Transfer, Stage::Attachment],
             &[Stage::Transfer],
         );
-        for (i, buffer) in (0..).zip(buffers) {
-            cmd.copy(buffer, 0, &readback, i * bytes, bytes);
+        let mut at = 0;
+        for (buffer, range) in &parts {
+            let bytes = range.len() as u64 * size;
+            cmd.copy(buffer, range.start as u64 * size, &readback, at, bytes);
+            at += bytes;
         }
         cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
         Ok(())
     })?;
-    Ok(std::array::from_fn(|i| {
-        readback.read(i as u64 * bytes, count)
+    let mut at = 0;
+    Ok(parts.map(|(_, range)| {
+        let values = readback.read(at, range.len());
+        at += range.len() as u64 * size;
+        values
     }))
 }

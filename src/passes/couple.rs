@@ -1,5 +1,5 @@
-//! Couples the sources of a batch to all sources. Shader: `couple.comp`; twin:
-//! [`crate::reference::couple`].
+//! Couples the sources of a batch to all sources, and sums what each gives parcels of elements.
+//! Shader: `couple.comp`; twins: [`crate::reference::couple`], [`crate::reference::normalise`].
 
 use std::sync::Arc;
 
@@ -22,9 +22,41 @@ pub struct Couple {
 }
 
 impl Couple {
+    /// To sources.
     pub fn new(
         device: &Arc<Device>,
         scene: &SceneBuffers,
+        batch: &Batch,
+        fresh: &FreshRows,
+        targets: &[CouplingTarget],
+    ) -> Result<Self> {
+        Self::by(device, (scene, &scene.weights), batch, fresh, targets)
+    }
+
+    /// To parcels of elements, of which each has one word: the sum of its form factors times areas.
+    /// Parcels are first element and number of elements.
+    pub fn to_parcels(
+        device: &Arc<Device>,
+        scene: &SceneBuffers,
+        batch: &Batch,
+        fresh: &FreshRows,
+        parcels: &[[u32; 2]],
+    ) -> Result<Self> {
+        let target =
+            |(first_word, &[first_element, element_count]): (u32, &[u32; 2])| CouplingTarget {
+                first_element,
+                element_count,
+                first_word,
+                word_count: 1,
+                inverse_area: 1.0,
+            };
+        let targets: Vec<CouplingTarget> = (0..).zip(parcels).map(target).collect();
+        Self::by(device, (scene, &scene.areas), batch, fresh, &targets)
+    }
+
+    fn by(
+        device: &Arc<Device>,
+        (scene, weights): (&SceneBuffers, &Buffer),
         batch: &Batch,
         fresh: &FreshRows,
         targets: &[CouplingTarget],
@@ -37,7 +69,7 @@ impl Couple {
             slots: &batch.slots,
             targets: &on_device,
             reflectance: &scene.reflectance,
-            weights: &scene.weights,
+            weights,
             fresh: &fresh.plain,
             fresh_meso: &fresh.meso,
             occupied: &fresh.occupied,

@@ -183,9 +183,13 @@ impl Gather {
             Ok(OfChunk { plain, meso })
         };
         let none = (0, 0, [[0; 2]; 2]);
-        let (first_relief_source, relief_source_count, [cells, kept_cells]) = relief
-            .map_or(none, |r| {
-                (r.first_source, r.source_count, [r.cells(), r.kept_cells()])
+        let (first_relief_source, relief_source_count, [cells, kept_cells]) =
+            relief.map_or(none, |r| {
+                (
+                    r.shape.first_source,
+                    r.shape.source_count,
+                    [r.shape.cells(), r.shape.kept_cells()],
+                )
             });
         Ok(Self {
             shape,
@@ -206,7 +210,7 @@ impl Gather {
                 is_continued: 0,
                 first_meso: 0,
             },
-            first_meso: relief.map_or(0, |relief| shape.meso.first - relief.first_element),
+            first_meso: relief.map_or(0, |relief| shape.meso.first - relief.shape.first_element),
             chunks: kept.chunks.iter().map(bind).collect::<Result<_>>()?,
         })
     }

@@ -32,9 +32,9 @@ impl MeasureRelief {
         Ok(Self {
             bound: ComputePipeline::new(device, "measure relief", &SHADER)?.bind(&bindings)?,
             parameters: Parameters {
-                first_source: relief.first_source,
-                source_count: relief.source_count,
-                first_element: relief.first_element,
+                first_source: relief.shape.first_source,
+                source_count: relief.shape.source_count,
+                first_element: relief.shape.first_element,
             },
         })
     }

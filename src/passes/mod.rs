@@ -33,7 +33,6 @@ pub mod shade;
 pub mod shadow_rays;
 pub mod shoot;
 pub mod shot_light;
-pub mod sum_factors;
 pub mod types;
 pub mod unshot;
 pub mod words;

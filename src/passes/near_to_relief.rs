@@ -88,9 +88,9 @@ impl NearToRelief {
             beyond: [emitted, reflected],
             bound: [of_emitted, of_reflected],
             parameters: Parameters {
-                first_element: relief.first_element,
-                element_count: relief.element_count,
-                kept_cells: relief.kept_cells(),
+                first_element: relief.shape.first_element,
+                element_count: relief.shape.element_count,
+                kept_cells: relief.shape.kept_cells(),
             },
         }))
     }

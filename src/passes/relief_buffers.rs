@@ -27,16 +27,37 @@ fn meso_elements(elements: &Elements, relief: &Relief) -> Vec<MesoElement> {
         .collect()
 }
 
-/// What any device holds of the relief of a scene, list by list: see [`ReliefBuffers`].
-#[derive(Clone, Serialize, Deserialize)]
-pub struct ReliefData {
+/// Elements and sources with a relief are the last of their kinds, point lights aside: each is a
+/// contiguous range.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub struct ReliefShape {
+    /// That sources send in, and slots in which elements keep what arrives.
     pub directions: Directions,
     pub kept: Directions,
     pub first_element: u32,
     pub element_count: u32,
     pub first_source: u32,
     pub source_count: u32,
+    /// Most elements of a source.
     pub most_members: u32,
+}
+
+impl ReliefShape {
+    /// Columns and rows of the directions' square.
+    pub fn cells(self) -> [u32; 2] {
+        [self.directions.columns, self.directions.rows]
+    }
+
+    /// Of the square of the slots that elements keep.
+    pub fn kept_cells(self) -> [u32; 2] {
+        [self.kept.columns, self.kept.rows]
+    }
+}
+
+/// What any device holds of the relief of a scene, list by list: see [`ReliefBuffers`].
+#[derive(Clone, Serialize, Deserialize)]
+pub struct ReliefData {
+    pub shape: ReliefShape,
     pub elements: Words,
     pub bases: Words,
     pub matrices: Words,
@@ -54,13 +75,15 @@ impl ReliefData {
             .map(|(slot, &share)| relief.directions.centre(slot).extend(share).as_vec4())
             .collect();
         Self {
-            directions: relief.directions,
-            kept: relief.kept(),
-            first_element: (elements.len() - relief.count()) as u32,
-            element_count: relief.count() as u32,
-            first_source: of_relief.start as u32,
-            source_count: of_relief.len() as u32,
-            most_members: members.map(|s| s.element_count).max().unwrap_or(1),
+            shape: ReliefShape {
+                directions: relief.directions,
+                kept: relief.kept(),
+                first_element: (elements.len() - relief.count()) as u32,
+                element_count: relief.count() as u32,
+                first_source: of_relief.start as u32,
+                source_count: of_relief.len() as u32,
+                most_members: members.map(|s| s.element_count).max().unwrap_or(1),
+            },
             elements: Words::of(&meso_elements(elements, relief)),
             bases: Words::of(&responses.bases),
             matrices: Words::of(&responses.matrices),
@@ -71,18 +94,9 @@ impl ReliefData {
     }
 }
 
-/// Elements and sources with a relief are the last of their kinds, point lights aside: each is a
-/// contiguous range.
+/// The relief of a scene on a device.
 pub struct ReliefBuffers {
-    /// That sources send in, and slots in which elements keep what arrives.
-    pub directions: Directions,
-    pub kept: Directions,
-    pub first_element: u32,
-    pub element_count: u32,
-    pub first_source: u32,
-    pub source_count: u32,
-    /// Most elements of a source.
-    pub most_members: u32,
+    pub shape: ReliefShape,
     /// Sources that send by direction at once, at most.
     pub slots: u32,
     pub elements: Buffer,
@@ -119,12 +133,13 @@ impl ReliefBuffers {
     /// # Errors
     /// More directional state than a buffer of the device may hold.
     pub fn new(device: &Arc<Device>, data: &ReliefData) -> Result<Self> {
-        let k = data.directions.count() as u64;
-        let elements = u64::from(data.element_count);
-        let slots_kept = data.kept.count() as u64;
+        let shape = data.shape;
+        let k = shape.directions.count() as u64;
+        let elements = u64::from(shape.element_count);
+        let slots_kept = shape.kept.count() as u64;
         let moment_bytes = 36 * slots_kept * elements;
-        check_room(device, data.element_count, slots_kept, moment_bytes)?;
-        let slot_bytes = 12 * k * u64::from(data.most_members);
+        check_room(device, shape.element_count, slots_kept, moment_bytes)?;
+        let slot_bytes = 12 * k * u64::from(shape.most_members);
         let batch_slots = (SENDING_BYTES / slot_bytes).clamp(1, MOST_SENDING) as u32;
         let (uses, texels_use) = (BufferUse::Storage, BufferUse::Texels);
         let storage = |name, words| upload_words(device, name, words, uses);
@@ -133,13 +148,7 @@ impl ReliefBuffers {
         let slots = u64::from(batch_slots);
         let reflected_bytes = size_of::<Reflected>() as u64 * elements;
         Ok(Self {
-            directions: data.directions,
-            kept: data.kept,
-            first_element: data.first_element,
-            element_count: data.element_count,
-            first_source: data.first_source,
-            source_count: data.source_count,
-            most_members: data.most_members,
+            shape,
             slots: batch_slots,
             elements: storage("meso elements", &data.elements)?,
             bases: texels("relief bases", &data.bases)?,
@@ -156,11 +165,11 @@ impl ReliefBuffers {
             moments_direct: zeroed("moments direct", moment_bytes)?,
             moments_indirect: zeroed("moments indirect", moment_bytes)?,
             reflected: zeroed("meso reflected", reflected_bytes)?,
-            shot_exits: zeroed("shot exits", 12 * k * u64::from(data.source_count))?,
+            shot_exits: zeroed("shot exits", 12 * k * u64::from(shape.source_count))?,
             member_exits: Buffer::new(
                 device,
                 "member exits",
-                12 * k * slots * u64::from(data.most_members),
+                12 * k * slots * u64::from(shape.most_members),
                 uses,
             )?,
             exits: Buffer::new(device, "exits", 2 * TEXEL_BYTES * k * slots, texels_use)?,
@@ -176,16 +185,6 @@ impl ReliefBuffers {
             &self.reflected,
         ];
         moments.into_iter().chain([&self.shot_exits])
-    }
-
-    /// Columns and rows of the directions' square.
-    pub fn cells(&self) -> [u32; 2] {
-        [self.directions.columns, self.directions.rows]
-    }
-
-    /// Of the square of the slots that elements keep.
-    pub fn kept_cells(&self) -> [u32; 2] {
-        [self.kept.columns, self.kept.rows]
     }
 }
 

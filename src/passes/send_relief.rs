@@ -36,16 +36,16 @@ impl SendRelief {
             member_exits: &relief.member_exits,
             exits: &relief.exits,
         };
-        let directions = [relief.directions.count() as u32];
+        let directions = [relief.shape.directions.count() as u32];
         Ok(Self {
             bound: ComputePipeline::with_constants(device, "send relief", &SHADER, &directions)?
                 .bind(&bindings)?,
             parameters: Parameters {
-                first_source: relief.first_source,
-                source_count: relief.source_count,
-                first_element: relief.first_element,
-                most_members: relief.most_members,
-                cells: relief.cells(),
+                first_source: relief.shape.first_source,
+                source_count: relief.shape.source_count,
+                first_element: relief.shape.first_element,
+                most_members: relief.shape.most_members,
+                cells: relief.shape.cells(),
                 first_slot: 0,
             },
         })

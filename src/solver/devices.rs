@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::exchange::{Exchange, Meeting};
-use super::member::{MemberData, MemberShare};
+use super::messages::{MemberData, MemberShare};
 #[cfg(feature = "mpi")]
 use super::ranks::{OnRanks, Ranks};
 use super::team::Others;

@@ -7,11 +7,11 @@ use super::row_maker::RowParts;
 use crate::error::Result;
 use crate::passes::batch::{Batch, Sight};
 use crate::passes::bin_pixels::BinPixels;
+use crate::passes::couple::Couple;
 use crate::passes::cull::Culling;
 use crate::passes::form_factors::{Care, FormFactors};
 use crate::passes::light_rows::LightRows;
 use crate::passes::near_rows::NearRows;
-use crate::passes::sum_factors::SumFactors;
 use crate::vk::{Commands, Device, Stage};
 
 /// The passes between a batch's item buffers and its form factors.
@@ -21,7 +21,7 @@ pub(super) enum Evaluate {
         form_factors: FormFactors,
         near: NearRows,
         /// In enclosed scenes.
-        sums: Option<SumFactors>,
+        sums: Option<Couple>,
     },
     Pixels(BinPixels),
     Lights(LightRows),
@@ -47,7 +47,7 @@ impl Evaluate {
                 Sight::Rays(_) => settings.emitter_places,
             },
         };
-        let sums = || SumFactors::new(device, scene, batch, fresh, parts.parcels);
+        let sums = || Couple::to_parcels(device, scene, batch, fresh, parts.parcels);
         Ok(Self::Receivers {
             form_factors: FormFactors::new(device, scene, batch, fresh, meso, care)?,
             near: NearRows::new(device, scene, batch, fresh)?,
@@ -56,7 +56,7 @@ impl Evaluate {
     }
 
     /// Sums of the form factors to each slot's source, in enclosed scenes.
-    pub fn sums(&self) -> Option<&SumFactors> {
+    pub fn sums(&self) -> Option<&Couple> {
         match self {
             Self::Receivers { sums, .. } => sums.as_ref(),
             Self::Pixels(_) | Self::Lights(_) => None,

@@ -10,7 +10,7 @@ use super::exchange::{Exchange, Gift};
 use super::near::ByLight;
 use super::shares::Share;
 use crate::error::{Error, Result};
-use crate::passes::buffers::{SceneBuffers, State, download, download_from};
+use crate::passes::buffers::{SceneBuffers, State, download};
 use crate::passes::gather::{ChunkSlots, Gather, GatherList, Part, most_rows};
 use crate::passes::kept_rows::KeptRows;
 use crate::passes::measure::Measure;
@@ -78,9 +78,10 @@ impl Gathering {
             Ok::<_, Error>(ByDirection {
                 send: SendRelief::new(device, scene, &list.slots, relief)?,
                 measure: MeasureRelief::new(device, scene, state, relief)?,
-                sources: relief.first_source..relief.first_source + relief.source_count,
+                sources: relief.shape.first_source
+                    ..relief.shape.first_source + relief.shape.source_count,
                 exits: relief.exits.clone(),
-                slot_exits: 2 * relief.directions.count(),
+                slot_exits: 2 * relief.shape.directions.count(),
             })
         };
         let near = match (relief, near) {
@@ -182,7 +183,7 @@ impl Gathering {
             Ok(())
         })?;
         let of_slot = by.slot_exits;
-        let mut exits: Vec<[f32; 4]> = download_from(&self.device, &by.exits, 0, count * of_slot)?;
+        let mut exits: Vec<[f32; 4]> = download(&self.device, &by.exits, count * of_slot)?;
         let is_own = |source: &u32| self.own_sources.binary_search(source).is_ok();
         let mut given = Vec::new();
         for (slot, (lit, _)) in rows.iter().enumerate() {

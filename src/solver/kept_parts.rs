@@ -4,7 +4,7 @@
 
 use std::ops::Range;
 
-use super::member::RestoredRows;
+use super::messages::RestoredRows;
 use super::shares::Share;
 use crate::constants::GROUP;
 use crate::passes::fresh_rows::{RowShape, Span};

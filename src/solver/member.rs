@@ -5,132 +5,28 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::Vec3;
-use serde::{Deserialize, Serialize};
 
 use super::drawing::read_items;
 use super::exchange::Exchange;
 use super::gather::{Gathering, LitRow};
 use super::makers::{Makers, RowKind};
-use super::near::ByLight;
+use super::messages::{
+    Command, MemberData, MemberShare, Reply, RestoredRows, kept_state, state_words,
+};
 use super::relief_light::ReliefSums;
 use super::row_maker::RowParts;
-use super::rows::MadeParts;
 use super::shares::Share;
 use super::{Settings, VISIBILITY_MEMORY};
 use crate::error::{Error, Result};
-use crate::passes::buffers::{SceneBuffers, State, download_from, upload};
+use crate::passes::buffers::{SceneBuffers, State, download_parts, upload};
 use crate::passes::fresh_rows::{FreshRows, RowShape};
 use crate::passes::kept_rows::{KeptRows, KeptSize, RestoredSize};
-use crate::passes::near_to_relief::NearParts;
 use crate::passes::occluder_tree::{OccluderTree, TreeData};
-use crate::passes::relief_buffers::{ReliefBuffers, ReliefData};
-use crate::passes::scene_data::{LitSources, SceneData};
-use crate::passes::types::{CouplingTarget, KeptRow, KeptState, MesoElement, Slot};
+use crate::passes::relief_buffers::ReliefBuffers;
+use crate::passes::scene_data::LitSources;
+use crate::passes::types::{CouplingTarget, KeptRow, MesoElement, Slot};
 use crate::passes::words::Words;
 use crate::vk::{Buffer, BufferUse, Commands, Device};
-
-/// What all members are made from.
-#[derive(Clone, Serialize, Deserialize)]
-pub(super) struct MemberData {
-    pub settings: Settings,
-    pub scene: SceneData,
-    pub relief: Option<ReliefData>,
-    /// Of a scene with relief.
-    pub near: Option<NearParts>,
-    /// Of the `receiver` estimator.
-    pub tree: Option<TreeData>,
-    /// Sources of a batch.
-    pub slots: u32,
-}
-
-/// What is one member's own.
-#[derive(Clone, Serialize, Deserialize)]
-pub(super) struct MemberShare {
-    pub share: Share,
-    /// Of its elements; words of a row of their own.
-    pub targets: Words,
-    /// Rows to begin with.
-    pub restored: Option<RestoredRows>,
-}
-
-/// What is kept of rows in a member's chunks.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub(super) struct RestoredRows {
-    pub chunk_words: u32,
-    /// See [`KeptState`].
-    pub state: [u32; 3],
-    pub chunks: Vec<Words>,
-    /// Source, chunk and first word.
-    pub places: Vec<[u32; 3]>,
-}
-
-impl Command {
-    /// Whether the first waits for what the others answer.
-    pub fn is_answered(&self) -> bool {
-        !matches!(self, Self::Submit { .. })
-    }
-}
-
-/// What the first member asks of another.
-#[derive(Clone, Serialize, Deserialize)]
-pub(super) enum Command {
-    /// Makes ready to draw sources of these kinds.
-    Prepare(Vec<RowKind>),
-    /// Begins a batch. Not answered: the first goes on meanwhile.
-    Submit {
-        sources: Vec<u32>,
-        kind: RowKind,
-    },
-    /// The oldest batch.
-    Take(RowKind),
-    Gather(Vec<LitRow>),
-    /// What its sources reflect.
-    Measure,
-    Irradiance,
-    Near(ByLight<Vec<Vec3>>),
-    Light,
-    Relight {
-        lit: LitSources,
-        more_eyes: bool,
-        /// Sources whose rows are not theirs any more.
-        dropped: Vec<u32>,
-        /// Nothing that was made to draw may be used again.
-        unprepared: bool,
-    },
-    /// Room for kept rows, and the device.
-    Room,
-    /// How far the chunks are filled.
-    State,
-    /// Words that were filled between two states.
-    Words([[u32; 3]; 2]),
-    /// What [`Self::Words`] gave, up to a state, and where rows lie in it.
-    Restore {
-        state: [u32; 3],
-        words: Words,
-        places: Vec<[u32; 3]>,
-    },
-    /// All that is kept.
-    Rows,
-}
-
-/// What a member answers.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub(super) enum Reply {
-    Done,
-    /// Slots of a batch of common sources and of those of other kinds.
-    Prepared(Vec<(RowKind, usize)>),
-    Made(MadeParts),
-    /// `[own source]`
-    Reflected(Vec<Vec3>),
-    /// Direct and indirect, `[own element]`.
-    Irradiance([Vec<Vec3>; 2]),
-    Light([Vec<Vec3>; 2], Option<ReliefSums>),
-    /// Words of a chunk, and chunks; the device and its driver.
-    Room([u32; 2], [String; 2]),
-    State([u32; 3]),
-    Words(Words),
-    Rows(RestoredRows),
-}
 
 /// See the module.
 pub(super) struct Member {
@@ -141,9 +37,7 @@ pub(super) struct Member {
     pub relief: Option<ReliefBuffers>,
     share: Share,
     targets: Vec<CouplingTarget>,
-    fresh: FreshRows,
-    meso: Option<Buffer>,
-    occluders: Option<OccluderTree>,
+    for_drawing: ForDrawing,
     kept: KeptRows,
     kept_size: KeptSize,
     makers: Option<Makers>,
@@ -153,6 +47,51 @@ pub(super) struct Member {
     exchange: Option<Box<dyn Exchange>>,
     /// Where the rows of sources lie.
     places: HashMap<u32, KeptRow>,
+}
+
+/// What drawing needs, on the host until it is first asked for: light by rows that are kept needs
+/// none of it.
+#[allow(clippy::large_enum_variant)] // one of them a member
+enum ForDrawing {
+    Wanted {
+        tree: Option<TreeData>,
+        meso: Vec<MesoElement>,
+        slots: u32,
+    },
+    Made(DrawingBuffers),
+}
+
+struct DrawingBuffers {
+    fresh: FreshRows,
+    meso: Option<Buffer>,
+    occluders: Option<OccluderTree>,
+}
+
+impl ForDrawing {
+    fn make(
+        &mut self,
+        device: &Arc<Device>,
+        shape: RowShape,
+        settings: &Settings,
+    ) -> Result<&DrawingBuffers> {
+        if let Self::Wanted { tree, meso, slots } = self {
+            let tree = tree.as_ref();
+            *self = Self::Made(DrawingBuffers {
+                fresh: FreshRows::new(device, shape, *slots, Makers::sorts(settings))?,
+                meso: match &meso[..] {
+                    [] => None,
+                    own => Some(upload(device, "meso elements", own, BufferUse::Storage)?),
+                },
+                occluders: tree
+                    .map(|tree| OccluderTree::new(device, tree))
+                    .transpose()?,
+            });
+        }
+        match self {
+            Self::Made(made) => Ok(made),
+            Self::Wanted { .. } => unreachable!("it was made above"),
+        }
+    }
 }
 
 impl Member {
@@ -190,28 +129,27 @@ impl Member {
         let meso = match &data.relief {
             Some(relief) if shape.meso.count > 0 => {
                 let all: &[MesoElement] = relief.elements.values();
-                let first = (shape.meso.first - relief.first_element) as usize;
-                let own = &all[first..first + shape.meso.count as usize];
-                Some(upload(device, "meso elements", own, BufferUse::Storage)?)
+                let first = (shape.meso.first - relief.shape.first_element) as usize;
+                all[first..first + shape.meso.count as usize].to_vec()
             }
-            _ => None,
+            _ => Vec::new(),
         };
         let near = data.near.as_ref();
         let buffers = (&scene, &state, relief.as_ref());
         let gathering = Gathering::new(device, buffers, near, &kept, &share, data.slots)?;
         let mut member = Self {
             device: Arc::clone(device),
-            fresh: FreshRows::new(device, shape, data.slots, Makers::sorts(settings))?,
-            occluders: (data.tree.as_ref())
-                .map(|tree| OccluderTree::new(device, tree))
-                .transpose()?,
+            for_drawing: ForDrawing::Wanted {
+                tree: data.tree.clone(),
+                meso,
+                slots: data.slots,
+            },
             settings: settings.clone(),
             scene,
             state,
             relief,
             share,
             targets: targets.values().to_vec(),
-            meso,
             kept,
             kept_size: size,
             makers: None,
@@ -272,8 +210,12 @@ impl Member {
                 Ok(Reply::Made(made))
             }
             Command::Gather(rows) => {
-                let place = |lit: LitRow| Some((lit, *self.places.get(&lit.source)?));
-                let rows: Vec<_> = rows.into_iter().filter_map(place).collect();
+                let lacks = || Error::Device("light of a row that is not kept is asked for".into());
+                let place = |lit: LitRow| {
+                    let place = self.places.get(&lit.source).ok_or_else(lacks)?;
+                    Ok((lit, *place))
+                };
+                let rows = rows.into_iter().map(place).collect::<Result<Vec<_>>>()?;
                 let exchange = self.exchange.as_deref_mut();
                 (self.gathering).run(&rows, exchange.map(|e| e as &mut dyn Exchange))?;
                 Ok(Reply::Done)
@@ -331,8 +273,8 @@ impl Member {
         }
     }
 
-    /// Goes on with what will be asked next, since nothing is asked now. Whether there was something
-    /// to do.
+    /// Goes on with what will be asked next, since nothing is asked now. Whether there was
+    /// something to do.
     ///
     /// # Errors
     /// As [`Self::run`].
@@ -346,13 +288,15 @@ impl Member {
     }
 
     fn prepare(&mut self, kinds: &[RowKind]) -> Result<Reply> {
+        let shape = self.share.shape;
+        let made = (self.for_drawing).make(&self.device, shape, &self.settings)?;
         let parts = RowParts {
             settings: &self.settings,
             scene: &self.scene,
             targets: &self.targets,
-            meso: self.meso.as_ref(),
-            fresh: &self.fresh,
-            occluders: self.occluders.as_ref(),
+            meso: made.meso.as_ref(),
+            fresh: &made.fresh,
+            occluders: made.occluders.as_ref(),
             kept: &self.kept,
             parcels: &self.share.parcels,
             shares: self.exchange.is_some(),
@@ -370,19 +314,21 @@ impl Member {
     }
 
     fn irradiance(&self) -> Result<[Vec<Vec3>; 2]> {
-        let ranges = self.share.elements();
-        let of = |buffer: &Buffer| -> Result<Vec<Vec3>> {
-            let [plain, meso] = &ranges;
-            let mut light = download_from(&self.device, buffer, plain.start, plain.len())?;
-            light.extend(download_from::<Vec3>(
-                &self.device,
-                buffer,
-                meso.start,
-                meso.len(),
-            )?);
-            Ok(light)
-        };
-        Ok([of(&self.state.direct)?, of(&self.state.indirect)?])
+        let State {
+            direct, indirect, ..
+        } = &self.state;
+        let [plain, meso] = self.share.elements();
+        let parts = [
+            (direct, plain.clone()),
+            (direct, meso.clone()),
+            (indirect, plain),
+            (indirect, meso),
+        ];
+        let [mut direct, of_meso, mut indirect, indirect_of_meso] =
+            download_parts::<Vec3, 4>(&self.device, parts)?;
+        direct.extend(of_meso);
+        indirect.extend(indirect_of_meso);
+        Ok([direct, indirect])
     }
 
     fn light(&self) -> Result<Reply> {
@@ -453,12 +399,4 @@ fn is_made(makers: &Makers, kind: RowKind) -> bool {
 
 fn unprepared() -> Error {
     Error::Device("a batch is asked for before its passes are made".into())
-}
-
-pub(super) fn kept_state([chunk, used, rows]: [u32; 3]) -> KeptState {
-    KeptState { chunk, used, rows }
-}
-
-pub(super) fn state_words(state: KeptState) -> [u32; 3] {
-    [state.chunk, state.used, state.rows]
 }

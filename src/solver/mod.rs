@@ -13,12 +13,14 @@ mod drawing;
 mod estimate;
 mod exchange;
 mod gather;
+mod joined;
 mod journal;
 mod kept_parts;
 mod ledger;
 mod look;
 mod makers;
 mod member;
+mod messages;
 mod near;
 mod packed;
 mod places;
@@ -32,6 +34,7 @@ mod row_maker;
 mod rows;
 mod self_test;
 mod settings;
+mod shared_items;
 mod shares;
 mod shots;
 mod spine;
@@ -411,7 +414,7 @@ impl Solver {
         let Some(relief) = &first.relief else {
             return Ok(None);
         };
-        let k = relief.directions.count();
+        let k = relief.shape.directions.count();
         let slots = first.gathered_slots(count)?;
         Ok(Some(ReliefExits {
             slots,
@@ -422,7 +425,7 @@ impl Solver {
             kept: download(
                 &self.device,
                 &relief.shot_exits,
-                k * relief.source_count as usize,
+                k * relief.shape.source_count as usize,
             )?,
         }))
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use super::member::MemberData;
+use super::messages::MemberData;
 use super::{Estimator, Settings, Visibility};
 use crate::constants::{LISTED_BITS, SOURCE_EYES};
 use crate::error::{Error, Result};

@@ -1,8 +1,8 @@
 //! Members in other processes, which `mpirun` starts, a device each.
 //!
 //! The first process reads, solves and writes; each other one does what it is asked, from scene to
-//! scene, until the first has ended. All calls of MPI are made by one thread a process. It waits for
-//! what is asked without using its core, since a software device may need it.
+//! scene, until the first has ended. All calls of MPI are made by one thread a process. It waits
+//! for what is asked without using its core, since a software device may need it.
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -20,7 +20,8 @@ use serde::de::DeserializeOwned;
 
 use super::devices::started_together;
 use super::exchange::{Exchange, Gift, Gifts};
-use super::member::{Command, Member, MemberData, MemberShare, Reply};
+use super::member::Member;
+use super::messages::{Command, MemberData, MemberShare, Reply};
 use super::team::Others;
 use crate::error::{Error, Result};
 use crate::vk::Device;
@@ -44,7 +45,6 @@ enum Request {
     Has(usize, Sender<bool>),
     /// To all others.
     Give(Tag, Vec<u8>),
-
     /// To all others, or from the first.
     Broadcast(Vec<u8>, Sender<Vec<u8>>),
     Abort,
@@ -65,8 +65,8 @@ const LONGEST_WAIT: Duration = Duration::from_micros(500);
 const PROGRESS: Duration = Duration::from_millis(1);
 const SOON: Duration = Duration::from_millis(20);
 
-/// Bytes that may be given and not yet taken, of which a gift may take a share: there are two rounds
-/// of each kind at most.
+/// Bytes that may be given and not yet taken, of which a gift may take a share: there are two
+/// rounds of each kind at most.
 const ROOM: usize = 1 << 30;
 const MOST_GIVEN: usize = ROOM / 8;
 /// What it takes to send anything.

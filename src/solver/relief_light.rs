@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::Result;
 use crate::mesh::elements::Elements;
 use crate::meso::{RANK, Relief};
-use crate::passes::buffers::download_from;
+use crate::passes::buffers::download_parts;
 use crate::passes::relief_buffers::ReliefBuffers;
 use crate::passes::types::Reflected;
 use crate::vk::Device;
@@ -94,18 +94,20 @@ impl ReliefSums {
         buffers: &ReliefBuffers,
         elements: Range<usize>,
     ) -> Result<Self> {
-        let first = elements.start - buffers.first_element as usize;
-        let of = |buffer, each: usize| {
-            download_from::<[Vec3; 3]>(device, buffer, first * each, elements.len() * each)
-        };
-        let slots = buffers.kept.count();
-        let (at, held) = (first * RANK, elements.len() * RANK);
-        let coefficients: Vec<Vec4> = download_from(device, &buffers.coefficients, at, held)?;
-        let reflected: Vec<Reflected> =
-            download_from(device, &buffers.reflected, first, elements.len())?;
+        let first = elements.start - buffers.shape.first_element as usize;
+        let own = |each: usize| first * each..(first + elements.len()) * each;
+        let slots = own(buffers.shape.kept.count());
+        let moments = [
+            (&buffers.moments_direct, slots.clone()),
+            (&buffers.moments_indirect, slots),
+        ];
+        let [direct, moments] = download_parts(device, moments)?;
+        let held = [(&buffers.coefficients, own(RANK))];
+        let [coefficients] = download_parts::<Vec4, 1>(device, held)?;
+        let [reflected] = download_parts::<Reflected, 1>(device, [(&buffers.reflected, own(1))])?;
         Ok(Self {
-            direct: of(&buffers.moments_direct, slots)?,
-            moments: of(&buffers.moments_indirect, slots)?,
+            direct,
+            moments,
             coefficients: coefficients.into_iter().map(Vec4::truncate).collect(),
             reflected: reflected.into_iter().map(|of| of.sum).collect(),
         })

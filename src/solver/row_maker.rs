@@ -10,13 +10,12 @@ use std::sync::Arc;
 use super::coupling::CouplingRow;
 use super::drawing::Drawing;
 use super::estimate::Evaluate;
-use super::exchange::{Exchange, Gift};
-use super::packed::{Drawn, pack, unpack};
+use super::exchange::Exchange;
 use super::rows::{MadeParts, RowPart, Stages};
+use super::shared_items::{Asked, SharedItems, slots_of};
 use super::{EmitterShadows, Settings};
-use crate::constants::{FACES, NONE, RECEIVE_LISTS};
-use crate::error::{Error, Result};
-use crate::math::hemicube::pixel_count;
+use crate::constants::{FACES, RECEIVE_LISTS};
+use crate::error::Result;
 use crate::passes::batch::{Batch, Sight};
 use crate::passes::buffers::SceneBuffers;
 use crate::passes::couple::Couple;
@@ -25,7 +24,6 @@ use crate::passes::keep::Keep;
 use crate::passes::kept_rows::KeptRows;
 use crate::passes::light_rows::LightRows;
 use crate::passes::occluder_tree::OccluderTree;
-use crate::passes::sum_factors::SumFactors;
 use crate::passes::types::{CouplingTarget, KeptRow, KeptState, ReceiverList, Slot};
 use crate::vk::{Buffer, BufferUse, Commands, Device, Stage, Timestamps};
 
@@ -71,7 +69,7 @@ pub(super) struct RowMaker {
     /// Batches under way on the device, oldest first.
     asked: VecDeque<Asked>,
     /// Where there are other members that draw.
-    shared: Option<Shared>,
+    shared: Option<SharedItems>,
     /// When the batch that was taken last ended, if another one waited for it.
     ended: Option<f64>,
     /// Which of the sets is submitted next.
@@ -79,31 +77,6 @@ pub(super) struct RowMaker {
     layout: Layout,
     lasting_chunks: u32,
     batch: Batch,
-}
-
-struct Asked {
-    sources: Vec<u32>,
-    /// Of a batch that was shared out, what this member has drawn: its place in the batch and the
-    /// counts.
-    counts: Option<Vec<(usize, [[u32; 3]; FACES as usize])>>,
-    /// Seconds that culling and drawing took.
-    drawing: [f64; 2],
-    /// Bytes given to the others.
-    given: u64,
-}
-
-/// Draws a share of the item buffers, and takes in those of others.
-struct Shared {
-    draw: Commands,
-    wanted: Buffer,
-    stamps: Timestamps,
-    drawn: Buffer,
-    counts: Buffer,
-    /// All item buffers of a batch, as they lie in the image.
-    items: Buffer,
-    /// Pixels a side of a face.
-    face: usize,
-    slots: usize,
 }
 
 /// Batches under way at once: as many as there is room for rows without room.
@@ -145,7 +118,7 @@ impl RowMaker {
         let couple = Couple::new(device, scene, &batch, fresh, parts.targets)?;
         let keep = Keep::new(device, &batch.slots, batch.slot_count, fresh, kept)?;
         let shared = match (&drawing, parts.shares) {
-            (Some(drawing), true) => Some(Shared::new(device, scene, drawing, &batch)?),
+            (Some(drawing), true) => Some(SharedItems::new(device, scene, drawing, &batch)?),
             _ => None,
         };
         let words = |count: u32| 4 * u64::from(count);
@@ -161,8 +134,8 @@ impl RowMaker {
             (counts, words(3 * FACES)),
             (Some(&fresh.facing_away), words(1)),
             (
-                evaluate.sums().map(|of| &of.sums),
-                words(evaluate.sums().map_or(0, SumFactors::parcel_count)),
+                evaluate.sums().map(|of| &of.coupling),
+                words(evaluate.sums().map_or(0, Couple::word_count)),
             ),
             (Some(&fresh.plain_lists.counts), list_bytes),
             (Some(&fresh.meso_lists.counts), list_bytes),
@@ -236,8 +209,8 @@ impl RowMaker {
         self.batch.slot_count as usize
     }
 
-    /// Begins a batch; two may be under way. Where there are other members, this one draws its share
-    /// of the item buffers and gives them away; [`Self::go_on`] does the rest.
+    /// Begins a batch; two may be under way. Where there are other members, this one draws its
+    /// share of the item buffers and gives them away; [`Self::go_on`] does the rest.
     ///
     /// # Errors
     /// A device that fails; another member that does.
@@ -245,7 +218,7 @@ impl RowMaker {
         assert!(sources.len() <= self.slots() && self.asked.len() + self.given.len() < SETS);
         let mut asked = Asked {
             sources: sources.to_vec(),
-            counts: None,
+            counts: Vec::new(),
             drawing: [0.0; 2],
             given: 0,
         };
@@ -303,7 +276,7 @@ impl RowMaker {
             self.layout.read(slot, source, from, self.lasting_chunks)
         };
         let mut rows: Vec<RowPart> = (0..).zip(&asked.sources).map(row).collect();
-        for (at, counts) in asked.counts.into_iter().flatten() {
+        for (at, counts) in asked.counts {
             rows[at].counts = counts.to_vec();
         }
         let stamps = self.timestamps[i].seconds()?;
@@ -337,128 +310,6 @@ impl RowMaker {
     /// The last batch.
     pub fn batch(&self) -> &Batch {
         &self.batch
-    }
-}
-
-/// Slots of sources, and empty ones behind.
-fn slots_of(sources: impl Iterator<Item = u32>, count: usize) -> Vec<Slot> {
-    let sources = sources.chain(std::iter::repeat(NONE));
-    sources.take(count).map(Slot::of).collect()
-}
-
-impl Shared {
-    fn new(
-        device: &Arc<Device>,
-        scene: &SceneBuffers,
-        drawing: &Drawing,
-        batch: &Batch,
-    ) -> Result<Self> {
-        let hemicubes = batch.hemicubes();
-        let slots = batch.slot_count as usize;
-        let items = 4 * (pixel_count(hemicubes.face_size) * slots) as u64;
-        let slot_bytes = (slots * size_of::<Slot>()) as u64;
-        let counts = hemicubes.counts.bytes();
-        let buffer = |name, bytes, usage| Buffer::new(device, name, bytes, usage);
-        let wanted = buffer("sources to draw", slot_bytes, BufferUse::Upload)?;
-        let drawn = buffer("drawn items", items, BufferUse::Readback)?;
-        let counted = buffer("drawn counts", counts, BufferUse::Readback)?;
-        let stamps = Timestamps::new(device, "drawing timestamps", 3)?;
-        let draw = Commands::record(device, "draw items", |cmd| {
-            let used = [Stage::Compute, Stage::Draw, Stage::Transfer];
-            cmd.reset_timestamps(&stamps);
-            cmd.barrier(&used, &[Stage::Transfer]);
-            cmd.copy(&wanted, 0, &batch.slots, 0, slot_bytes);
-            cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
-            cmd.timestamp(&stamps, 0);
-            drawing.record(cmd, scene, batch, || cmd.timestamp(&stamps, 1));
-            cmd.timestamp(&stamps, 2);
-            cmd.copy_shader_image_to_buffer(&hemicubes.items, &drawn);
-            cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
-            cmd.copy(&hemicubes.counts, 0, &counted, 0, counts);
-            cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
-            Ok(())
-        })?;
-        Ok(Self {
-            items: buffer("items of all", items, BufferUse::Upload)?,
-            draw,
-            wanted,
-            stamps,
-            drawn,
-            counts: counted,
-            face: hemicubes.face_size as usize,
-            slots,
-        })
-    }
-
-    /// Draws every so many-th source of a batch, and gives the item buffers away.
-    fn draw(&mut self, asked: &mut Asked, exchange: &mut dyn Exchange) -> Result<()> {
-        let [member, members] = exchange.place();
-        let own = (asked.sources.iter().copied().enumerate())
-            .skip(member)
-            .step_by(members);
-        let own: Vec<(usize, u32)> = own.collect();
-        let mut drawn = Vec::new();
-        if !own.is_empty() {
-            let sources = own.iter().map(|(_, source)| *source);
-            self.wanted.write(0, &slots_of(sources, self.slots));
-            self.draw.submit()?;
-            self.draw.wait()?;
-            let seconds = self.stamps.intervals()?;
-            asked.drawing = [seconds[0], seconds[1]];
-            let items: Vec<u32> = self
-                .drawn
-                .read(0, pixel_count(self.face as u32) * self.slots);
-            let count = own.len();
-            let counts: Vec<[[u32; 3]; FACES as usize]> = self.counts.read(0, count);
-            let one = |(slot, counts)| Drawn {
-                counts,
-                items: self
-                    .columns(slot)
-                    .flat_map(|at| items[at].to_vec())
-                    .collect(),
-            };
-            drawn = counts.iter().copied().enumerate().map(one).collect();
-            asked.counts = Some(own.iter().map(|(at, _)| *at).zip(counts).collect());
-        } else {
-            asked.counts = Some(Vec::new());
-        }
-        let given = pack(drawn.iter(), self.face);
-        asked.given = given.len() as u64;
-        exchange.give(Gift::Items, given)
-    }
-
-    /// Brings the item buffers of all to the device.
-    fn collect(&mut self, asked: &Asked, exchange: &mut dyn Exchange) -> Result<()> {
-        let [_, members] = exchange.place();
-        let all = exchange.collect(Gift::Items)?;
-        let pixels = pixel_count(self.face as u32);
-        let mut items = vec![NONE; pixels * self.slots];
-        for (member, given) in all.iter().enumerate() {
-            let of = unpack(given, pixels, self.face)?;
-            let slots = (member..asked.sources.len()).step_by(members);
-            if of.len() != slots.len() {
-                let what = "a device of several sent other item buffers than it was asked for";
-                return Err(Error::Device(what.into()));
-            }
-            for (slot, one) in slots.zip(of) {
-                for (at, row) in self.columns(slot).zip(one.items.chunks(self.face)) {
-                    items[at].copy_from_slice(row);
-                }
-            }
-        }
-        self.items.write(0, &items);
-        Ok(())
-    }
-
-    /// Where the rows of a slot lie in an image.
-    fn columns(&self, slot: usize) -> impl Iterator<Item = std::ops::Range<usize>> + use<> {
-        let (face, wide) = (self.face, self.face * self.slots);
-        (0..3 * face).map(move |row| row * wide + slot * face..row * wide + (slot + 1) * face)
-    }
-
-    /// Puts the item buffers of all into the image.
-    fn take_in(&self, cmd: &Commands, batch: &Batch) {
-        cmd.upload_texture(&self.items, &batch.hemicubes().items, 4);
     }
 }
 

@@ -1,8 +1,8 @@
 //! Who finds what: the elements of a scene in parcels, and the members' shares of these.
 //!
 //! A parcel ends where a source does, so that what the members of a source receive is summed by one
-//! member of a team. Sums over all elements are taken parcel by parcel, and these added up in order:
-//! they do not depend on who has which.
+//! member of a team. Sums over all elements are taken parcel by parcel, and these added up in
+//! order: they do not depend on who has which.
 
 use std::ops::Range;
 

@@ -399,8 +399,8 @@ impl Spine {
         Ok(())
     }
 
-    /// What `lit` has of the sources whose rows are kept, the last one first: those that send little
-    /// are added up before the strongest.
+    /// What `lit` has of the sources whose rows are kept, the last one first: those that send
+    /// little are added up before the strongest.
     fn kept_rows(&self, lit: impl Fn(&Ledger, usize, f32) -> Option<LitRow>) -> Vec<LitRow> {
         let sources = self.ledger.sources.iter().enumerate();
         let of = |(s, drawn): (usize, &Drawn)| {

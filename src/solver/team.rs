@@ -10,23 +10,25 @@ use std::sync::{Arc, Mutex, MutexGuard};
 
 use glam::{DVec3, Vec3};
 
-use super::coupling::{CouplingRow, Targets};
+use super::coupling::Targets;
 use super::devices::Crew;
 use super::exchange::other_failed;
 use super::gather::LitRow;
+use super::joined::{Joined, put};
 use super::makers::{Batch, RowKind};
-use super::member::{Command, Member, MemberShare, Reply, RestoredRows, kept_state, state_words};
+use super::member::Member;
+use super::messages::{Command, Reply, RestoredRows, kept_state, state_words};
 use super::near::ByLight;
 use super::problem::{Problem, Relit};
 use super::relief_light::ReliefSums;
-use super::rows::{Made, MadeParts, Row, RowPart, Stages, scale_of};
+use super::rows::{Made, Row, RowPart, Stages};
 use super::shares::{Parcels, Share};
 use crate::error::{Error, Result};
 use crate::mesh::sources::Source;
 use crate::passes::fresh_rows::RowShape;
 use crate::passes::kept_rows::SCRATCH;
 use crate::passes::scene_data::{LitSources, SceneData};
-use crate::passes::types::{CouplingTarget, KeptRow, KeptState};
+use crate::passes::types::KeptState;
 use crate::passes::words::Words;
 
 /// The members beside the first, as it reaches them. Each does what it is asked, in that order.
@@ -46,7 +48,7 @@ pub(super) trait Others: Send {
     /// What each answers.
     fn answers(&mut self) -> Vec<Result<Reply>>;
 
-    /// Whether no answer is waited for.
+    /// Whether all answers have come.
     fn have_answered(&mut self) -> bool;
 
     /// None of them waits for another any more.
@@ -58,17 +60,9 @@ pub(super) struct Team {
     first: Mutex<Member>,
     /// None where the first is alone.
     others: Option<Mutex<Box<dyn Others>>>,
-    /// `[member]`
-    shares: Vec<Arc<Share>>,
-    /// Where the words of each member's targets lie in a row of all: first word there, number of
-    /// words, `[member][target]`.
-    words: Vec<Vec<[usize; 2]>>,
-    /// Of a row of all.
-    word_count: usize,
-    parcels: usize,
+    joined: Joined,
     elements: usize,
     sources: usize,
-    normalises: bool,
     /// Room for kept rows, `[member]`: words of a chunk, and chunks.
     pub room: Vec<[u32; 2]>,
     /// Names with drivers, `[member]`.
@@ -110,19 +104,13 @@ impl Team {
         let data = Arc::new(on.member_data(scene));
         let members = on.sources.list.iter().map(Source::members);
         let parcels = Parcels::new(members, data.scene.shape);
-        let shares = parcels.shares(&crew.weights()?);
-        let shares: Vec<Arc<Share>> = shares.into_iter().map(Arc::new).collect();
-        let mut restored = restored(&shares).map(Vec::into_iter);
-        let mut own = Vec::new();
-        let mut words = Vec::new();
-        for share in &shares {
-            let (of_share, places) = targets_of(share, &targets.list);
-            words.push(places);
-            own.push(MemberShare {
-                share: Share::clone(share),
-                targets: Words::of(&of_share),
-                restored: restored.as_mut().and_then(Iterator::next),
-            });
+        let normalises = on.settings.normalise;
+        let (joined, mut own) = Joined::new(&parcels, &crew.weights()?, targets, normalises);
+        for (own, restored) in own
+            .iter_mut()
+            .zip(restored(&joined.shares).into_iter().flatten())
+        {
+            own.restored = Some(restored);
         }
         let mut own = own.into_iter();
         let of_first = own.next().expect("a team has a member");
@@ -137,17 +125,13 @@ impl Team {
         let mut team = Self {
             first: Mutex::new(first),
             others: others.map(Mutex::new),
-            words,
-            word_count: targets.words(),
-            parcels: parcels.len(),
+            joined,
             elements: on.elements.len(),
             sources: on.sources.list.len(),
-            normalises: on.settings.normalise,
             room: Vec::new(),
             devices: Vec::new(),
             prepared: None,
             under_way: VecDeque::new(),
-            shares,
         };
         for reply in team.ask(Command::Room)? {
             let Reply::Room(room, device) = reply else {
@@ -193,15 +177,14 @@ impl Team {
         let is_answered = of_first.is_answered();
         let mut first = self.first();
         let mut own = first.run(of_first);
-        if own.is_ok() && is_answered && !others.have_answered() {
-            // Why not is told when it is asked for.
+        if is_answered && !others.have_answered() {
             own = own.and_then(|reply| first.go_on().map(|_| reply));
         }
         if own.is_err() {
             others.close();
         }
         let mut replies = vec![own];
-        if is_answered || replies[0].is_err() {
+        if is_answered {
             replies.extend(others.answers());
         }
         first_error(replies)
@@ -335,81 +318,30 @@ impl Team {
             };
             parts.push(made);
         }
-        let alone = parts.len() == 1;
+        let is_alone = parts.len() == 1;
         let mut stages = Stages::default();
-        let mut sent = 0;
-        for made in &parts {
+        let (mut sent, mut states) = (0, Vec::new());
+        let count = parts[0].rows.len();
+        let mut rows: Vec<Vec<RowPart>> = vec![Vec::new(); count];
+        for made in parts {
             stages += made.stages;
-            if !alone {
+            states.push(kept_state(made.state));
+            if !is_alone {
                 sent += made.given + made.rows.iter().map(RowPart::bytes).sum::<u64>();
             }
+            if made.rows.len() != count {
+                return Err(strange());
+            }
+            for (row, part) in rows.iter_mut().zip(made.rows) {
+                row.push(part);
+            }
         }
-        let states = parts.iter().map(|made| kept_state(made.state)).collect();
-        let count = parts[0].rows.len();
-        if parts.iter().any(|made| made.rows.len() != count) {
-            return Err(strange());
-        }
-        let row = |i: usize| self.row(&parts, i, sources);
+        let row = |parts: &Vec<RowPart>| self.joined.row(parts, sources).ok_or_else(strange);
         Ok(Made {
-            rows: (0..count).map(row).collect::<Result<_>>()?,
+            rows: rows.iter().map(row).collect::<Result<_>>()?,
             stages,
             states: Some(states),
             sent,
-        })
-    }
-
-    /// Puts the parts of a row together.
-    fn row(&self, parts: &[MadeParts], i: usize, sources: &[Source]) -> Result<Row> {
-        let own = || parts.iter().map(|made| &made.rows[i]);
-        let source = parts[0].rows[i].source;
-        if own().any(|part| part.source != source) {
-            return Err(strange());
-        }
-        let mut words = vec![0.0; self.word_count];
-        let mut sums = vec![0.0; self.parcels];
-        for (m, part) in own().enumerate() {
-            let counted: usize = self.words[m].iter().map(|[_, count]| count).sum();
-            let of_part = part.coupling.words(counted);
-            let mut of_part = &of_part[..];
-            for &[first, count] in &self.words[m] {
-                let (target, rest) = of_part.split_at(count);
-                words[first..first + count].copy_from_slice(target);
-                of_part = rest;
-            }
-            let numbers = self.shares[m].numbers.iter().cloned().flatten();
-            for (number, &sum) in numbers.zip(&part.sums) {
-                sums[number] = f64::from(sum);
-            }
-        }
-        let of = &sources[source as usize];
-        let is_summed = of.is_surface() && own().any(|part| !part.sums.is_empty());
-        let share = is_summed.then(|| sums.iter().sum::<f64>() / of.area);
-        let scale = match share.filter(|_| self.normalises) {
-            Some(share) => scale_of(share),
-            None => 1.0,
-        };
-        let place = |part: &RowPart| {
-            let [chunk, first] = part.place;
-            KeptRow {
-                chunk,
-                first,
-                scale,
-            }
-        };
-        let counts = own()
-            .map(|part| &part.counts)
-            .find(|counts| !counts.is_empty());
-        Ok(Row {
-            source,
-            scale,
-            share: share.map(|share| share as f32),
-            coupling: CouplingRow::new(&words, scale),
-            places: own()
-                .all(|part| part.has_room)
-                .then(|| own().map(place).collect()),
-            counts: counts.cloned().unwrap_or_default(),
-            facing_away: own().map(|part| part.facing_away).sum(),
-            listed: std::array::from_fn(|list| own().map(|part| part.listed[list]).sum()),
         })
     }
 
@@ -448,7 +380,7 @@ impl Team {
             let Reply::Reflected(reflected) = reply else {
                 return Err(strange());
             };
-            for (&s, reflected) in self.shares[m].sources.iter().zip(reflected) {
+            for (&s, reflected) in self.joined.shares[m].sources.iter().zip(reflected) {
                 all[s as usize] = reflected.as_dvec3();
             }
         }
@@ -462,7 +394,7 @@ impl Team {
     pub fn irradiance(&self) -> Result<[Vec<Vec3>; 2]> {
         let replies = self.ask(Command::Irradiance)?;
         let mut all = [(); 2].map(|()| vec![Vec3::ZERO; self.elements]);
-        for (share, reply) in self.shares.iter().zip(replies) {
+        for (share, reply) in self.joined.shares.iter().zip(replies) {
             let Reply::Irradiance(light) = reply else {
                 return Err(strange());
             };
@@ -479,7 +411,7 @@ impl Team {
         let replies = self.ask(Command::Light)?;
         let mut all = [(); 2].map(|()| vec![Vec3::ZERO; self.elements]);
         let mut relief: Option<ReliefSums> = None;
-        for (share, reply) in self.shares.iter().zip(replies) {
+        for (share, reply) in self.joined.shares.iter().zip(replies) {
             let Reply::Light(light, sums) = reply else {
                 return Err(strange());
             };
@@ -493,7 +425,7 @@ impl Team {
     }
 
     /// Takes the light of the sources as they are now, and forgets all light, and the rows of
-    /// `dropped`. What was made to draw is made anew if it cannot draw these `kinds`.
+    /// `dropped`. Passes that draw are built again if they cannot draw these `kinds`.
     ///
     /// # Errors
     /// A device that fails.
@@ -574,7 +506,7 @@ impl Team {
             Reply::Rows(rows) => Ok((Arc::clone(share), rows)),
             _ => Err(strange()),
         };
-        self.shares.iter().zip(replies).map(rows).collect()
+        self.joined.shares.iter().zip(replies).map(rows).collect()
     }
 
     /// Words of a chunk where one member keeps rows of this shape, of all elements.
@@ -626,33 +558,4 @@ fn is_of_another(error: &Error) -> bool {
 
 fn strange() -> Error {
     Error::Device("a device of several answers what it was not asked".into())
-}
-
-/// Puts the light of a member's elements among that of all.
-fn put(all: &mut [Vec<Vec3>; 2], share: &Share, light: [Vec<Vec3>; 2]) {
-    for (all, light) in all.iter_mut().zip(light) {
-        let mut light = light.into_iter();
-        for e in share.elements().into_iter().flatten() {
-            all[e] = light.next().unwrap_or_default();
-        }
-    }
-}
-
-/// The targets of a member with words of their own, and where these lie in a row of all.
-fn targets_of(share: &Share, all: &[CouplingTarget]) -> (Vec<CouplingTarget>, Vec<[usize; 2]>) {
-    let mut own = Vec::new();
-    let mut places = Vec::new();
-    let mut first_word = 0;
-    for target in all
-        .iter()
-        .filter(|target| share.shape.has(target.first_element))
-    {
-        places.push([target.first_word as usize, target.word_count as usize]);
-        own.push(CouplingTarget {
-            first_word,
-            ..*target
-        });
-        first_word += target.word_count;
-    }
-    (own, places)
 }

@@ -6,7 +6,8 @@ use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::thread::{self, JoinHandle};
 
 use super::exchange::{Meeting, Seat, other_failed};
-use super::member::{Command, Member, MemberData, MemberShare, Reply};
+use super::member::Member;
+use super::messages::{Command, MemberData, MemberShare, Reply};
 use super::team::Others;
 use crate::error::Result;
 use crate::vk::Device;

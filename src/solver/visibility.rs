@@ -10,7 +10,7 @@ use sha2::{Digest, Sha256};
 use super::coupling::CouplingRow;
 use super::kept_parts::{merged, slice};
 use super::ledger;
-use super::member::RestoredRows;
+use super::messages::RestoredRows;
 use super::problem::GroupedBy;
 use super::shares::Share;
 use super::word_file::{Kind, hexadecimal};

@@ -1,9 +1,10 @@
 //! The order of groups: neighbours a few hundred at a time, and these far apart.
 //!
 //! Elements lie in the order of their groups, and members of a team find those that follow one
-//! another (`solver/shares.rs`). What a source sees lies together. So that each member has a part of
-//! whatever that is, the scene is cut into chunks of neighbours, and the chunks are ordered by their
-//! numbers with the bits reversed: any half of all has every other one, any quarter every fourth.
+//! another (`solver/shares.rs`). What a source sees lies together. So that each member has a part
+//! of whatever that is, the scene is cut into chunks of neighbours, and the chunks are ordered by
+//! their numbers with the bits reversed: any half of all has every other one, any quarter every
+//! fourth.
 
 use std::ops::Range;
 
@@ -13,8 +14,8 @@ use crate::constants::GROUP;
 /// Elements of a chunk, at least: few blocks of GROUP elements lie in two.
 const CHUNK: usize = 25 * GROUP as usize;
 
-/// Reorders the groups, those of each kind by themselves; `is_last`: whether the element that stands
-/// at a place of the order is of the last kind.
+/// Reorders the groups, those of each kind by themselves; `is_last`: whether the element that
+/// stands at a place of the order is of the last kind.
 pub(super) fn scatter(groups: &mut Groups, is_last: impl Fn(usize) -> bool) {
     let of_last = groups.ranges.partition_point(|range| !is_last(range.start));
     let (plain, last) = groups.ranges.split_at(of_last);

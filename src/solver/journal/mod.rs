@@ -18,7 +18,7 @@ use part::{Header, Part, Recorded};
 use serde::{Deserialize, Serialize};
 
 use super::makers::{Batch, RowKind};
-use super::member::state_words;
+use super::messages::state_words;
 use super::rows::{Made, Row};
 use super::team::Team;
 use crate::atomic_file::is_temporary;

@@ -11,7 +11,7 @@ use crate::passes::types::{KeptRow, KeptState};
 use crate::passes::words::Words;
 use crate::solver::coupling::CouplingRow;
 use crate::solver::makers::RowKind;
-use crate::solver::member::kept_state;
+use crate::solver::messages::kept_state;
 use crate::solver::rows::Row;
 use crate::solver::word_file::Kind;
 
@@ -291,7 +291,8 @@ impl Lists {
             .collect()
     }
 
-    /// The inverse of [`Self::new`]; none if they are no rows of so many sources, words and members.
+    /// The inverse of [`Self::new`]; none if they are no rows of so many sources, words and
+    /// members.
     fn batches(&self, [sources, words, members]: [usize; 3]) -> Option<Vec<Recorded>> {
         let records: &[Record] = bytemuck::try_cast_slice(&self.rows).ok()?;
         let mut records = records.iter();
