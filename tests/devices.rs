@@ -165,6 +165,30 @@ fn so_they_do_where_no_form_factors_are_kept() {
     }
 }
 
+/// Where there are fewer sources than devices, some have nothing to find.
+#[test]
+fn so_they_do_where_a_device_has_no_elements() {
+    for relief in [false, true] {
+        let mut build = Build::new();
+        let wall = build.material(0.5, 0.0);
+        let lamp = build.material(0.2, 3.0);
+        if relief {
+            build.relief(wall, 8, |x, y| 0.03 * (x * y));
+        }
+        let wall = build.quad(DVec3::ZERO, DVec3::Z, DVec3::X, (1, 1), wall);
+        build.uv(wall, DVec3::X, DVec3::Z);
+        build.quad(DVec3::Y, DVec3::X, DVec3::Z, (1, 1), lamp);
+        for memory in [None, Some(0)] {
+            let settings = Settings {
+                visibility_memory: memory,
+                ..settings()
+            };
+            let what = format!("two squares, relief {relief}, memory {memory:?}");
+            agree(&what, (&build.0.scene, false), &settings);
+        }
+    }
+}
+
 /// Each device has memory of its own: two keep about twice the rows, and draw fewer of them again.
 /// What is drawn again is added up apart, so that the light differs by rounding, and by what may be
 /// unshot.
@@ -210,11 +234,7 @@ fn so_they_do_where_a_limit_of_shots_stops_them() {
 #[test]
 fn so_they_do_when_they_are_interrupted_and_go_on() {
     let scene = scene(true, true);
-    // No emitters are drawn finely, which the first device does alone.
-    let settings = Settings {
-        emitter_hemicube: Some(settings().hemicube),
-        ..settings()
-    };
+    let settings = settings();
     let all = devices(2);
     let interrupted = |devices: &[Arc<Device>]| {
         let elements =

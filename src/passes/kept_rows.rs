@@ -248,6 +248,7 @@ impl KeptRows {
 /// Bytes of a row that all elements see.
 fn row_bytes(shape: RowShape) -> u64 {
     let (plain, meso) = (shape.plain_blocks(), shape.meso_blocks());
-    let table = (4 * u64::from(shape.blocks())).next_multiple_of(TEXEL_BYTES);
+    // One texel where a member of a team has no elements.
+    let table = (4 * u64::from(shape.blocks().max(1))).next_multiple_of(TEXEL_BYTES);
     table + u64::from(GROUP) * (2 * u64::from(plain) + 6 * u64::from(meso))
 }
