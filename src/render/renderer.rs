@@ -240,9 +240,10 @@ impl<'a> Renderer<'a> {
                     cmd.reset_timestamps(&stamps);
                     cmd.timestamp(&stamps, 0);
                     self.record(cmd, &canvas, tile, 1, None, || cmd.timestamp(&stamps, 1));
+                    cmd.read_back_timestamps(&stamps);
                     Ok(())
                 })?;
-                Ok(stamps.intervals()?[0])
+                Ok(stamps.intervals()[0])
             })
             .collect()
     }

@@ -83,6 +83,9 @@ impl Meeting {
     }
 }
 
+/// The way to the other members as it is lent; none where a member is alone.
+pub(super) type Lent<'a> = Option<&'a mut (dyn Exchange + 'static)>;
+
 /// One member's; however it ends, nobody waits for it for ever.
 pub(super) struct Seat {
     meeting: Arc<Meeting>,

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::exchange::{Exchange, Gift};
+use super::exchange::{Exchange, Gift, Lent};
 use super::near::ByLight;
 use super::shares::Share;
 use crate::error::{Error, Result};
@@ -104,11 +104,7 @@ impl Gathering {
 
     /// Adds what these rows bring, which are no more than [`Self::most`]: one sum of all of them,
     /// in this order, whatever chunks they lie in.
-    pub fn run(
-        &self,
-        rows: &[(LitRow, KeptRow)],
-        exchange: Option<&mut dyn Exchange>,
-    ) -> Result<()> {
+    pub fn run(&self, rows: &[(LitRow, KeptRow)], exchange: Lent<'_>) -> Result<()> {
         if rows.is_empty() {
             return Ok(());
         }

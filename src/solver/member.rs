@@ -41,8 +41,6 @@ pub(super) struct Member {
     kept: KeptRows,
     kept_size: KeptSize,
     makers: Option<Makers>,
-    /// Of what kind the batches under way are.
-    drawing: RowKind,
     pub gathering: Gathering,
     exchange: Option<Box<dyn Exchange>>,
     /// Where the rows of sources lie.
@@ -153,7 +151,6 @@ impl Member {
             kept,
             kept_size: size,
             makers: None,
-            drawing: RowKind::Common,
             gathering,
             exchange,
             places: HashMap::new(),
@@ -185,24 +182,16 @@ impl Member {
     pub fn run(&mut self, command: Command) -> Result<Reply> {
         match command {
             Command::Prepare(kinds) => self.prepare(&kinds),
-            Command::Submit { sources, kind } => {
+            Command::Submit(batch) => {
                 let exchange = self.exchange.as_deref_mut();
-                let Some(makers) = &mut self.makers else {
-                    return Err(unprepared());
-                };
-                self.drawing = kind;
-                let maker = makers.of(kind);
-                maker.submit(&sources, exchange.map(|e| e as &mut dyn Exchange))?;
+                let makers = self.makers.as_mut().ok_or_else(unprepared)?;
+                makers.submit(batch, exchange)?;
                 Ok(Reply::Done)
             }
-            Command::Take(kind) => {
+            Command::Take => {
                 let exchange = self.exchange.as_deref_mut();
-                let Some(makers) = &mut self.makers else {
-                    return Err(unprepared());
-                };
-                let maker = makers.of(kind);
-                let made = maker.take(exchange.map(|e| e as &mut dyn Exchange))?;
-                let made = made.unwrap_or_default();
+                let makers = self.makers.as_mut().ok_or_else(unprepared)?;
+                let made = makers.take(exchange)?.unwrap_or_default();
                 for row in &made.rows {
                     let [chunk, first] = row.place;
                     self.place(&[[row.source, chunk, first]]);
@@ -217,7 +206,7 @@ impl Member {
                 };
                 let rows = rows.into_iter().map(place).collect::<Result<Vec<_>>>()?;
                 let exchange = self.exchange.as_deref_mut();
-                (self.gathering).run(&rows, exchange.map(|e| e as &mut dyn Exchange))?;
+                (self.gathering).run(&rows, exchange)?;
                 Ok(Reply::Done)
             }
             Command::Measure => Ok(Reply::Reflected(self.gathering.measure()?)),
@@ -273,20 +262,6 @@ impl Member {
         }
     }
 
-    /// Goes on with what will be asked next, since nothing is asked now. Whether there was
-    /// something to do.
-    ///
-    /// # Errors
-    /// As [`Self::run`].
-    pub fn go_on(&mut self) -> Result<bool> {
-        let exchange = self.exchange.as_deref_mut();
-        let Some(makers) = &mut self.makers else {
-            return Ok(false);
-        };
-        let maker = makers.of(self.drawing);
-        maker.go_on(exchange.map(|e| e as &mut dyn Exchange))
-    }
-
     fn prepare(&mut self, kinds: &[RowKind]) -> Result<Reply> {
         let shape = self.share.shape;
         let made = (self.for_drawing).make(&self.device, shape, &self.settings)?;
@@ -306,11 +281,9 @@ impl Member {
             _ => Makers::new(&self.device, &parts, kinds)?,
         };
         let makers = self.makers.insert(makers);
-        let mut slots = vec![(RowKind::Common, makers.all.slots())];
-        for kind in makers.kinds() {
-            slots.push((kind, makers.of(kind).slots()));
-        }
-        Ok(Reply::Prepared(slots))
+        let kinds = [RowKind::Common].into_iter().chain(makers.kinds());
+        let slots = kinds.map(|kind| (kind, makers.slots(kind)));
+        Ok(Reply::Prepared(slots.collect()))
     }
 
     fn irradiance(&self) -> Result<[Vec<Vec3>; 2]> {
@@ -382,7 +355,7 @@ impl Member {
     /// The item buffers of the last batch of common sources, `[row][slot][column]`.
     pub fn items(&self) -> Result<Vec<u32>> {
         match &self.makers {
-            Some(makers) => read_items(&self.device, makers.all.batch()),
+            Some(makers) => read_items(&self.device, makers.batch()),
             None => Ok(Vec::new()),
         }
     }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Settings;
 use super::gather::LitRow;
-use super::makers::RowKind;
+use super::makers::{Batch, RowKind};
 use super::near::ByLight;
 use super::relief_light::ReliefSums;
 use super::rows::MadeParts;
@@ -58,12 +58,9 @@ pub(super) enum Command {
     /// Makes ready to draw sources of these kinds.
     Prepare(Vec<RowKind>),
     /// Begins a batch. Not answered: the first goes on meanwhile.
-    Submit {
-        sources: Vec<u32>,
-        kind: RowKind,
-    },
+    Submit(Batch),
     /// The oldest batch.
-    Take(RowKind),
+    Take,
     Gather(Vec<LitRow>),
     /// What its sources reflect.
     Measure,
@@ -97,7 +94,7 @@ pub(super) enum Command {
 impl Command {
     /// Whether the first waits for what the others answer.
     pub fn is_answered(&self) -> bool {
-        !matches!(self, Self::Submit { .. })
+        !matches!(self, Self::Submit(_))
     }
 }
 

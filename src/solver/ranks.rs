@@ -41,8 +41,6 @@ pub struct Ranks {
 enum Request {
     Send(usize, Vec<u8>),
     Receive(usize, Tag, Sender<Vec<u8>>),
-    /// Whether a message from a process has come.
-    Has(usize, Sender<bool>),
     /// To all others.
     Give(Tag, Vec<u8>),
     /// To all others, or from the first.
@@ -65,8 +63,8 @@ const LONGEST_WAIT: Duration = Duration::from_micros(500);
 const PROGRESS: Duration = Duration::from_millis(1);
 const SOON: Duration = Duration::from_millis(20);
 
-/// Bytes that may be given and not yet taken, of which a gift may take a share: there are two
-/// rounds of each kind at most.
+/// Bytes that may be given and not yet taken, of which a gift may take a share: there are
+/// [`super::makers::UNDER_WAY`] rounds of a kind at most.
 const ROOM: usize = 1 << 30;
 const MOST_GIVEN: usize = ROOM / 8;
 /// What it takes to send anything.
@@ -144,10 +142,6 @@ impl Ranks {
             };
             self.answer(Ok(Reply::Done))?;
             loop {
-                // While nothing is asked, it goes on with what will be.
-                if !self.has_come(0)? && self.or_all_end(member.go_on()) {
-                    continue;
-                }
                 let asked = self.receive(0)?;
                 if asked.is_empty() {
                     break;
@@ -155,7 +149,7 @@ impl Ranks {
                 let command: Command = read(&asked)?;
                 let is_answered = command.is_answered();
                 // Others wait for what this one gives them then.
-                let is_awaited = matches!(command, Command::Submit { .. } | Command::Gather(_));
+                let is_awaited = matches!(command, Command::Submit(_) | Command::Gather(_));
                 let mut answer = member.run(command);
                 if is_awaited {
                     answer = Ok(self.or_all_end(answer));
@@ -232,13 +226,6 @@ impl Ranks {
         message.recv().map_err(|_| left())
     }
 
-    /// Whether a message from a process has come.
-    fn has_come(&self, from: usize) -> Result<bool> {
-        let (send, has) = channel();
-        self.ask(Request::Has(from, send))?;
-        has.recv().map_err(|_| left())
-    }
-
     fn broadcast(&self, message: Vec<u8>) -> Result<Vec<u8>> {
         let (send, message_of_first) = channel();
         self.ask(Request::Broadcast(message, send))?;
@@ -288,10 +275,6 @@ fn answer(universe: &mut Universe, asked: &Receiver<Request>) {
                 }
             }
             Request::Receive(from, tag, to) => drop(to.send(receive(&world, from, tag))),
-            Request::Has(from, to) => {
-                let from = world.process_at_rank(from as Rank);
-                let _ = to.send(from.immediate_probe_with_tag(ASKED).is_some());
-            }
             Request::Give(tag, message) => {
                 give(&world, tag, &message);
                 given = Some(Instant::now());
@@ -435,11 +418,6 @@ impl Others for OnRanks {
             answer.map_err(Error::Device)
         };
         (from..ranks.count).map(answer).collect()
-    }
-
-    fn have_answered(&mut self) -> bool {
-        let ranks = &self.0;
-        (1..ranks.count).all(|rank| ranks.has_come(rank).unwrap_or(true))
     }
 
     fn close(&mut self) {

@@ -4,13 +4,12 @@
 //! Where there are several members, each draws its share of a batch's item buffers, and all give
 //! these to one another.
 
-use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::coupling::CouplingRow;
 use super::drawing::Drawing;
 use super::estimate::Evaluate;
-use super::exchange::Exchange;
+use super::exchange::Lent;
 use super::rows::{MadeParts, RowPart, Stages};
 use super::shared_items::{Asked, SharedItems, slots_of};
 use super::{EmitterShadows, Settings};
@@ -21,7 +20,7 @@ use crate::passes::buffers::SceneBuffers;
 use crate::passes::couple::Couple;
 use crate::passes::fresh_rows::FreshRows;
 use crate::passes::keep::Keep;
-use crate::passes::kept_rows::KeptRows;
+use crate::passes::kept_rows::{KeptRows, SCRATCH};
 use crate::passes::light_rows::LightRows;
 use crate::passes::occluder_tree::OccluderTree;
 use crate::passes::types::{CouplingTarget, KeptRow, KeptState, ReceiverList, Slot};
@@ -58,29 +57,21 @@ pub(super) enum Looks {
     },
 }
 
-/// Makes parts of rows of the sources that it is asked for, two batches at a time.
+/// Makes parts of rows of the sources that it is asked for, [`SETS`] batches at a time.
 pub(super) struct RowMaker {
     commands: [Commands; SETS],
     wanted: [Buffer; SETS],
     readback: [Buffer; SETS],
     timestamps: [Timestamps; SETS],
-    /// Batches of which the item buffers are given away, oldest first.
-    given: VecDeque<Asked>,
-    /// Batches under way on the device, oldest first.
-    asked: VecDeque<Asked>,
     /// Where there are other members that draw.
     shared: Option<SharedItems>,
-    /// When the batch that was taken last ended, if another one waited for it.
-    ended: Option<f64>,
-    /// Which of the sets is submitted next.
-    next: usize,
     layout: Layout,
     lasting_chunks: u32,
     batch: Batch,
 }
 
-/// Batches under way at once: as many as there is room for rows without room.
-const SETS: usize = crate::passes::kept_rows::SCRATCH as usize;
+/// Batches that are evaluated at once: as many as there is room for rows without room.
+pub(super) const SETS: usize = SCRATCH as usize;
 
 impl RowMaker {
     pub fn new(device: &Arc<Device>, parts: &RowParts<'_>, looks: Looks) -> Result<Self> {
@@ -163,7 +154,7 @@ impl RowMaker {
                 cmd.timestamp(stamps, 0);
                 match (&drawing, &shared) {
                     (_, Some(shared)) => {
-                        shared.take_in(cmd, &batch);
+                        shared.take_in(cmd, i, &batch);
                         cmd.timestamp(stamps, 1);
                     }
                     (Some(drawing), None) => {
@@ -184,7 +175,7 @@ impl RowMaker {
                 cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
                 layout.record(cmd, &readback[i]);
                 cmd.copy(&kept.state, 0, &readback[i], layout.bytes, state_bytes);
-                cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
+                cmd.read_back_timestamps(stamps);
                 Ok(())
             })
         };
@@ -193,10 +184,6 @@ impl RowMaker {
             wanted,
             readback,
             timestamps,
-            given: VecDeque::new(),
-            asked: VecDeque::new(),
-            ended: None,
-            next: 0,
             layout,
             lasting_chunks: kept.chunk_count(),
             shared,
@@ -209,81 +196,65 @@ impl RowMaker {
         self.batch.slot_count as usize
     }
 
-    /// Begins a batch; two may be under way. Where there are other members, this one draws its
-    /// share of the item buffers and gives them away; [`Self::go_on`] does the rest.
+    /// Whether item buffers are shared out.
+    pub fn shares(&self) -> bool {
+        self.shared.is_some()
+    }
+
+    /// Begins to draw this member's share of the item buffers, where they are shared out.
     ///
     /// # Errors
-    /// A device that fails; another member that does.
-    pub fn submit(&mut self, sources: &[u32], exchange: Option<&mut dyn Exchange>) -> Result<()> {
-        assert!(sources.len() <= self.slots() && self.asked.len() + self.given.len() < SETS);
-        let mut asked = Asked {
-            sources: sources.to_vec(),
-            counts: Vec::new(),
-            drawing: [0.0; 2],
-            given: 0,
-        };
+    /// A device that fails.
+    pub fn draw(&mut self, asked: &Asked, exchange: Lent<'_>) -> Result<()> {
+        match (&mut self.shared, exchange) {
+            (Some(shared), Some(exchange)) => shared.draw(asked, exchange.place()),
+            _ => Ok(()),
+        }
+    }
+
+    /// Gives away what [`Self::draw`] has begun, once it is there.
+    ///
+    /// # Errors
+    /// As [`Self::draw`]; another member that fails.
+    pub fn give(&mut self, asked: &mut Asked, exchange: Lent<'_>) -> Result<()> {
+        match (&mut self.shared, exchange) {
+            (Some(shared), Some(exchange)) => shared.give(asked, exchange),
+            _ => Ok(()),
+        }
+    }
+
+    /// Begins to evaluate a batch as one of [`SETS`], with the item buffers of all members; where
+    /// they are not shared out, it draws them first.
+    ///
+    /// # Errors
+    /// As [`Self::give`].
+    pub fn evaluate(&mut self, set: usize, asked: &Asked, exchange: Lent<'_>) -> Result<()> {
         if let (Some(shared), Some(exchange)) = (&mut self.shared, exchange) {
-            shared.draw(&mut asked, exchange)?;
-            self.given.push_back(asked);
-            return Ok(());
+            shared.collect(asked, set, exchange)?;
         }
-        self.evaluate(asked)
-    }
-
-    /// Goes on with the oldest batch of which the item buffers are given away, once all others have
-    /// given theirs. Whether there was one.
-    ///
-    /// # Errors
-    /// As [`Self::submit`].
-    pub fn go_on(&mut self, exchange: Option<&mut dyn Exchange>) -> Result<bool> {
-        let (Some(shared), Some(exchange)) = (&mut self.shared, exchange) else {
-            return Ok(false);
-        };
-        let Some(asked) = self.given.pop_front() else {
-            return Ok(false);
-        };
-        // The item buffers of the batch before may still be read.
-        self.commands[(self.next + SETS - 1) % SETS].wait()?;
-        shared.collect(&asked, exchange)?;
-        self.evaluate(asked)?;
-        Ok(true)
-    }
-
-    fn evaluate(&mut self, asked: Asked) -> Result<()> {
         let slots = slots_of(asked.sources.iter().copied(), self.slots());
-        self.wanted[self.next].write(0, &slots);
-        self.commands[self.next].submit()?;
-        self.asked.push_back(asked);
-        self.next = (self.next + 1) % SETS;
-        Ok(())
+        self.wanted[set].write(0, &slots);
+        self.commands[set].submit()
     }
 
-    /// Waits for the oldest batch under way; none if there is none.
+    /// Waits for the batch that was evaluated as this set. Returns what it made, and when on the
+    /// device it began and ended.
     ///
     /// # Errors
-    /// As [`Self::submit`].
-    pub fn take(&mut self, exchange: Option<&mut dyn Exchange>) -> Result<Option<MadeParts>> {
-        if self.asked.is_empty() {
-            self.go_on(exchange)?;
-        }
-        let Some(asked) = self.asked.pop_front() else {
-            return Ok(None);
-        };
-        let i = (self.next + SETS - self.asked.len() - 1) % SETS;
-        self.commands[i].wait()?;
+    /// A device that fails.
+    pub fn take(&mut self, set: usize, asked: Asked) -> Result<(MadeParts, [f64; 2])> {
+        self.commands[set].wait()?;
         let row = |(slot, &source)| {
-            let from = &self.readback[i];
+            let from = &self.readback[set];
             self.layout.read(slot, source, from, self.lasting_chunks)
         };
         let mut rows: Vec<RowPart> = (0..).zip(&asked.sources).map(row).collect();
         for (at, counts) in asked.counts {
             rows[at].counts = counts.to_vec();
         }
-        let stamps = self.timestamps[i].seconds()?;
+        let stamps = self.timestamps[set].seconds();
         let stage = |s: usize| (stamps[s + 1] - stamps[s]).max(0.0);
         let [cull, item_buffer, sort, rays, bin, keep] = std::array::from_fn(stage);
-        let idle = self.ended.map_or(0.0, |ended| (stamps[0] - ended).max(0.0));
-        self.ended = (stamps.last().copied()).filter(|_| !self.asked.is_empty());
         let [culled, drawn] = asked.drawing;
         let stages = Stages {
             cull: cull + culled,
@@ -292,19 +263,20 @@ impl RowMaker {
             rays,
             bin,
             keep,
-            idle,
+            idle: 0.0,
         };
         let KeptState {
             chunk,
             used,
             rows: kept,
-        } = self.readback[i].read(self.layout.bytes, 1)[0];
-        Ok(Some(MadeParts {
+        } = self.readback[set].read(self.layout.bytes, 1)[0];
+        let made = MadeParts {
             rows,
             stages,
             state: [chunk, used, kept],
             given: asked.given,
-        }))
+        };
+        Ok((made, [stamps[0], stamps[STAMPS as usize - 1]]))
     }
 
     /// The last batch.

@@ -5,8 +5,10 @@ use std::sync::Arc;
 
 use super::drawing::Drawing;
 use super::exchange::{Exchange, Gift};
-use super::packed::{Drawn, pack, unpack};
-use crate::constants::{FACES, NONE};
+use super::makers::RowKind;
+use super::packed::{Counts, pack, unpack};
+use super::row_maker::SETS;
+use crate::constants::NONE;
 use crate::error::{Error, Result};
 use crate::math::hemicube::pixel_count;
 use crate::passes::batch::Batch;
@@ -15,11 +17,13 @@ use crate::passes::types::Slot;
 use crate::vk::{Buffer, BufferUse, Commands, Device, Stage, Timestamps};
 
 /// A batch that was asked for.
+#[derive(Default)]
 pub(super) struct Asked {
     pub sources: Vec<u32>,
+    pub kind: RowKind,
     /// Of a batch that was shared out, what this member has drawn: its place in the batch and the
     /// counts.
-    pub counts: Vec<(usize, [[u32; 3]; FACES as usize])>,
+    pub counts: Vec<(usize, Counts)>,
     /// Seconds that culling and drawing took.
     pub drawing: [f64; 2],
     /// Bytes given to the others.
@@ -33,8 +37,8 @@ pub(super) struct SharedItems {
     stamps: Timestamps,
     drawn: Buffer,
     counts: Buffer,
-    /// All item buffers of a batch, as they lie in the image.
-    items: Buffer,
+    /// All item buffers of batches that are evaluated, as they lie in the image.
+    items: [Buffer; SETS],
     /// Pixels a side of a face.
     face: usize,
     slots: usize,
@@ -75,11 +79,12 @@ impl SharedItems {
             cmd.copy_shader_image_to_buffer(&hemicubes.items, &drawn);
             cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
             cmd.copy(&hemicubes.counts, 0, &counted, 0, counts);
-            cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
+            cmd.read_back_timestamps(&stamps);
             Ok(())
         })?;
+        let all = || buffer("items of all", items, BufferUse::Upload);
         Ok(Self {
-            items: buffer("items of all", items, BufferUse::Upload)?,
+            items: [all()?, all()?],
             draw,
             wanted,
             stamps,
@@ -90,71 +95,91 @@ impl SharedItems {
         })
     }
 
-    /// Draws every so many-th source of a batch, and gives the item buffers away.
-    pub fn draw(&mut self, asked: &mut Asked, exchange: &mut dyn Exchange) -> Result<()> {
-        let [member, members] = exchange.place();
-        let own = (asked.sources.iter().copied().enumerate())
+    /// Begins to draw what is one member's of a batch: every so many-th source. What was drawn
+    /// before is given.
+    pub fn draw(&mut self, asked: &Asked, [member, members]: [usize; 2]) -> Result<()> {
+        let own = (asked.sources.iter().copied())
             .skip(member)
             .step_by(members);
-        let own: Vec<(usize, u32)> = own.collect();
-        let mut drawn = Vec::new();
-        if !own.is_empty() {
-            let sources = own.iter().map(|(_, source)| *source);
-            self.wanted.write(0, &slots_of(sources, self.slots));
-            self.draw.submit()?;
-            self.draw.wait()?;
-            let seconds = self.stamps.intervals()?;
-            asked.drawing = [seconds[0], seconds[1]];
-            let pixels = pixel_count(self.face as u32);
-            let items: Vec<u32> = self.drawn.read(0, pixels * self.slots);
-            let counts: Vec<[[u32; 3]; FACES as usize]> = self.counts.read(0, own.len());
-            let one = |(slot, &counts)| {
-                let mut column = Vec::with_capacity(pixels);
-                (self.columns(slot)).for_each(|at| column.extend_from_slice(&items[at]));
-                Drawn {
-                    counts,
-                    items: column,
-                }
-            };
-            drawn = counts.iter().enumerate().map(one).collect();
-            asked.counts = own.iter().map(|(at, _)| *at).zip(counts).collect();
+        if own.len() == 0 {
+            return Ok(());
         }
-        let given = pack(drawn.iter(), self.face);
-        asked.given = given.len() as u64;
-        exchange.give(Gift::Items, given)
+        self.wanted.write(0, &slots_of(own, self.slots));
+        self.draw.submit()
     }
 
-    /// Brings the item buffers of all to the device.
-    pub fn collect(&mut self, asked: &Asked, exchange: &mut dyn Exchange) -> Result<()> {
+    /// Gives away the item buffers that [`Self::draw`] has begun, once they are there.
+    pub fn give(&mut self, asked: &mut Asked, exchange: &mut dyn Exchange) -> Result<()> {
+        let [member, members] = exchange.place();
+        let own = (0..asked.sources.len()).skip(member).step_by(members);
+        let mut packed = Vec::new();
+        if own.len() > 0 {
+            self.draw.wait()?;
+            let seconds = self.stamps.intervals();
+            asked.drawing = [seconds[0], seconds[1]];
+            let counts: Vec<Counts> = self.counts.read(0, own.len());
+            self.drawn.look_at(|items: &[u32]| {
+                for (slot, counts) in counts.iter().enumerate() {
+                    let rows = self.rows(slot).map(|at| &items[at]);
+                    pack(counts, rows, &mut packed);
+                }
+            });
+            asked.counts = own.zip(counts).collect();
+        }
+        asked.given = packed.len() as u64;
+        exchange.give(Gift::Items, packed)
+    }
+
+    /// Brings the item buffers of all to the device, for the commands that [`Self::take_in`] records
+    /// for `set`.
+    pub fn collect(
+        &mut self,
+        asked: &Asked,
+        set: usize,
+        exchange: &mut dyn Exchange,
+    ) -> Result<()> {
         let [_, members] = exchange.place();
         let all = exchange.collect(Gift::Items)?;
-        let pixels = pixel_count(self.face as u32);
-        let mut items = vec![NONE; pixels * self.slots];
-        for (member, given) in all.iter().enumerate() {
-            let of = unpack(given, pixels, self.face)?;
-            let slots = (member..asked.sources.len()).step_by(members);
-            if of.len() != slots.len() {
-                let what = "a device of several sent other item buffers than it was asked for";
-                return Err(Error::Device(what.into()));
-            }
-            for (slot, one) in slots.zip(of) {
-                for (at, row) in self.columns(slot).zip(one.items.chunks(self.face)) {
-                    items[at].copy_from_slice(row);
+        let (face, wide) = (self.face, self.face * self.slots);
+        let pixels = pixel_count(face as u32);
+        self.items[set].change(|items: &mut [u32]| {
+            for (member, given) in all.iter().enumerate() {
+                let slots = (member..asked.sources.len()).step_by(members);
+                let of = unpack(given, pixels, |which, run, item| {
+                    let slot = member + which * members;
+                    if slot >= self.slots {
+                        return;
+                    }
+                    for row in run.start / face..=(run.end - 1) / face {
+                        let columns = run.start.max(row * face)..run.end.min((row + 1) * face);
+                        let shift = row * (wide - face) + slot * face;
+                        items[columns.start + shift..columns.end + shift].fill(item);
+                    }
+                })?;
+                if of != slots.len() {
+                    let what = "a device of several sent other item buffers than it was asked for";
+                    return Err(Error::Device(what.into()));
                 }
             }
-        }
-        self.items.write(0, &items);
-        Ok(())
+            // Slots without a source see nothing.
+            for slot in asked.sources.len()..self.slots {
+                for row in 0..pixels / face {
+                    let first = row * wide + slot * face;
+                    items[first..first + face].fill(NONE);
+                }
+            }
+            Ok(())
+        })
     }
 
     /// Where the rows of a slot lie in an image.
-    fn columns(&self, slot: usize) -> impl Iterator<Item = Range<usize>> + use<> {
+    fn rows(&self, slot: usize) -> impl Iterator<Item = Range<usize>> + use<> {
         let (face, wide) = (self.face, self.face * self.slots);
         (0..3 * face).map(move |row| row * wide + slot * face..row * wide + (slot + 1) * face)
     }
 
     /// Puts the item buffers of all into the image.
-    pub fn take_in(&self, cmd: &Commands, batch: &Batch) {
-        cmd.upload_texture(&self.items, &batch.hemicubes().items, 4);
+    pub fn take_in(&self, cmd: &Commands, set: usize, batch: &Batch) {
+        cmd.upload_texture(&self.items[set], &batch.hemicubes().items, 4);
     }
 }

@@ -219,7 +219,7 @@ impl ShotBatch {
             cmd.timestamp(&timestamps, 3);
             cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
             cmd.copy(counts, 0, &readback, 0, counts.bytes());
-            cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
+            cmd.read_back_timestamps(&timestamps);
             Ok(())
         })?;
         Ok(Self {
@@ -242,7 +242,7 @@ impl ShotBatch {
         self.wanted.write(0, &all);
         self.commands.submit()?;
         self.commands.wait()?;
-        let [cull, item_buffer, bin] = self.timestamps.intervals()?[..] else {
+        let [cull, item_buffer, bin] = self.timestamps.intervals()[..] else {
             unreachable!("a batch of shots has {STAMPS} timestamps");
         };
         let stages = Stages {

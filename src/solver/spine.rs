@@ -356,7 +356,7 @@ impl Spine {
         };
         let in_time = recorded.or(time.map(fitting)).unwrap_or(usize::MAX);
         self.prepare()?;
-        if !self.team.has_room(kind) || in_time == 0 {
+        if !self.team.has_room() || in_time == 0 {
             return Ok(None);
         }
         candidates.sort_by(strongest_first);

@@ -15,7 +15,7 @@ use super::devices::Crew;
 use super::exchange::other_failed;
 use super::gather::LitRow;
 use super::joined::{Joined, put};
-use super::makers::{Batch, RowKind};
+use super::makers::{Batch, RowKind, UNDER_WAY};
 use super::member::Member;
 use super::messages::{Command, Reply, RestoredRows, kept_state, state_words};
 use super::near::ByLight;
@@ -26,7 +26,6 @@ use super::shares::{Parcels, Share};
 use crate::error::{Error, Result};
 use crate::mesh::sources::Source;
 use crate::passes::fresh_rows::RowShape;
-use crate::passes::kept_rows::SCRATCH;
 use crate::passes::scene_data::{LitSources, SceneData};
 use crate::passes::types::KeptState;
 use crate::passes::words::Words;
@@ -47,9 +46,6 @@ pub(super) trait Others: Send {
 
     /// What each answers.
     fn answers(&mut self) -> Vec<Result<Reply>>;
-
-    /// Whether all answers have come.
-    fn have_answered(&mut self) -> bool;
 
     /// None of them waits for another any more.
     fn close(&mut self);
@@ -176,10 +172,7 @@ impl Team {
     fn with_answers(&self, others: &mut Box<dyn Others>, of_first: Command) -> Result<Vec<Reply>> {
         let is_answered = of_first.is_answered();
         let mut first = self.first();
-        let mut own = first.run(of_first);
-        if is_answered && !others.have_answered() {
-            own = own.and_then(|reply| first.go_on().map(|_| reply));
-        }
+        let own = first.run(of_first);
         if own.is_err() {
             others.close();
         }
@@ -246,10 +239,9 @@ impl Team {
         of(kind).or(of(RowKind::Common)).unwrap_or(0)
     }
 
-    /// Whether another batch can begin: two may be under way, of one kind.
-    pub fn has_room(&self, kind: RowKind) -> bool {
-        let under_way = &self.under_way;
-        under_way.len() < SCRATCH as usize && under_way.iter().all(|batch| batch.kind == kind)
+    /// Whether another batch can begin.
+    pub fn has_room(&self) -> bool {
+        self.under_way.len() < UNDER_WAY
     }
 
     /// Whether a batch is under way.
@@ -269,7 +261,7 @@ impl Team {
         };
         let is_drawn = !sources.is_empty();
         if is_drawn {
-            self.ask(Command::Submit { sources, kind })?;
+            self.ask(Command::Submit(Batch { sources, kind }))?;
         }
         self.under_way.push_back(UnderWay {
             kind,
@@ -286,7 +278,7 @@ impl Team {
         };
         let kind = batch.kind;
         let mut made = match batch.is_drawn {
-            true => self.take_drawn(kind, sources)?,
+            true => self.take_drawn(sources)?,
             false => Made {
                 rows: Vec::new(),
                 stages: Stages::default(),
@@ -310,9 +302,9 @@ impl Team {
         }))
     }
 
-    fn take_drawn(&self, kind: RowKind, sources: &[Source]) -> Result<Made> {
+    fn take_drawn(&self, sources: &[Source]) -> Result<Made> {
         let mut parts = Vec::new();
-        for reply in self.ask(Command::Take(kind))? {
+        for reply in self.ask(Command::Take)? {
             let Reply::Made(made) = reply else {
                 return Err(strange());
             };

@@ -1,8 +1,7 @@
 //! Members on threads of this process, a device each.
 
-use std::collections::VecDeque;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
 
 use super::exchange::{Meeting, Seat, other_failed};
@@ -21,8 +20,6 @@ pub(super) struct Threads {
 struct OnThread {
     commands: Sender<Command>,
     replies: Receiver<Result<Reply>>,
-    /// Answers that have come and were not asked for.
-    come: VecDeque<Result<Reply>>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -43,7 +40,6 @@ impl Threads {
             OnThread {
                 commands,
                 replies,
-                come: VecDeque::new(),
                 thread: Some(thread::spawn(work)),
             }
         };
@@ -79,21 +75,8 @@ fn work(
         if !is_asked {
             return;
         }
-        // While nothing is asked, it goes on with what will be.
-        let command = match asked.try_recv() {
-            Ok(command) => command,
-            Err(TryRecvError::Disconnected) => return,
-            Err(TryRecvError::Empty) => match member.go_on() {
-                Ok(true) => continue,
-                Ok(false) => match asked.recv() {
-                    Ok(command) => command,
-                    Err(_) => return,
-                },
-                Err(error) => {
-                    drop(member);
-                    return drop(answers.send(Err(error)));
-                }
-            },
+        let Ok(command) = asked.recv() else {
+            return;
         };
         let is_answered = command.is_answered();
         match member.run(command) {
@@ -121,21 +104,11 @@ impl Others for Threads {
     }
 
     fn answers(&mut self) -> Vec<Result<Reply>> {
-        let answer = |member: &mut OnThread| match member.come.pop_front() {
-            Some(answer) => answer,
-            None => {
-                let answer = member.replies.recv();
-                answer.unwrap_or_else(|_| Err(other_failed()))
-            }
+        let answer = |member: &OnThread| {
+            let answer = member.replies.recv();
+            answer.unwrap_or_else(|_| Err(other_failed()))
         };
-        self.members.iter_mut().map(answer).collect()
-    }
-
-    fn have_answered(&mut self) -> bool {
-        self.members.iter_mut().all(|member| {
-            member.come.extend(member.replies.try_iter());
-            !member.come.is_empty()
-        })
+        self.members.iter().map(answer).collect()
     }
 
     fn close(&mut self) {

@@ -187,6 +187,28 @@ impl Buffer {
         target[offset..offset + source.len()].copy_from_slice(source);
     }
 
+    /// Changes what an [`BufferUse::Upload`] buffer holds, which no work under way may use.
+    pub fn change<T: Pod, R>(&mut self, change: impl FnOnce(&mut [T]) -> R) -> R {
+        let mut allocation = (self.owner.allocation.write()).unwrap_or_else(|e| e.into_inner());
+        let target = allocation
+            .as_mut()
+            .and_then(Allocation::mapped_slice_mut)
+            .expect("only upload and stream buffers are written by the CPU");
+        let whole = self.owner.bytes as usize / size_of::<T>() * size_of::<T>();
+        change(bytemuck::cast_slice_mut(&mut target[..whole]))
+    }
+
+    /// Shows what a [`BufferUse::Readback`] buffer holds, whose writes are done.
+    pub fn look_at<T: Pod, R>(&self, look: impl FnOnce(&[T]) -> R) -> R {
+        let allocation = (self.owner.allocation.read()).unwrap_or_else(|e| e.into_inner());
+        let source = allocation
+            .as_ref()
+            .and_then(Allocation::mapped_slice)
+            .expect("only readback buffers are read by the CPU");
+        let whole = self.owner.bytes as usize / size_of::<T>() * size_of::<T>();
+        look(bytemuck::cast_slice(&source[..whole]))
+    }
+
     /// Reads `count` values from byte `offset`. The buffer must be a [`BufferUse::Readback`] buffer
     /// whose writes are done.
     pub fn read<T: Pod>(&self, offset: u64, count: usize) -> Vec<T> {

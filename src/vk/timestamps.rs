@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::Device;
+use super::{Buffer, BufferUse, Device};
 use crate::error::Result;
 
 /// A pool of timestamps. A clone is another handle to the same pool.
@@ -13,6 +13,8 @@ use crate::error::Result;
 #[derive(Clone)]
 pub struct Timestamps {
     pub(super) owner: Arc<TimestampsOwner>,
+    /// Where they are read: lavapipe waits for all that was submitted when a pool is asked.
+    pub(super) readback: Buffer,
 }
 
 pub(super) struct TimestampsOwner {
@@ -32,45 +34,31 @@ impl Timestamps {
         let raw = unsafe { device.raw.create_query_pool(&info, None) }
             .map_err(device.error("creating a query pool"))?;
         device.set_name(raw, name);
+        let owner = Arc::new(TimestampsOwner {
+            raw,
+            count,
+            device: Arc::clone(device),
+        });
+        let bytes = u64::from(count) * size_of::<u64>() as u64;
         Ok(Self {
-            owner: Arc::new(TimestampsOwner {
-                raw,
-                count,
-                device: Arc::clone(device),
-            }),
+            owner,
+            readback: Buffer::new(device, name, bytes, BufferUse::Readback)?,
         })
     }
 
-    /// Seconds at which each timestamp was written, since a time that is the device's own; the
-    /// submission must be done.
-    ///
-    /// # Errors
-    /// A device that fails.
-    pub fn seconds(&self) -> Result<Vec<f64>> {
-        let TimestampsOwner { raw, count, device } = &*self.owner;
-        let mut ticks = vec![0u64; *count as usize];
-        // SAFETY: the pool holds as many results as the slice.
-        unsafe {
-            device.raw.get_query_pool_results(
-                *raw,
-                0,
-                &mut ticks,
-                vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT,
-            )
-        }
-        .map_err(device.error("reading timestamps"))?;
+    /// Seconds at which each timestamp was written, since a time that is the device's own; a
+    /// submission that reads them back must be done.
+    pub fn seconds(&self) -> Vec<f64> {
+        let TimestampsOwner { count, device, .. } = &*self.owner;
+        let ticks: Vec<u64> = self.readback.read(0, *count as usize);
         let period = device.limits().timestamp_period * 1e-9;
-        Ok(ticks.iter().map(|&t| t as f64 * period).collect())
+        ticks.iter().map(|&t| t as f64 * period).collect()
     }
 
-    /// Seconds between each timestamp and the next, `count - 1` of them; the submission must be
-    /// done.
-    ///
-    /// # Errors
-    /// A device that fails.
-    pub fn intervals(&self) -> Result<Vec<f64>> {
-        let seconds = self.seconds()?;
-        Ok(seconds.windows(2).map(|t| (t[1] - t[0]).max(0.0)).collect())
+    /// Seconds between each timestamp and the next, `count - 1` of them, as [`Self::seconds`].
+    pub fn intervals(&self) -> Vec<f64> {
+        let seconds = self.seconds();
+        seconds.windows(2).map(|t| (t[1] - t[0]).max(0.0)).collect()
     }
 }
 

@@ -279,6 +279,28 @@ impl Commands {
                 .cmd_reset_query_pool(self.raw(), pool.raw, 0, pool.count);
         }
     }
+
+    /// Brings timestamps to the host. All of them must have been written.
+    pub fn read_back_timestamps(&self, timestamps: &Timestamps) {
+        let (pool, to) = (&timestamps.owner, &timestamps.readback);
+        self.hold(pool);
+        self.hold(&to.owner);
+        let stride = size_of::<u64>() as u64;
+        // SAFETY: the buffer has room for the whole pool, whose results this waits for.
+        unsafe {
+            self.device.raw.cmd_copy_query_pool_results(
+                self.raw(),
+                pool.raw,
+                0,
+                pool.count,
+                to.owner.raw,
+                0,
+                stride,
+                vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT,
+            );
+        }
+        self.barrier(&[Stage::Transfer], &[Stage::Host]);
+    }
 }
 
 impl Drop for Commands {
