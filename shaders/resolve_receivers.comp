@@ -48,10 +48,13 @@ void main() {
     uint first_eye = eye_starts[source];
     uint stride = (eye_starts[source + 1] - first_eye) / EYES;
     uint lane = gl_LocalInvocationIndex % LANES_EACH;
-    for (uint at = ELEMENTS * gl_WorkGroupID.x; at < count; at += ELEMENTS * gl_NumWorkGroups.x) {
+    uint piece_size = ELEMENTS * ((count + ELEMENTS * pieces - 1) / (ELEMENTS * pieces));
+    uint begin = piece * piece_size;
+    uint end = min(begin + piece_size, count);
+    for (uint at = begin + ELEMENTS * gl_WorkGroupID.x; at < end; at += ELEMENTS * gl_NumWorkGroups.x) {
         // The lanes past the end do as the last one does.
         uint of = at + gl_LocalInvocationIndex / LANES_EACH;
-        uint i = listed[list * element_count + min(of, count - 1)];
+        uint i = listed[list * element_count + min(of, end - 1)];
         uint e = first_element + i;
         vec4 ball[RAYS] = vec4[](fetch(balls, e));
         vec3 n[RAYS] = vec3[](fetch(planes, e).xyz);
@@ -65,7 +68,7 @@ void main() {
                 eye.eye = place.at;
                 weight = weight_of(place, s, ball[0].xyz, n[0]);
             }
-            bool open[RAYS] = bool[](weight > 0.0 && of < count);
+            bool open[RAYS] = bool[](weight > 0.0 && of < end);
             look(eye, ball, n, open);
             sum += vec2(open[0] ? weight : 0.0, weight);
         }

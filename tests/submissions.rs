@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{assert_silent, device};
+use common::{assert_silent, device, own_device};
 use mesolux::bake::{solution, solve};
 use mesolux::render::{Lighting, View, render};
 use mesolux::scene::{LoadOptions, load};
@@ -11,6 +11,53 @@ use mesolux::solver::Settings;
 
 /// Elements times sources of a part that makes rows, at most.
 const PAIRS: u64 = 1 << 17;
+
+/// Light, and parts that make rows.
+fn solved(name: &str, patches: Option<usize>, part_pairs: Option<u64>) -> (Vec<u32>, usize) {
+    let device = own_device();
+    device.time_parts();
+    let options = LoadOptions {
+        patches,
+        ..LoadOptions::default()
+    };
+    let scene = load(name, &options).expect("it is built in");
+    let settings = Settings {
+        shots: Some(40),
+        ..Settings::default()
+    };
+    let settings = Settings {
+        part_pairs: part_pairs.unwrap_or(settings.part_pairs),
+        ..settings
+    };
+    let solver = solve(&device, &scene, &settings, None, |_| true).expect("it is solved");
+    let light = solver.light().expect("it comes back");
+    let mut all = light.irradiance;
+    all.extend(light.irradiance_direct);
+    all.extend(light.radiosity);
+    if let Some(relief) = light.relief {
+        all.extend(relief.moments.iter().flatten());
+        all.extend(relief.exitant);
+    }
+    let words = all.iter().flat_map(|v| v.to_array()).map(f32::to_bits);
+    let parts = device.timed_parts();
+    let of_rows = parts.0.get("make rows").map_or(0, |part| part.0);
+    (words.collect(), of_rows as usize)
+}
+
+/// A row whose elements are more than a part finds is cut, in a scene with emitters that are looked
+/// at by rays, and in one with relief, a sun and a sky.
+#[test]
+fn the_size_of_parts_changes_no_light() {
+    for (name, patches) in [("cornell", Some(3000)), ("brick-wall", None)] {
+        let (whole, few) = solved(name, patches, None);
+        let (cut, many) = solved(name, patches, Some(500));
+        println!("{name}: {few} and {many} parts");
+        assert!(many > 10 * few, "{name}: {few} and {many} parts");
+        let other = whole.iter().zip(&cut).filter(|(a, b)| a != b).count();
+        assert_eq!(other, 0, "of {} numbers of {name}", whole.len());
+    }
+    assert_silent();
+}
 
 #[test]
 #[ignore = "long: runs by scripts/test --all"]

@@ -12,9 +12,12 @@ void main() {
     uint count = lists[list].count;
     uint lane = gl_LocalInvocationIndex % LIGHT_LANES;
     Light light = load_light(slots[slot].source);
-    for (uint at = ELEMENTS * gl_WorkGroupID.x; at < count; at += ELEMENTS * gl_NumWorkGroups.x) {
+    uint piece_size = ELEMENTS * ((count + ELEMENTS * pieces - 1) / (ELEMENTS * pieces));
+    uint begin = piece * piece_size;
+    uint end = min(begin + piece_size, count);
+    for (uint at = begin + ELEMENTS * gl_WorkGroupID.x; at < end; at += ELEMENTS * gl_NumWorkGroups.x) {
         uint of = at + gl_LocalInvocationIndex / LIGHT_LANES;
-        uint i = listed[list * element_count + min(of, count - 1)];
+        uint i = listed[list * element_count + min(of, end - 1)];
         Receiver receiver = load_receiver(first_element + i);
         vec3 normal[RAYS] = vec3[](receiver.normal);
         vec3 sum = vec3(0.0);
@@ -28,7 +31,7 @@ void main() {
         }
         sums[gl_LocalInvocationIndex] = sum;
         barrier();
-        if (lane == 0 && of < count) {
+        if (lane == 0 && of < end) {
             vec3 all = vec3(0.0);
             for (uint k = 0; k < LIGHT_LANES; k++) {
                 all += sums[gl_LocalInvocationIndex + k];

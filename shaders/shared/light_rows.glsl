@@ -51,6 +51,9 @@ layout(push_constant, scalar) uniform Parameters {
     // Elements that are this member's, counted from the first; no form factor is found to others.
     uint own_begin;
     uint own_end;
+    // Which of these pieces of a list the dispatch is for; a survey is of all elements.
+    uint piece;
+    uint pieces;
 };
 
 // 1: lights at a finite distance, whose places are the eye alone.

@@ -35,6 +35,9 @@ layout(push_constant, scalar) uniform Parameters {
     // Elements that are this member's, counted from the first; no form factor is found to others.
     uint own_begin;
     uint own_end;
+    // Which of these pieces of a list the dispatch is for; of shaders that take all of it, the only.
+    uint piece;
+    uint pieces;
 };
 
 // Whether an element of the dispatch is this member's.

@@ -86,6 +86,7 @@ impl SceneBuffers {
         let geometry = |name, words| upload_words(device, name, words, BufferUse::Geometry);
         let storage = |name, words| upload_words(device, name, words, BufferUse::Storage);
         let texels = |name, words| upload_words(device, name, words, BufferUse::Texels);
+        let read = |name, words| upload_words(device, name, words, BufferUse::ReadTexels);
         let blocks = data.blocks_of(shape);
         let [near, near_relief] = data.near_of(shape);
         let lit = &data.lit;
@@ -99,10 +100,10 @@ impl SceneBuffers {
             corners: geometry("corners", &data.corners)?,
             occluder_corners: storage("occluder corners", &data.occluder_corners)?,
             occluder_items: storage("occluder items", &data.occluder_items)?,
-            triangles: texels("triangles", &data.triangles)?,
+            triangles: read("triangles", &data.triangles)?,
             parts: texels("parts", &lit.parts)?,
-            planes: texels("planes", &data.planes)?,
-            balls: texels("balls", &data.balls)?,
+            planes: read("planes", &data.planes)?,
+            balls: read("balls", &data.balls)?,
             receiver_blocks: upload(device, "receiver blocks", &blocks, BufferUse::Storage)?,
             areas: storage("areas", &data.areas)?,
             weights: storage("weights", &data.weights)?,

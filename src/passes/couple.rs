@@ -6,9 +6,9 @@ use std::sync::Arc;
 use super::batch::Batch;
 use super::buffers::{SceneBuffers, upload};
 use super::fresh_rows::FreshRows;
-use super::groups;
 use super::shaders::couple::{Bindings, Parameters, SHADER};
 use super::types::CouplingTarget;
+use super::{by_slots, groups};
 use crate::error::Result;
 use crate::vk::{BoundCompute, Buffer, BufferUse, Commands, ComputePipeline, Device};
 
@@ -17,6 +17,7 @@ pub struct Couple {
     bound: BoundCompute,
     parameters: Parameters,
     slot_count: u32,
+    fresh: FreshRows,
     /// `[slot][word]`.
     pub coupling: Buffer,
 }
@@ -89,6 +90,7 @@ impl Couple {
                 first_meso: shape.first_meso(),
             },
             slot_count: batch.slot_count,
+            fresh: fresh.clone(),
             coupling,
         })
     }
@@ -99,7 +101,14 @@ impl Couple {
     }
 
     pub fn record(&self, cmd: &Commands) {
-        let size = [groups(self.parameters.target_count), self.slot_count, 1];
-        cmd.dispatch(&self.bound, &self.parameters, size);
+        let groups = groups(self.parameters.target_count);
+        by_slots(cmd, &self.fresh, self.slot_count, |first, count| {
+            cmd.dispatch_from(
+                &self.bound,
+                &self.parameters,
+                [0, first, 0],
+                [groups, count, 1],
+            );
+        });
     }
 }

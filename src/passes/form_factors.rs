@@ -16,7 +16,7 @@ use super::shaders::{
     resolve_receivers, sort_receivers, sort_receivers_rays,
 };
 use super::types::ReceiverList;
-use super::{PART_PAIRS, Parts, groups};
+use super::{Parts, groups, pieces};
 use crate::constants::{
     RECEIVE_CROSSED, RECEIVE_DOUBTFUL, RECEIVE_KINDS, RECEIVE_LISTS, SORT_ELEMENTS, SORT_SLOTS,
 };
@@ -143,7 +143,7 @@ impl FormFactors {
         let (face_size, at_once) = match &batch.sight {
             Sight::Hemicubes(hemicubes) => {
                 let elements = rows.shape.plain.count + rows.shape.meso.count;
-                let most = (SORT_RATE * PART_PAIRS / u64::from(elements.max(1))) as u32;
+                let most = (SORT_RATE * rows.part_pairs / u64::from(elements.max(1))) as u32;
                 let most = most.clamp(1, SORT_SLOTS);
                 (hemicubes.face_size, most)
             }
@@ -186,16 +186,24 @@ impl FormFactors {
             block_count: rows.shape.blocks(),
             own_begin: range.span.own[0],
             own_end: range.span.own[1],
+            piece: 0,
+            pieces: 1,
         };
-        let mut parts = Parts::of(PART_PAIRS);
+        let mut parts = Parts::of(rows.part_pairs);
         for first in (0..self.slot_count).step_by(self.at_once as usize) {
             for range in &self.ranges {
                 let slots = first..(first + self.at_once).min(self.slot_count);
                 let pairs = u64::from(range.span.count) * slots.len() as u64;
                 let rate = if self.face_size > 0 { SORT_RATE } else { 1 };
-                parts.step(cmd, pairs / rate);
-                let size = [groups(range.span.count.div_ceil(SORT_ELEMENTS)), 1, 1];
-                cmd.dispatch(&range.sort, &parameters(range, slots), size);
+                let push = parameters(range, slots);
+                let all = groups(range.span.count.div_ceil(SORT_ELEMENTS));
+                let pieces = pieces(pairs / rate, rows.part_pairs);
+                let piece = all.div_ceil(pieces).max(1);
+                for first in (0..all).step_by(piece as usize) {
+                    parts.step(cmd, pairs / rate / u64::from(pieces));
+                    let size = [piece.min(all - first), 1, 1];
+                    cmd.dispatch_from(&range.sort, &push, [first, 0, 0], size);
+                }
             }
         }
         stamp();
@@ -205,9 +213,14 @@ impl FormFactors {
         };
         for range in &self.ranges {
             for &(list, ref resolve) in &range.resolve {
-                for slot in 0..self.slot_count {
-                    parts.step(cmd, range.span.count.into());
-                    let push = parameters(range, slot..slot + 1);
+                // Each takes a piece of what the list holds, and has invocations for all of it.
+                let work = u64::from(range.span.count);
+                let pieces = pieces(work, rows.part_pairs);
+                let all = (0..self.slot_count).flat_map(|slot| (0..pieces).map(move |p| (slot, p)));
+                for (slot, piece) in all {
+                    parts.step(cmd, work / u64::from(pieces));
+                    let mut push = parameters(range, slot..slot + 1);
+                    (push.piece, push.pieces) = (piece, pieces);
                     let at = list_at(slot, list);
                     cmd.dispatch_indirect(resolve, &push, &range.lists.counts, at);
                 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use super::PART_PAIRS;
 use super::buffers::{filled, upload};
 use super::groups;
 use super::types::ReceiverList;
@@ -103,6 +104,9 @@ impl RowShape {
 pub struct FreshRows {
     pub shape: RowShape,
     pub slot_count: u32,
+    /// Elements times sources whose form factors a part of a submission finds, at most; see
+    /// [`super::PART_PAIRS`].
+    pub part_pairs: u64,
     /// `[slot][element]`, of elements without relief.
     pub plain: Buffer,
     /// `[slot][meso element]`, vectors in its frame.
@@ -147,6 +151,11 @@ impl ReceiverLists {
 }
 
 impl FreshRows {
+    /// With parts of submissions of another size.
+    pub fn in_parts(self, part_pairs: u64) -> Self {
+        Self { part_pairs, ..self }
+    }
+
     /// For `slots` sources; `sorts`: with the lists that the `receiver` estimator needs.
     pub fn new(device: &Arc<Device>, shape: RowShape, slots: u32, sorts: bool) -> Result<Self> {
         let lists = |elements: u32| {
@@ -160,6 +169,7 @@ impl FreshRows {
         Ok(Self {
             shape,
             slot_count,
+            part_pairs: PART_PAIRS,
             plain: storage("form factors", 4 * slots * u64::from(shape.plain.count))?,
             meso: storage(
                 "form factors to relief",

@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use super::by_slots;
 use super::fresh_rows::FreshRows;
 use super::kept_rows::KeptRows;
 use super::shaders::{allocate, keep};
@@ -14,6 +15,7 @@ use crate::vk::{BoundCompute, Buffer, BufferUse, Commands, ComputePipeline, Devi
 pub struct Keep {
     allocate: BoundCompute,
     keep: BoundCompute,
+    fresh: FreshRows,
     first: allocate::Parameters,
     then: keep::Parameters,
     /// Where the rows of a batch have been put: [`KeptRow`], `[slot]`.
@@ -55,6 +57,7 @@ impl Keep {
                 fresh: &fresh.plain,
                 fresh_meso: &fresh.meso,
             })?,
+            fresh: fresh.clone(),
             first: allocate::Parameters {
                 slot_count,
                 block_count: shape.blocks(),
@@ -80,6 +83,8 @@ impl Keep {
         cmd.dispatch(&self.allocate, &first, [1, 1, 1]);
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         let groups = self.then.block_count.div_ceil(KEEP_BLOCKS);
-        cmd.dispatch(&self.keep, &self.then, [groups, first.slot_count, 1]);
+        by_slots(cmd, &self.fresh, first.slot_count, |first, count| {
+            cmd.dispatch_from(&self.keep, &self.then, [0, first, 0], [groups, count, 1]);
+        });
     }
 }

@@ -39,6 +39,7 @@ pub mod words;
 
 use crate::constants::GROUP;
 use crate::vk::Commands;
+use fresh_rows::{FreshRows, RowShape};
 
 /// The shaders, each in a module with its words, its bindings and its push constants by name,
 /// which the build writes from the GLSL.
@@ -63,7 +64,29 @@ fn groups(items: u32) -> u32 {
 
 /// Elements times sources whose form factors a part of a submission finds, at most: 0.1 s and more by
 /// lavapipe's two cores.
-const PART_PAIRS: u64 = 1 << 17;
+pub const PART_PAIRS: u64 = 1 << 17;
+
+/// Into how many pieces a step of so much work is cut, where a part takes so much at most.
+fn pieces(work: u64, most: u64) -> u32 {
+    work.div_ceil(most).max(1) as u32
+}
+
+/// Elements times sources that a part keeps or couples, over those whose form factors it finds.
+const KEEP_RATE: u64 = 32;
+
+/// Records a pass over all elements of fresh rows for the slots of one part after another: `each`
+/// gets the first, and how many there are.
+fn by_slots(cmd: &Commands, rows: &FreshRows, slots: u32, mut each: impl FnMut(u32, u32)) {
+    let RowShape { plain, meso } = rows.shape;
+    let work = u64::from(plain.count + meso.count).max(1);
+    let step = (KEEP_RATE * rows.part_pairs / work).clamp(1, slots.max(1).into()) as u32;
+    for first in (0..slots).step_by(step as usize) {
+        if first > 0 {
+            cmd.part();
+        }
+        each(first, step.min(slots - first));
+    }
+}
 
 /// Cuts what is recorded into parts, so that no submission is long enough for a driver to end it.
 struct Parts {

@@ -75,7 +75,8 @@ impl ForDrawing {
         if let Self::Wanted { tree, meso, slots } = self {
             let tree = tree.as_ref();
             *self = Self::Made(DrawingBuffers {
-                fresh: FreshRows::new(device, shape, *slots, Makers::sorts(settings))?,
+                fresh: FreshRows::new(device, shape, *slots, Makers::sorts(settings))?
+                    .in_parts(settings.part_pairs),
                 meso: match &meso[..] {
                     [] => None,
                     own => Some(upload(device, "meso elements", own, BufferUse::Storage)?),

@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::mesh::near::Nearness;
 use crate::mesh::sources::Grouping;
 use crate::meso;
+use crate::passes::PART_PAIRS;
 use crate::passes::cull::Culling;
 
 /// How form factors are taken from the item buffer.
@@ -85,6 +86,9 @@ pub struct Settings {
     /// Triangles that are listed at once for a face of a hemicube, at most; what is left is drawn
     /// after them. None: as many as fit the device's largest buffer. The light is the same.
     pub list_room: Option<u32>,
+    /// Elements times sources of a part of a submission, at most, by about how long that takes: see
+    /// [`crate::passes::PART_PAIRS`].
+    pub part_pairs: u64,
     /// Bytes on the device for the rows of sources that have been drawn. Sources whose rows find no
     /// room are drawn once more. None: [`VISIBILITY_MEMORY`], or a third of the device's memory if
     /// that is less.
@@ -119,6 +123,7 @@ impl Default for Settings {
             merging: true,
             batch: 32,
             list_room: None,
+            part_pairs: PART_PAIRS,
             visibility_memory: None,
             coupling_memory: COUPLING_MEMORY,
             relief: meso::Options::default(),
@@ -181,6 +186,7 @@ impl Settings {
             batch,
             // These do not affect the result.
             list_room: _,
+            part_pairs: _,
             checkpoints: _,
             visibility_memory,
             coupling_memory,

@@ -27,6 +27,9 @@ pub enum BufferUse {
     Texels,
     /// The same, written by its address.
     AddressedTexels,
+    /// Device memory that is read as texels of four words alone, so that it may be larger than the
+    /// device's largest storage buffer.
+    ReadTexels,
     /// Memory that the CPU writes once and the device copies from.
     Upload,
     /// Memory that the CPU writes repeatedly, and that shaders read or that feeds vertices and
@@ -234,7 +237,7 @@ impl BufferUse {
             Self::Geometry => all | F::VERTEX_BUFFER | F::INDEX_BUFFER | F::INDIRECT_BUFFER,
             Self::Stream => all | F::VERTEX_BUFFER | F::INDEX_BUFFER,
             Self::Addressed => all | F::SHADER_DEVICE_ADDRESS,
-            Self::Texels => all | F::UNIFORM_TEXEL_BUFFER,
+            Self::Texels | Self::ReadTexels => all | F::UNIFORM_TEXEL_BUFFER,
             Self::AddressedTexels => all | F::UNIFORM_TEXEL_BUFFER | F::SHADER_DEVICE_ADDRESS,
         }
     }
@@ -245,7 +248,8 @@ impl BufferUse {
             | Self::Geometry
             | Self::Addressed
             | Self::Texels
-            | Self::AddressedTexels => MemoryLocation::GpuOnly,
+            | Self::AddressedTexels
+            | Self::ReadTexels => MemoryLocation::GpuOnly,
             Self::Upload | Self::Stream => MemoryLocation::CpuToGpu,
             Self::Readback => MemoryLocation::GpuToCpu,
         }
@@ -264,7 +268,10 @@ impl BufferUse {
     }
 
     fn is_read_as_texels(self) -> bool {
-        matches!(self, Self::Texels | Self::AddressedTexels)
+        matches!(
+            self,
+            Self::Texels | Self::AddressedTexels | Self::ReadTexels
+        )
     }
 }
 

@@ -98,6 +98,7 @@ impl ComputePipeline {
                 .push_next(&mut size);
         }
         let info = vk::ComputePipelineCreateInfo::default()
+            .flags(vk::PipelineCreateFlags::DISPATCH_BASE)
             .stage(stage)
             .layout(layout);
         // SAFETY: module, layout and constants outlive the call.

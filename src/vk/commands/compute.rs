@@ -8,15 +8,27 @@ use crate::vk::{BoundCompute, Buffer, ShaderParameters};
 impl Commands {
     /// Dispatches `groups` workgroups; nothing is recorded where there are none.
     pub fn dispatch<P: ShaderParameters>(&self, bound: &BoundCompute, push: &P, groups: [u32; 3]) {
+        self.dispatch_from(bound, push, [0; 3], groups);
+    }
+
+    /// Dispatches `groups` workgroups of a larger number, of which `first` is the first.
+    pub fn dispatch_from<P: ShaderParameters>(
+        &self,
+        bound: &BoundCompute,
+        push: &P,
+        first: [u32; 3],
+        groups: [u32; 3],
+    ) {
         if groups.contains(&0) {
             return;
         }
         self.bind_compute(bound, push);
-        // SAFETY: a pipeline with its set and constants is bound.
+        let ([x, y, z], [width, height, depth]) = (first, groups);
+        // SAFETY: a pipeline with its set and constants is bound, made for any first group.
         unsafe {
             self.device
                 .raw
-                .cmd_dispatch(self.raw(), groups[0], groups[1], groups[2]);
+                .cmd_dispatch_base(self.raw(), x, y, z, width, height, depth);
         }
     }
 
