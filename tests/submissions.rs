@@ -62,7 +62,12 @@ fn the_size_of_parts_changes_no_light() {
 #[test]
 #[ignore = "long: runs by scripts/test --all"]
 fn what_is_submitted_comes_in_parts() {
-    for (name, patches) in [("cornell", 100_000), ("cornell-relief", 40_000)] {
+    for (name, patches, shots) in [
+        ("cornell", 100_000, None),
+        ("cornell-relief", 40_000, None),
+        // Emitters, which take longest, and some others.
+        ("cornell", 1_000_000, Some(50)),
+    ] {
         let device = device();
         let options = LoadOptions {
             patches: Some(patches),
@@ -72,6 +77,7 @@ fn what_is_submitted_comes_in_parts() {
         device.time_parts();
         let settings = Settings {
             residual: 0.05,
+            shots,
             ..Settings::default()
         };
         let solver = solve(&device, &scene, &settings, None, |_| true).expect("it is solved");
