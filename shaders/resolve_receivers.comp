@@ -48,10 +48,10 @@ void main() {
     uint first_eye = eye_starts[source];
     uint stride = (eye_starts[source + 1] - first_eye) / EYES;
     uint lane = gl_LocalInvocationIndex % LANES_EACH;
-    uint piece_size = ELEMENTS * ((count + ELEMENTS * pieces - 1) / (ELEMENTS * pieces));
-    uint begin = piece * piece_size;
-    uint end = min(begin + piece_size, count);
-    for (uint at = begin + ELEMENTS * gl_WorkGroupID.x; at < end; at += ELEMENTS * gl_NumWorkGroups.x) {
+    uvec2 range = piece_of(count, ELEMENTS, piece, pieces);
+    uint end = range.y;
+    uint step_size = ELEMENTS * gl_NumWorkGroups.x;
+    for (uint at = range.x + ELEMENTS * gl_WorkGroupID.x; at < end; at += step_size) {
         // The lanes past the end do as the last one does.
         uint of = at + gl_LocalInvocationIndex / LANES_EACH;
         uint i = listed[list * element_count + min(of, end - 1)];

@@ -48,7 +48,7 @@ fn solved(name: &str, patches: Option<usize>, part_pairs: Option<u64>) -> (Vec<u
 /// at by rays, and in one with relief, a sun and a sky.
 #[test]
 fn the_size_of_parts_changes_no_light() {
-    for (name, patches) in [("cornell", Some(3000)), ("brick-wall", None)] {
+    for (name, patches) in [("cornell", Some(6000)), ("brick-wall", None)] {
         let (whole, few) = solved(name, patches, None);
         let (cut, many) = solved(name, patches, Some(500));
         println!("{name}: {few} and {many} parts");

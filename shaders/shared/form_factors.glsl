@@ -268,8 +268,12 @@ FLUX mean_form_factor(uint element, vec4 ball, vec3 n, Source s) {
 
 void main() {
     uint list = first_slot * RECEIVE_LISTS + KIND;
+    uvec2 range = piece_of(lists[list].count, GROUP, piece, pieces);
+    if (range.x + GROUP * gl_WorkGroupID.x >= range.y) {
+        return;
+    }
     // The lanes past the end do as the last one does.
-    uint at = min(gl_GlobalInvocationID.x, lists[list].count - 1);
+    uint at = min(range.x + gl_GlobalInvocationID.x, range.y - 1);
     uint word = listed[list * element_count + at];
     uint i = bitfieldExtract(word, 0, int(LISTED_BITS));
     // The share of the source that it sees.

@@ -12,10 +12,10 @@ void main() {
     uint count = lists[list].count;
     uint lane = gl_LocalInvocationIndex % LIGHT_LANES;
     Light light = load_light(slots[slot].source);
-    uint piece_size = ELEMENTS * ((count + ELEMENTS * pieces - 1) / (ELEMENTS * pieces));
-    uint begin = piece * piece_size;
-    uint end = min(begin + piece_size, count);
-    for (uint at = begin + ELEMENTS * gl_WorkGroupID.x; at < end; at += ELEMENTS * gl_NumWorkGroups.x) {
+    uvec2 range = piece_of(count, ELEMENTS, piece, pieces);
+    uint end = range.y;
+    uint stride = ELEMENTS * gl_NumWorkGroups.x;
+    for (uint at = range.x + ELEMENTS * gl_WorkGroupID.x; at < end; at += stride) {
         uint of = at + gl_LocalInvocationIndex / LIGHT_LANES;
         uint i = listed[list * element_count + min(of, end - 1)];
         Receiver receiver = load_receiver(first_element + i);

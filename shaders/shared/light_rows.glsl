@@ -6,6 +6,7 @@
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_vote : require
 #extension GL_KHR_shader_subgroup_ballot : require
+#include "shared/pieces.glsl"
 #include "shared/types.glsl"
 #include "shared/texels.glsl"
 #include "shared/kept.glsl"

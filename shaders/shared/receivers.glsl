@@ -6,6 +6,7 @@
 #include "shared/types.glsl"
 #include "shared/hemicube.glsl"
 #include "shared/texels.glsl"
+#include "shared/pieces.glsl"
 
 layout(local_size_x = GROUP) in;
 
@@ -35,7 +36,7 @@ layout(push_constant, scalar) uniform Parameters {
     // Elements that are this member's, counted from the first; no form factor is found to others.
     uint own_begin;
     uint own_end;
-    // Which of these pieces of a list the dispatch is for; of shaders that take all of it, the only.
+    // Which of these pieces of a list the dispatch is for; sorting is of all elements.
     uint piece;
     uint pieces;
 };

@@ -195,6 +195,7 @@ mod tests {
             stored_texels: false,
             heap_bytes: 16 << 30,
             max_image_side: 16384,
+            max_workgroups: 65_535,
             subgroup_size: 8,
             subpixel_bits: 8,
             timestamp_period: 1.0,

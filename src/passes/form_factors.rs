@@ -42,6 +42,9 @@ pub struct Care {
 /// Pairs that are sorted by item buffers in the time in which rays sort one.
 const SORT_RATE: u64 = 4;
 
+/// Elements of a piece of a list whose form factors are found, over those that rays look at.
+const FORM_FACTOR_RATE: u64 = 8;
+
 /// Bound to a batch.
 pub struct FormFactors {
     /// Elements without relief, and in scenes that have some those with it.
@@ -230,10 +233,14 @@ impl FormFactors {
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         // Every element is in one list of a slot at most.
         for range in &self.ranges {
-            for slot in 0..self.slot_count {
-                parts.step(cmd, range.span.count.into());
+            let work = u64::from(range.span.count);
+            let pieces = pieces(work, FORM_FACTOR_RATE * rows.part_pairs);
+            let all = (0..self.slot_count).flat_map(|slot| (0..pieces).map(move |p| (slot, p)));
+            for (slot, piece) in all {
+                parts.step(cmd, work / u64::from(pieces));
                 for (kind, form_factors) in (0..).zip(&range.form_factors) {
-                    let push = parameters(range, slot..slot + 1);
+                    let mut push = parameters(range, slot..slot + 1);
+                    (push.piece, push.pieces) = (piece, pieces);
                     let at = list_at(slot, kind);
                     cmd.dispatch_indirect(form_factors, &push, &range.lists.counts, at);
                 }

@@ -17,6 +17,7 @@ use super::relief_light::ReliefSums;
 use super::row_maker::RowParts;
 use super::shares::Share;
 use super::{Settings, VISIBILITY_MEMORY};
+use crate::constants::GROUP;
 use crate::error::{Error, Result};
 use crate::passes::buffers::{SceneBuffers, State, download_parts, upload};
 use crate::passes::fresh_rows::{FreshRows, RowShape};
@@ -109,6 +110,7 @@ impl Member {
         } = own;
         let settings = &data.settings;
         let shape = share.shape;
+        check_room(device, shape)?;
         let scene = SceneBuffers::new(device, &data.scene, shape)?;
         let state = State::new(device, &scene)?;
         let relief = (data.relief.as_ref())
@@ -369,6 +371,21 @@ impl Member {
 
 fn is_made(makers: &Makers, kind: RowKind) -> bool {
     kind == RowKind::Common || makers.kinds().contains(&kind)
+}
+
+/// A pass takes a workgroup for each block of elements.
+fn check_room(device: &Device, shape: RowShape) -> Result<()> {
+    let most = u64::from(GROUP) * u64::from(device.limits().max_workgroups);
+    let count = u64::from(shape.plain.count.max(shape.meso.count));
+    if count > most {
+        let what = format!(
+            "{count} elements, more than the {most} that {} finds: fewer by --patches, or several \
+             devices",
+            device.name()
+        );
+        return Err(Error::Usage(what));
+    }
+    Ok(())
 }
 
 fn unprepared() -> Error {

@@ -1,4 +1,4 @@
-//! What the first member of a team tells the others, and what they answer.
+//! Commands of the first member of a team, and the replies to them.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};

@@ -63,8 +63,8 @@ fn halves(planes: &mut [u8]) -> [&mut [u8]; 2] {
     <[&mut [u8]; 2]>::from(planes.split_at_mut(middle))
 }
 
-/// The inverse of [`pack`], of as many item buffers as there are, each of `count` items: `each` gets
-/// which of them it is, a run of places in it, and their item.
+/// The inverse of [`pack`], of item buffers of `count` items each. `each` gets the number of the
+/// buffer, a run of places in it, and their item. Returns how many buffers there were.
 ///
 /// # Errors
 /// Anything that [`pack`] does not make.

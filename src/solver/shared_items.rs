@@ -130,8 +130,8 @@ impl SharedItems {
         exchange.give(Gift::Items, packed)
     }
 
-    /// Brings the item buffers of all to the device, for the commands that [`Self::take_in`] records
-    /// for `set`.
+    /// Brings the item buffers of all members to the device, for the commands of `set`: see
+    /// [`Self::take_in`].
     pub fn collect(
         &mut self,
         asked: &Asked,

@@ -69,6 +69,8 @@ pub struct Limits {
     /// Whether shaders read texels from storage, since texel buffers hold too few.
     pub stored_texels: bool,
     pub max_image_side: u32,
+    /// Of a dispatch, along x.
+    pub max_workgroups: u32,
     pub subgroup_size: u32,
     /// Fractional bits of a rasterised vertex's position, in pixels.
     pub subpixel_bits: u32,
@@ -321,6 +323,7 @@ impl Limits {
             },
             stored_texels,
             max_image_side: candidate.max_image_side,
+            max_workgroups: candidate.max_workgroups,
             subgroup_size: candidate.subgroup_size,
             subpixel_bits: limits.sub_pixel_precision_bits.clamp(4, 16),
             timestamp_period: f64::from(limits.timestamp_period),

@@ -67,6 +67,8 @@ pub struct Candidate {
     pub heap_bytes: u64,
     pub max_storage_buffer_range: u64,
     pub max_image_side: u32,
+    /// Of a dispatch, along x.
+    pub max_workgroups: u32,
     pub subgroup_size: u32,
     rank: u8,
 }
@@ -257,6 +259,7 @@ impl Instance {
                 .unwrap_or(0),
             max_storage_buffer_range: u64::from(base.limits.max_storage_buffer_range),
             max_image_side: base.limits.max_image_dimension2_d,
+            max_workgroups: base.limits.max_compute_work_group_count[0],
             subgroup_size: support.subgroup_size,
             rank,
         }
