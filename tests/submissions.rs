@@ -5,22 +5,26 @@ mod common;
 
 use common::{assert_silent, device, own_device};
 use mesolux::bake::{solution, solve};
-use mesolux::render::{Lighting, View, render};
-use mesolux::scene::{LoadOptions, load};
+use mesolux::render::{Cuts, Lighting, Renderer, SAMPLES, Show, View};
+use mesolux::scene::{LoadOptions, Scene, load};
 use mesolux::solver::Settings;
 
 /// Elements times sources of a part that makes rows, at most.
 const PAIRS: u64 = 1 << 17;
 
-/// Light, and parts that make rows.
-fn solved(name: &str, patches: Option<usize>, part_pairs: Option<u64>) -> (Vec<u32>, usize) {
-    let device = own_device();
-    device.time_parts();
+fn loaded(name: &str, patches: Option<usize>) -> Scene {
     let options = LoadOptions {
         patches,
         ..LoadOptions::default()
     };
-    let scene = load(name, &options).expect("it is built in");
+    load(name, &options).expect("it is built in")
+}
+
+/// Light, and parts that make rows.
+fn solved(name: &str, patches: Option<usize>, part_pairs: Option<u64>) -> (Vec<u32>, usize) {
+    let device = own_device();
+    device.time_parts();
+    let scene = loaded(name, patches);
     let settings = Settings {
         shots: Some(40),
         ..Settings::default()
@@ -59,6 +63,58 @@ fn the_size_of_parts_changes_no_light() {
     assert_silent();
 }
 
+/// A tile draws only what reaches into it, and is cut where that is much: the picture stays, of
+/// plain triangles, of relief and of what counts its fragments.
+#[test]
+fn the_cuts_of_draws_change_no_picture() {
+    let scene = loaded("cornell-relief", Some(8000));
+    let device = own_device();
+    device.time_parts();
+    let solver = solve(&device, &scene, &Settings::default(), None, |_| true).expect("solved");
+    let solution = solution(&scene, &solver).expect("it comes back");
+    let view = View {
+        camera: &scene.cameras[0],
+        width: 320,
+        height: 200,
+    };
+    for show in [Show::Shaded, Show::Overdraw] {
+        let lighting = Lighting {
+            show,
+            ..Lighting::from(&solution)
+        };
+        let mut renderer =
+            Renderer::new(&device, &scene, lighting, &view, SAMPLES).expect("a view");
+        let mut picture = |cuts| {
+            renderer.cuts = cuts;
+            device.time_parts();
+            let picture = renderer.picture().expect("it is drawn");
+            let bits: Vec<[u32; 3]> = picture
+                .radiance
+                .iter()
+                .map(|rgb| rgb.map(f32::to_bits))
+                .collect();
+            (bits, device.timed_parts().0["shade"].0, renderer.drawn())
+        };
+        let cuts = Cuts::default();
+        let (whole, few, [_, all]) = picture(Cuts {
+            by_tile: false,
+            ..cuts
+        });
+        let (by_tile, same, [drawn, _]) = picture(cuts);
+        let (cut, many, _) = picture(Cuts {
+            part_indices: 1000,
+            ..cuts
+        });
+        println!("{drawn} of {all} triangles, {few} and {many} parts");
+        assert!(drawn < all / 4, "{drawn} of {all}");
+        // The first time something is uploaded too.
+        assert!(same <= few && many > 2 * few, "{few}, {same}, {many}");
+        assert!(whole == by_tile, "another picture by tile");
+        assert!(whole == cut, "another picture in parts");
+    }
+    assert_silent();
+}
+
 #[test]
 #[ignore = "long: runs by scripts/test --all"]
 fn what_is_submitted_comes_in_parts() {
@@ -69,11 +125,7 @@ fn what_is_submitted_comes_in_parts() {
         ("cornell", 1_000_000, Some(50)),
     ] {
         let device = device();
-        let options = LoadOptions {
-            patches: Some(patches),
-            ..LoadOptions::default()
-        };
-        let scene = load(name, &options).expect("it is built in");
+        let scene = loaded(name, Some(patches));
         device.time_parts();
         let settings = Settings {
             residual: 0.05,
@@ -87,11 +139,14 @@ fn what_is_submitted_comes_in_parts() {
             width: 640,
             height: 480,
         };
-        render(&device, &scene, Lighting::from(&solution), &view).expect("it is drawn");
+        let lighting = Lighting::from(&solution);
+        let renderer = Renderer::new(&device, &scene, lighting, &view, SAMPLES).expect("a view");
+        renderer.picture().expect("it is drawn");
+        let [drawn, of] = renderer.drawn();
         let mut parts: Vec<_> = device.timed_parts().0.into_iter().collect();
         parts.sort_by_key(|(_, (_, longest))| std::cmp::Reverse(*longest));
         println!(
-            "{name}, {patches} elements, {} sources",
+            "{name}, {patches} elements, {} sources; tiles draw {drawn} of {of} triangles",
             solver.report().sources
         );
         for (name, (count, longest)) in parts.iter().take(12) {
@@ -105,7 +160,7 @@ fn what_is_submitted_comes_in_parts() {
         };
         let least = solver.report().kept_sources * patches as u64 / PAIRS;
         assert!(count("make rows") >= least, "{least}");
-        assert!(count("shade") >= 12 * 9, "tiles of 56 pixels");
+        assert!(count("shade") >= 16 * 12, "tiles of 40 pixels");
     }
     assert_silent();
 }

@@ -20,6 +20,7 @@ pub mod near_marks;
 pub mod near_rows;
 pub mod near_to_relief;
 pub mod occluder_tree;
+pub mod pass_parts;
 pub mod receiver_blocks;
 pub mod relief;
 pub mod relief_buffers;

@@ -3,12 +3,14 @@
 //! `relief_hits.frag`, `shared/relief_hit.glsl`, `shared/height_march.glsl`, whose twin is
 //! [`crate::reference::relief_rays`].
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use super::buffers::upload;
+use super::pass_parts::{PartedPass, PassParts};
 use super::shade::Target;
 use super::shaders::relief_hits::{Bindings, SHADER};
 use super::types::{HeightTile, Prism, ReliefSurface};
@@ -50,11 +52,20 @@ pub struct ShapeBuffers {
     pub(super) pyramids: Buffer,
     vertices: Buffer,
     indices: Buffer,
-    index_count: u32,
+}
+
+/// The prisms that a tile may show, and in which parts they are drawn.
+pub struct Drawn {
+    pub prisms: Vec<Range<u32>>,
+    pub parameters: Parameters,
+    /// Indices of a part of the submission, at most.
+    pub part_indices: u32,
 }
 
 pub struct ReliefHits {
     pass: RenderPass,
+    /// For the parts after the first.
+    further: RenderPass,
     pipeline: GraphicsPipeline,
 }
 
@@ -84,11 +95,15 @@ impl ReliefHits {
     /// A device that fails.
     pub fn new(device: &Arc<Device>, shading: u32) -> Result<Self> {
         let hits = Attachment::read_by_shaders(FORMAT);
-        let pass = RenderPass::keeping_depths(device, "relief hits", hits)?;
+        let [pass, further] = RenderPass::in_parts(device, "relief hits", hits)?;
         let constants = [shading];
         let state = prisms("relief hits", &SHADER, &constants);
         let pipeline = GraphicsPipeline::new(device, &pass, &state)?;
-        Ok(Self { pass, pipeline })
+        Ok(Self {
+            pass,
+            further,
+            pipeline,
+        })
     }
 
     /// Where hits over the depths of a target are found.
@@ -117,15 +132,21 @@ impl ReliefHits {
         &self,
         cmd: &Commands,
         hits: &Hits,
-        (width, height): (u32, u32),
+        size: (u32, u32),
         set: &DescriptorSet,
         shape: &ShapeBuffers,
-        parameters: &Parameters,
+        drawn: &Drawn,
     ) {
-        cmd.begin_render_pass(&self.pass, &hits.framebuffer, [0; 4]);
-        cmd.viewport(0, 0, width, height);
-        shape.draw(cmd, &self.pipeline, set, parameters);
-        cmd.end_render_pass();
+        let parts = PassParts {
+            passes: [&self.pass, &self.further],
+            framebuffer: &hits.framebuffer,
+            size,
+            clear: [0; 4],
+            indices: drawn.part_indices,
+        };
+        let mut pass = PartedPass::begin(cmd, parts);
+        shape.draw(&mut pass, &self.pipeline, set, drawn);
+        pass.end();
     }
 }
 
@@ -187,7 +208,6 @@ impl ShapeBuffers {
             pyramids: upload(device, "relief pyramids", shape.pyramids, texels)?,
             vertices: upload(device, "relief vertices", &vertices, drawn)?,
             indices: upload(device, "relief indices", &indices, drawn)?,
-            index_count: indices.len() as u32,
         })
     }
 
@@ -200,17 +220,23 @@ impl ShapeBuffers {
         }
     }
 
-    /// Draws all prisms within the render pass that is under way.
+    /// Draws prisms within the render pass that is under way.
     pub(super) fn draw(
         &self,
-        cmd: &Commands,
+        pass: &mut PartedPass<'_>,
         pipeline: &GraphicsPipeline,
         set: &DescriptorSet,
-        parameters: &Parameters,
+        drawn: &Drawn,
     ) {
-        cmd.bind_indices(&self.indices);
-        cmd.bind_graphics(pipeline, set, Some(&self.vertices));
-        cmd.push_graphics(pipeline, parameters);
-        cmd.draw_indexed(0, self.index_count);
+        let of_prism = HULL.len() as u32;
+        let indices = drawn
+            .prisms
+            .iter()
+            .map(|run| of_prism * run.start..of_prism * run.end);
+        pass.draw(indices, |cmd| {
+            cmd.bind_indices(&self.indices);
+            cmd.bind_graphics(pipeline, set, Some(&self.vertices));
+            cmd.push_graphics(pipeline, &drawn.parameters);
+        });
     }
 }

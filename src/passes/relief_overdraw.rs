@@ -3,11 +3,12 @@
 
 use std::sync::Arc;
 
-use super::relief_hits::{self, Parameters, ShapeBuffers};
+use super::pass_parts::PartedPass;
+use super::relief_hits::{self, Drawn, ShapeBuffers};
 use super::shade::Shade;
 use super::shaders::relief_overdraw::SHADER;
 use crate::error::Result;
-use crate::vk::{Blending, Commands, DescriptorSet, Device, GraphicsPipeline, GraphicsState};
+use crate::vk::{Blending, DescriptorSet, Device, GraphicsPipeline, GraphicsState};
 
 pub struct ReliefOverdraw {
     pipeline: GraphicsPipeline,
@@ -39,11 +40,11 @@ impl ReliefOverdraw {
     /// under way.
     pub fn record(
         &self,
-        cmd: &Commands,
+        pass: &mut PartedPass<'_>,
         set: &DescriptorSet,
         shape: &ShapeBuffers,
-        parameters: &Parameters,
+        drawn: &Drawn,
     ) {
-        shape.draw(cmd, &self.pipeline, set, parameters);
+        shape.draw(pass, &self.pipeline, set, drawn);
     }
 }

@@ -2,12 +2,14 @@
 //! [`crate::reference::shade`]. What comes straight from light points is compared with
 //! [`crate::path_tracer`].
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 
 use super::buffers::upload;
+use super::pass_parts::{PartedPass, PassParts};
 use super::shaders::shade::{Bindings, SHADER};
 use super::shadow_rays::{LightBuffers, LightCounts};
 use super::types::LitTriangle;
@@ -72,11 +74,10 @@ impl Parameters {
     }
 }
 
-/// A run of vertices of one material.
-#[derive(Clone, Copy)]
+/// Runs of vertices of one material.
+#[derive(Clone)]
 pub struct Draw<'a> {
-    pub first_vertex: u32,
-    pub vertex_count: u32,
+    pub vertices: Vec<Range<u32>>,
     pub texture: &'a DescriptorSet,
     /// LIT_… of [`crate::constants`].
     pub lit: u32,
@@ -89,6 +90,8 @@ pub struct Shade {
     pass: RenderPass,
     /// The same over depths that another pass has drawn.
     over_depths: RenderPass,
+    /// For the parts after the first.
+    further: RenderPass,
     /// `[LIT_…]`
     lit: [GraphicsPipeline; 3],
     /// For draws that add; None unless asked for.
@@ -116,7 +119,7 @@ impl Shade {
     /// A device that fails.
     pub fn new(device: &Arc<Device>, adds: bool, beams: bool) -> Result<Self> {
         let colour = Attachment::copied(FORMAT);
-        let pass = RenderPass::new(device, "shade", colour)?;
+        let [pass, further] = RenderPass::in_parts(device, "shade", colour)?;
         let over_depths = RenderPass::over_depths(device, "shade", colour)?;
         let attribute = |format, offset: usize| VertexAttribute {
             format,
@@ -158,6 +161,7 @@ impl Shade {
             lit: [lit(LIT_NOT)?, lit(LIT_OPEN)?, lit(LIT_IN_PARTS)?],
             adding: adding.transpose()?,
             over_depths,
+            further,
             pass,
         })
     }
@@ -203,7 +207,7 @@ impl Shade {
         cmd: &Commands,
         target: &Target,
         mesh: &Mesh<'_>,
-        first: impl FnOnce(),
+        first: impl FnOnce(&mut PartedPass<'_>),
         draws: impl Iterator<Item = Draw<'a>>,
         drawn: impl FnOnce(),
     ) {
@@ -212,20 +216,27 @@ impl Shade {
             true => &self.over_depths,
             false => &self.pass,
         };
-        cmd.begin_render_pass(pass, &target.framebuffer, clear);
-        cmd.viewport(0, 0, mesh.size.0, mesh.size.1);
-        first();
-        cmd.bind_indices(mesh.indices);
+        let parts = PassParts {
+            passes: [pass, &self.further],
+            framebuffer: &target.framebuffer,
+            size: mesh.size,
+            clear,
+            indices: mesh.part_indices,
+        };
+        let mut pass = PartedPass::begin(cmd, parts);
+        first(&mut pass);
         for draw in draws {
             let pipeline = match (draw.adds, &self.adding) {
                 (true, Some(adding)) => adding,
                 _ => &self.lit[draw.lit as usize],
             };
-            cmd.bind_graphics(pipeline, draw.texture, Some(mesh.vertices));
-            cmd.push_graphics(pipeline, &draw.parameters);
-            cmd.draw_indexed(draw.first_vertex, draw.vertex_count);
+            pass.draw(draw.vertices, |cmd| {
+                cmd.bind_indices(mesh.indices);
+                cmd.bind_graphics(pipeline, draw.texture, Some(mesh.vertices));
+                cmd.push_graphics(pipeline, &draw.parameters);
+            });
         }
-        cmd.end_render_pass();
+        pass.end();
         drawn();
         cmd.copy_image_to_buffer(&target.colour, &target.readback);
         cmd.barrier(&[Stage::Transfer], &[Stage::Host]);
@@ -242,6 +253,8 @@ pub struct Mesh<'a> {
     pub background: f32,
     /// Whether the target's depths are those of another pass.
     pub over_depths: bool,
+    /// Indices of a part of the submission, at most.
+    pub part_indices: u32,
 }
 
 impl Target {

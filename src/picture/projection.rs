@@ -89,6 +89,20 @@ impl Projection {
         (w + x * (across / x.length_squared()) + y * (down / y.length_squared())).normalize()
     }
 
+    /// Column and row, pixels from the top left corner, of a place that is so far from the eye,
+    /// internal units; none behind the near plane.
+    pub fn place(&self, from_eye: Vec3) -> Option<[f64; 2]> {
+        let [x, y, w] = self.rows.map(|row| row.dot(from_eye.as_dvec3()));
+        // Half, since a device rounds.
+        let is_before = w >= 0.5 * f64::from(NEAR);
+        is_before.then(|| {
+            [
+                0.5 * (x / w + 1.0) * self.size[0],
+                0.5 * (y / w + 1.0) * self.size[1],
+            ]
+        })
+    }
+
     /// Angle of one of `samples` samples along a pixel's side in the picture's middle, radians.
     pub fn sample_angle(&self, samples: u32) -> f32 {
         // Half of the picture's height is 1 / |y| at a distance of 1.

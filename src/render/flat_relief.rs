@@ -81,6 +81,7 @@ impl Sorting<'_> {
             lighting,
             projection,
             samples,
+            ..
         } = *self.seen;
         let surface = self.kept.surface_of[e];
         let tile = self.kept.tiles.get(surface as usize)?;

@@ -1,17 +1,19 @@
 //! The triangles of the shade pass: fronts by material, and backs.
 
 use std::f32::consts::PI;
+use std::ops::Range;
 use std::sync::Arc;
 
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::blocks::Blocks;
 use super::flat_relief::FlatRelief;
 use super::seen_scene::SeenScene;
 use super::shafts::Shafts;
 use super::textures::Bound;
-use super::{Joined, Light, Lighting, Show, corner_irradiance, parts};
+use super::{Cuts, Joined, Light, Lighting, Show, corner_irradiance, parts};
 use crate::constants::{LIT_IN_PARTS, LIT_NOT, LIT_OPEN, PART_HIDDEN, PART_OPEN, PART_UNSURE};
 use crate::error::Result;
 use crate::mesh::corners::Corners;
@@ -34,6 +36,7 @@ pub struct Mesh {
     /// Number of parts of lit triangles, `[PART_…]`.
     pub parts: [usize; 3],
     ranges: Vec<KindRange>,
+    blocks: Blocks,
 }
 
 /// Drawn triangles of one kind.
@@ -41,10 +44,8 @@ struct KindRange {
     kind: Kind,
     /// LIT_…
     lit: u32,
-    /// First vertex.
-    first: u32,
-    /// Number of vertices.
-    count: u32,
+    /// Drawn triangles.
+    triangles: Range<u32>,
 }
 
 /// A drawn triangle; ordered by kind, then by index.
@@ -165,15 +166,15 @@ impl Mesh {
         let mut ranges = Vec::new();
         let mut first = 0;
         for same in places.chunk_by(|&a, &b| kind(a) == kind(b)) {
-            let count = 3 * same.len() as u32;
+            let end = first + same.len() as u32;
             let (kind, lit) = kind(same[0]);
+            let triangles = first..end;
             ranges.push(KindRange {
                 kind,
                 lit,
-                first,
-                count,
+                triangles,
             });
-            first += count;
+            first = end;
         }
         let vertices: Vec<Vertex> = places
             .iter()
@@ -185,6 +186,7 @@ impl Mesh {
         }
         let fronts = order.iter().filter(|drawn| drawn.kind.is_lit()).count();
         let indices: Vec<u32> = (0..vertices.len() as u32).collect();
+        let corners: Vec<Vec3> = vertices.iter().map(|vertex| vertex.position).collect();
         Ok(Self {
             vertices: upload(device, "shade vertices", &vertices, BufferUse::Geometry)?,
             indices: upload(device, "shade indices", &indices, BufferUse::Geometry)?,
@@ -192,10 +194,17 @@ impl Mesh {
             parts: lit.parts,
             lit: LitBuffers::new(device, &lit.triangles, &lit.states)?,
             ranges,
+            blocks: Blocks::new(projection, &corners, 3),
         })
     }
 
-    /// Draws of one tile, lit straight by so many lights.
+    /// Triangles that a tile draws, and all.
+    pub fn drawn(&self, tile: Tile, cuts: Cuts) -> [usize; 2] {
+        let ranges = self.ranges.iter().map(|range| &range.triangles);
+        self.blocks.drawn(ranges, tile, cuts)
+    }
+
+    /// Draws of what one tile may show, lit straight by so many lights.
     pub fn draws<'a>(
         &'a self,
         seen: &SeenScene<'a>,
@@ -205,11 +214,15 @@ impl Mesh {
     ) -> impl Iterator<Item = Draw<'a>> {
         let rows = seen.projection.rows(tile);
         let corner = tile.corner(seen.samples);
-        let (scene, lighting) = (seen.scene, seen.lighting);
+        let (scene, lighting, cuts) = (seen.scene, seen.lighting, seen.cuts);
         let parameters = move |material| parameters(rows, material, lighting);
+        let shown = move |range: &KindRange| {
+            let runs = self.blocks.shown(range.triangles.clone(), tile, cuts);
+            let vertices = runs.into_iter().map(|run| 3 * run.start..3 * run.end);
+            vertices.collect()
+        };
         self.ranges.iter().map(move |range| Draw {
-            first_vertex: range.first,
-            vertex_count: range.count,
+            vertices: shown(range),
             lit: range.lit,
             texture: match range.kind {
                 Kind::Front(m) if lighting.show.is_coloured() => textures.of_material(m),

@@ -9,6 +9,7 @@
 //! ```
 
 mod background;
+mod blocks;
 mod compare;
 mod flat_relief;
 mod flip;
@@ -34,7 +35,7 @@ pub use compare::{Comparison, side_by_side};
 pub use flip::{Flip, PIXELS_PER_DEGREE, ldr};
 pub use lighting::{Direct, Lighting, ReliefShading, Show};
 pub use overdraw::Overdraw;
-pub use renderer::Renderer;
+pub use renderer::{Cuts, Renderer};
 pub use slots::slot_colour;
 #[cfg(feature = "window")]
 pub(crate) use textures::upload as upload_texture;

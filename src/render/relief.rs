@@ -10,8 +10,9 @@ use super::seen_scene::SeenScene;
 use super::shafts::Shafts;
 use super::textures::Textures;
 use crate::error::Result;
+use crate::passes::pass_parts::PartedPass;
 use crate::passes::relief::{Draw, Parameters};
-use crate::passes::relief_hits::{self, Hits};
+use crate::passes::relief_hits::{self, Drawn, Hits};
 use crate::passes::shade::Target;
 use crate::passes::shadow_rays::{LightBuffers, LightCounts};
 use crate::picture::Tile;
@@ -100,8 +101,8 @@ impl Relief {
             return false;
         };
         let size = (tile.width * seen.samples, tile.height * seen.samples);
-        let (shape, parameters) = (&self.mesh.shape, self.rays(seen, tile));
-        finding.record(cmd, hits, size, &self.set, shape, &parameters);
+        let drawn = self.drawn(seen, tile);
+        finding.record(cmd, hits, size, &self.set, &self.mesh.shape, &drawn);
         true
     }
 
@@ -109,6 +110,7 @@ impl Relief {
     pub fn record(
         &self,
         cmd: &Commands,
+        pass: &mut PartedPass<'_>,
         seen: &SeenScene<'_>,
         tile: Tile,
         target: &ReliefTarget,
@@ -117,8 +119,8 @@ impl Relief {
         let shading = match &*self.passes {
             ReliefPasses::Shaded(_, shading) => shading,
             ReliefPasses::Overdraw(overdraw) => {
-                let parameters = self.rays(seen, tile);
-                return overdraw.record(cmd, &self.set, &self.mesh.shape, &parameters);
+                let drawn = self.drawn(seen, tile);
+                return overdraw.record(pass, &self.set, &self.mesh.shape, &drawn);
             }
         };
         let rows = seen.projection.rows(tile);
@@ -151,6 +153,15 @@ impl Relief {
             }
         });
         shading.record(cmd, draws);
+    }
+
+    fn drawn(&self, seen: &SeenScene<'_>, tile: Tile) -> Drawn {
+        let all = 0..self.mesh.prism_count;
+        Drawn {
+            prisms: self.mesh.blocks.shown(all, tile, seen.cuts),
+            parameters: self.rays(seen, tile),
+            part_indices: seen.cuts.part_indices,
+        }
     }
 
     fn rays(&self, seen: &SeenScene<'_>, tile: Tile) -> relief_hits::Parameters {

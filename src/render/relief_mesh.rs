@@ -9,12 +9,13 @@ use bytemuck::Zeroable;
 use glam::{DVec2, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
+use super::blocks::Blocks;
 use super::flat_relief::{FlatRelief, Sorting};
 use super::relief_scene::ReliefScene;
 use super::seen_scene::SeenScene;
 use super::shafts::{Shafts, Starts};
 use super::slots::slot_colour;
-use super::{Light, Lighting, ReliefShading};
+use super::{Cuts, Light, Lighting, ReliefShading};
 use crate::bake::solution::DirectionalLight;
 use crate::constants::MOST_RANK;
 use crate::error::Result;
@@ -23,6 +24,7 @@ use crate::mesh::clusters::{Cluster, Face, FaceClusters};
 use crate::passes::relief::{Buffers, Lights};
 use crate::passes::relief_hits::{Shape, ShapeBuffers};
 use crate::passes::types::{ParallelLight, Prism};
+use crate::picture::Tile;
 use crate::scene::{Triangle, relief_normals};
 use crate::vk::Device;
 
@@ -32,6 +34,9 @@ pub struct ReliefMesh {
     pub lights: Buffers,
     pub directions: Directions,
     pub ranges: Vec<PrismRange>,
+    /// Of prisms.
+    pub blocks: Blocks,
+    pub prism_count: u32,
     pub rest: FlatRelief,
     /// Number of prisms in each state, `[PART_…]`.
     pub states: [usize; 3],
@@ -121,6 +126,10 @@ impl ReliefMesh {
             tiles: &kept.surfaces.tiles,
             pyramids: &kept.surfaces.pyramids,
         };
+        let corners: Vec<Vec3> = list
+            .iter()
+            .flat_map(|p| [p.low_a, p.low_b, p.low_c, p.high_a, p.high_b, p.high_c])
+            .collect();
         let lights = Lights {
             factors: &kept.surfaces.factors,
             coefficients: &prisms.lit.coefficients,
@@ -132,9 +141,19 @@ impl ReliefMesh {
             lights: Buffers::new(device, &lights)?,
             directions: *directions,
             ranges: ranges(drawn.iter().map(|&m| triangle(m).material)),
+            blocks: Blocks::new(seen.projection, &corners, 6),
+            prism_count: list.len() as u32,
             rest,
             states,
         })
+    }
+}
+
+impl ReliefMesh {
+    /// Prisms that a tile draws, and all.
+    pub fn drawn(&self, tile: Tile, cuts: Cuts) -> [usize; 2] {
+        let all = 0..self.prism_count;
+        self.blocks.drawn(std::iter::once(&all), tile, cuts)
     }
 }
 

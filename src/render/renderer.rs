@@ -12,6 +12,7 @@ use super::seen_scene::SeenScene;
 use super::textures::{Bound, Textures};
 use super::{Lighting, Overdraw, Show, View};
 use crate::error::Result;
+use crate::passes::pass_parts::PART_INDICES;
 use crate::passes::shade::{self, Shade, Target};
 use crate::passes::shadow_rays::LightBuffers;
 use crate::picture::{Light, Picture, Projection, SAMPLES, Tile};
@@ -19,8 +20,26 @@ use crate::scene::Scene;
 use crate::scene::sky::Sky;
 use crate::vk::{Commands, Device, Timestamps};
 
-/// Pixels along a side of a tile, each a submission: 0.1 to 0.3 s by lavapipe's two cores.
-const TILE: u32 = 56;
+/// Pixels along a side of a tile, each a submission: 0.1 s by lavapipe's two cores.
+const TILE: u32 = 40;
+
+/// How draws of a view are cut. The picture does not depend on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cuts {
+    /// Whether a tile leaves out the triangles that do not reach into it.
+    pub by_tile: bool,
+    /// Indices of a part of a submission, at most: three for each triangle.
+    pub part_indices: u32,
+}
+
+impl Default for Cuts {
+    fn default() -> Self {
+        Self {
+            by_tile: true,
+            part_indices: PART_INDICES,
+        }
+    }
+}
 
 /// Marks pixels of plain triangles when pixels of relief are counted.
 const NOT_RELIEF: f32 = 2.0;
@@ -29,6 +48,7 @@ const NOT_RELIEF: f32 = 2.0;
 pub struct Renderer<'a> {
     fixed: Fixed<'a>,
     view: ViewParts,
+    pub cuts: Cuts,
 }
 
 /// What does not depend on the view.
@@ -77,6 +97,7 @@ impl ViewParts {
             lighting: &fixed.lighting,
             projection: &projection,
             samples: fixed.samples,
+            cuts: Cuts::default(),
         };
         let (lights, shafts) = light_buffers(device, &seen)?;
         let kept = fixed.relief.as_ref();
@@ -125,7 +146,11 @@ impl<'a> Renderer<'a> {
             shade,
         };
         let view = ViewParts::new(&fixed, view)?;
-        Ok(Self { fixed, view })
+        Ok(Self {
+            fixed,
+            view,
+            cuts: Cuts::default(),
+        })
     }
 
     /// Turns to another view. Pipelines, textures, and the part of the relief and its light that
@@ -254,6 +279,22 @@ impl<'a> Renderer<'a> {
         self.view.mesh.open
     }
 
+    /// Triangles and prisms that the tiles of a picture draw, and what they drew if each drew all.
+    pub fn drawn(&self) -> [usize; 2] {
+        let ViewParts { mesh, relief, .. } = &self.view;
+        let mut counts = [0; 2];
+        for tile in Tile::of(self.view.size, TILE) {
+            let plain = mesh.drawn(tile, self.cuts);
+            let prisms = relief
+                .as_ref()
+                .map(|relief| relief.mesh.drawn(tile, self.cuts));
+            for of in [plain, prisms.unwrap_or_default()] {
+                (0..2).for_each(|k| counts[k] += of[k]);
+            }
+        }
+        counts
+    }
+
     /// Number of parts of plain triangles that follow shadow rays, that see all of each light, and
     /// that see none.
     pub fn parts(&self) -> [usize; 3] {
@@ -336,6 +377,7 @@ impl<'a> Renderer<'a> {
             lighting,
             projection,
             samples,
+            cuts: self.cuts,
         };
         let plain = mesh
             .draws(&seen, tile, bound, lights.counts)
@@ -361,10 +403,11 @@ impl<'a> Renderer<'a> {
                     _ => 0.0,
                 },
                 over_depths,
+                part_indices: self.cuts.part_indices,
             },
-            || {
+            |pass| {
                 if let Some((relief, target)) = of_relief {
-                    relief.record(cmd, &seen, tile, target, lights);
+                    relief.record(cmd, pass, &seen, tile, target, lights);
                 }
             },
             plain,

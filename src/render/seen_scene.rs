@@ -1,6 +1,6 @@
 //! A lit scene as one eye sees it: what every part of a picture is made from.
 
-use super::Lighting;
+use super::{Cuts, Lighting};
 use crate::picture::Projection;
 use crate::scene::Scene;
 
@@ -12,4 +12,5 @@ pub struct SeenScene<'a> {
     pub projection: &'a Projection,
     /// Samples along a side of a pixel.
     pub samples: u32,
+    pub cuts: Cuts,
 }

@@ -7,18 +7,23 @@ use winit::window::Window;
 
 use super::DeviceChoice;
 use crate::error::{Error, Result};
+use crate::passes::pass_parts::{PartedPass, PassParts};
 use crate::solver::choose_device;
 use crate::vk::{
-    Attachment, Buffer, BufferUse, Commands, Device, Format, Framebuffer, Image, ImageUse,
-    Instance, RenderPass, Shown, Stage, Surface, Swapchain,
+    Attachment, Buffer, BufferUse, Device, Format, Framebuffer, Image, ImageUse, Instance,
+    RenderPass, Shown, Stage, Surface, Swapchain,
 };
+
+/// Indices of a part of a frame, at most: its triangles follow no rays.
+const FRAME_INDICES: u32 = 3 << 17;
 
 /// A window with its device, and its images while it has an area.
 pub struct Screen {
     swapchain: Option<Swapchain>,
     target: Option<Target>,
     surface: Option<Arc<Surface>>,
-    pass: RenderPass,
+    /// Of a frame: the first, and those of further parts.
+    passes: [RenderPass; 2],
     format: Format,
     /// Since when the window has refused every frame.
     refused: Option<Instant>,
@@ -72,12 +77,12 @@ impl Screen {
         let format = swapchain
             .as_ref()
             .map_or(Format::B8G8R8A8_UNORM, Swapchain::format);
-        let pass = RenderPass::new(&device, "window", Attachment::copied(format))?;
+        let passes = RenderPass::in_parts(&device, "window", Attachment::copied(format))?;
         Ok(Self {
             swapchain,
             target: None,
             surface: Some(surface),
-            pass,
+            passes,
             format,
             refused: None,
             device,
@@ -91,7 +96,7 @@ impl Screen {
     }
 
     pub fn pass(&self) -> &RenderPass {
-        &self.pass
+        &self.passes[0]
     }
 
     /// Drops the surface as if the system had lost it; the next frame makes a new one.
@@ -132,7 +137,12 @@ impl Screen {
         let size = swapchain.size();
         if self.target.as_ref().is_none_or(|t| t.colour.size() != size) {
             self.target = None;
-            self.target = Some(Target::new(&self.device, &self.pass, self.format, size)?);
+            self.target = Some(Target::new(
+                &self.device,
+                &self.passes[0],
+                self.format,
+                size,
+            )?);
         }
         Ok(Some(size))
     }
@@ -145,7 +155,7 @@ impl Screen {
     pub fn show(
         &mut self,
         capture: bool,
-        record: impl FnOnce(&Commands),
+        record: impl FnOnce(&mut PartedPass<'_>),
     ) -> Result<(Shown, Option<Captured>)> {
         let (Some(swapchain), Some(target)) = (&mut self.swapchain, &self.target) else {
             return Ok((Shown::Stale, None));
@@ -160,10 +170,16 @@ impl Screen {
             false => None,
         };
         let shown = swapchain.show(&target.colour, |cmd| {
-            cmd.begin_render_pass(&self.pass, &target.framebuffer, [0; 4]);
-            cmd.viewport(0, 0, width, height);
-            record(cmd);
-            cmd.end_render_pass();
+            let parts = PassParts {
+                passes: self.passes.each_ref(),
+                framebuffer: &target.framebuffer,
+                size: (width, height),
+                clear: [0; 4],
+                indices: FRAME_INDICES,
+            };
+            let mut pass = PartedPass::begin(cmd, parts);
+            record(&mut pass);
+            pass.end();
             if let Some(readback) = &readback {
                 cmd.copy_image_to_buffer(&target.colour, readback);
                 cmd.barrier(&[Stage::Transfer], &[Stage::Host]);

@@ -10,12 +10,13 @@ use super::slopes::{Slopes, mean_tile, slope_axes};
 use super::snapshot::{Slant, Snapshot};
 use super::surface_mesh::{About, MeshRange, NOTHING, SurfaceMesh, Vertex};
 use crate::error::Result;
+use crate::passes::pass_parts::PartedPass;
 use crate::passes::shaders::{view_mesh, view_mesh_relief, view_overlay};
 use crate::render::upload_texture;
 use crate::scene::Scene;
 use crate::vk::{
-    Blending, Buffer, BufferUse, Commands, DescriptorSet, Device, Format, GraphicsPipeline,
-    GraphicsShaders, GraphicsState, Image, RenderPass, Sampled, Sampler, Sides, VertexAttribute,
+    Blending, Buffer, BufferUse, DescriptorSet, Device, Format, GraphicsPipeline, GraphicsShaders,
+    GraphicsState, Image, RenderPass, Sampled, Sampler, Sides, VertexAttribute,
 };
 
 /// What a frame shows of the surfaces.
@@ -229,8 +230,7 @@ impl SurfacePass {
     }
 
     /// Records the draws within a render pass that has begun.
-    pub fn record(&self, cmd: &Commands, seen: &Rows, shown: &Shown) {
-        cmd.bind_indices(&self.mesh.indices);
+    pub fn record(&self, pass: &mut PartedPass<'_>, seen: &Rows, shown: &Shown) {
         for range in &self.mesh.ranges {
             let sets = &self.sets[range.material as usize];
             let relief = sets.relief.as_ref();
@@ -239,7 +239,7 @@ impl SurfacePass {
                 None => (&self.plain, &sets.plain),
             };
             self.draw(
-                cmd,
+                pass,
                 pipeline,
                 set,
                 range,
@@ -249,11 +249,10 @@ impl SurfacePass {
     }
 
     /// Records what lies over the surfaces, which have been drawn.
-    pub fn record_overlays(&self, cmd: &Commands, seen: &Rows, shown: &Shown) {
-        cmd.bind_indices(&self.mesh.indices);
+    pub fn record_overlays(&self, pass: &mut PartedPass<'_>, seen: &Rows, shown: &Shown) {
         for range in &self.mesh.ranges {
             let parameters = self.parameters(seen, shown, range);
-            self.draw(cmd, &self.overlay, &self.overlays, range, &parameters);
+            self.draw(pass, &self.overlay, &self.overlays, range, &parameters);
         }
     }
 
@@ -279,15 +278,18 @@ impl SurfacePass {
 
     fn draw(
         &self,
-        cmd: &Commands,
+        pass: &mut PartedPass<'_>,
         pipeline: &GraphicsPipeline,
         set: &DescriptorSet,
         range: &MeshRange,
         parameters: &view_mesh::Parameters,
     ) {
-        cmd.bind_graphics(pipeline, set, Some(&self.mesh.vertices));
-        cmd.push_graphics(pipeline, parameters);
-        cmd.draw_indexed(range.first, range.count);
+        let run = range.first..range.first + range.count;
+        pass.draw(std::iter::once(run), |cmd| {
+            cmd.bind_indices(&self.mesh.indices);
+            cmd.bind_graphics(pipeline, set, Some(&self.mesh.vertices));
+            cmd.push_graphics(pipeline, parameters);
+        });
     }
 }
 

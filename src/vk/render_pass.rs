@@ -25,14 +25,6 @@ pub enum AfterPass {
     Copy,
 }
 
-/// What happens to the depths after a render pass.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Depths {
-    Dropped,
-    /// Another render pass goes on with them.
-    Kept,
-}
-
 /// What of a target's content a render pass goes on with; the rest is cleared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Before {
@@ -73,20 +65,8 @@ impl Attachment {
     }
 }
 
-impl Depths {
-    const LAYOUT: vk::ImageLayout = vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL;
-
-    fn store(self) -> vk::AttachmentStoreOp {
-        match self {
-            Self::Kept => vk::AttachmentStoreOp::STORE,
-            Self::Dropped => vk::AttachmentStoreOp::DONT_CARE,
-        }
-    }
-}
-
-/// A render pass of one subpass: one colour attachment, stored, and a depth attachment, stored on
-/// request. Both are cleared at the start but where it is said. A clone is another handle to the
-/// same render pass.
+/// A render pass of one subpass: a colour and a depth attachment, both stored. They are cleared at
+/// the start but where it is said. A clone is another handle to the same render pass.
 ///
 /// Commands that record it keep it alive.
 #[derive(Clone)]
@@ -102,28 +82,15 @@ pub(super) struct RenderPassOwner {
 }
 
 const DEPTH_FORMAT: vk::Format = vk::Format::D32_SFLOAT;
+const DEPTH_LAYOUT: vk::ImageLayout = vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL;
 
 impl RenderPass {
-    /// # Errors
-    /// A device that fails.
-    pub fn new(device: &Arc<Device>, name: &str, colour: Attachment) -> Result<Self> {
-        Self::from_attachments(device, name, colour, Depths::Dropped, Before::Nothing)
-    }
-
-    /// A render pass whose depths another one goes on with.
-    ///
-    /// # Errors
-    /// A device that fails.
-    pub fn keeping_depths(device: &Arc<Device>, name: &str, colour: Attachment) -> Result<Self> {
-        Self::from_attachments(device, name, colour, Depths::Kept, Before::Nothing)
-    }
-
-    /// A render pass that goes on with the depths that another one kept.
+    /// A render pass that goes on with the depths of another one.
     ///
     /// # Errors
     /// A device that fails.
     pub fn over_depths(device: &Arc<Device>, name: &str, colour: Attachment) -> Result<Self> {
-        Self::from_attachments(device, name, colour, Depths::Dropped, Before::Depths)
+        Self::from_attachments(device, name, colour, Before::Depths)
     }
 
     /// Two render passes: the first clears the targets, the second adds to them and may be
@@ -132,7 +99,7 @@ impl RenderPass {
     /// # Errors
     /// A device that fails.
     pub fn in_parts(device: &Arc<Device>, name: &str, colour: Attachment) -> Result<[Self; 2]> {
-        let part = |before| Self::from_attachments(device, name, colour, Depths::Kept, before);
+        let part = |before| Self::from_attachments(device, name, colour, before);
         Ok([part(Before::Nothing)?, part(Before::All)?])
     }
 
@@ -140,16 +107,15 @@ impl RenderPass {
         device: &Arc<Device>,
         name: &str,
         colour: Attachment,
-        depths: Depths,
         before: Before,
     ) -> Result<Self> {
-        let attachments = descriptions(colour, depths, before);
+        let attachments = descriptions(colour, before);
         let colours = [vk::AttachmentReference::default()
             .attachment(0)
             .layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)];
         let depth = vk::AttachmentReference::default()
             .attachment(1)
-            .layout(vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL);
+            .layout(DEPTH_LAYOUT);
         let subpasses = [vk::SubpassDescription::default()
             .pipeline_bind_point(vk::PipelineBindPoint::GRAPHICS)
             .color_attachments(&colours)
@@ -175,12 +141,8 @@ impl RenderPass {
 }
 
 /// The colour attachment, then the depth attachment.
-fn descriptions(
-    colour: Attachment,
-    depths: Depths,
-    before: Before,
-) -> [vk::AttachmentDescription; 2] {
-    let description = |format, loaded: Option<vk::ImageLayout>, layout, store| {
+fn descriptions(colour: Attachment, before: Before) -> [vk::AttachmentDescription; 2] {
+    let description = |format, loaded: Option<vk::ImageLayout>, layout| {
         let (load, initial_layout) = match loaded {
             Some(layout) => (vk::AttachmentLoadOp::LOAD, layout),
             None => (vk::AttachmentLoadOp::CLEAR, vk::ImageLayout::UNDEFINED),
@@ -189,18 +151,17 @@ fn descriptions(
             .format(format)
             .samples(vk::SampleCountFlags::TYPE_1)
             .load_op(load)
-            .store_op(store)
+            .store_op(vk::AttachmentStoreOp::STORE)
             .stencil_load_op(vk::AttachmentLoadOp::DONT_CARE)
             .stencil_store_op(vk::AttachmentStoreOp::DONT_CARE)
             .initial_layout(initial_layout)
             .final_layout(layout)
     };
-    let stored = vk::AttachmentStoreOp::STORE;
     let of_colour = (before == Before::All).then(|| colour.final_layout());
-    let of_depths = (before != Before::Nothing).then_some(Depths::LAYOUT);
+    let of_depths = (before != Before::Nothing).then_some(DEPTH_LAYOUT);
     [
-        description(colour.format, of_colour, colour.final_layout(), stored),
-        description(DEPTH_FORMAT, of_depths, Depths::LAYOUT, depths.store()),
+        description(colour.format, of_colour, colour.final_layout()),
+        description(DEPTH_FORMAT, of_depths, DEPTH_LAYOUT),
     ]
 }
 

@@ -25,7 +25,7 @@ pub(super) struct Uploads {
     bytes: u64,
 }
 
-/// Bytes that wait, at most.
+/// Bytes that wait, at most, and of a part of a submission, but for a buffer that is larger.
 const MOST_WAITING: u64 = 64 << 20;
 
 impl Buffer {
@@ -80,9 +80,16 @@ impl Commands {
         let commands = Self::record(device, "upload", |cmd| {
             let all = [Stage::Compute, Stage::Draw, Stage::Transfer];
             cmd.barrier(&all, &[Stage::Transfer]);
+            let mut bytes = 0;
             for owner in buffers {
-                let contents = std::mem::take(&mut *lock(&owner.contents));
                 let buffer = Buffer { owner };
+                let more = buffer.bytes();
+                if bytes > 0 && bytes + more > MOST_WAITING {
+                    cmd.part();
+                    bytes = 0;
+                }
+                bytes += more;
+                let contents = std::mem::take(&mut *lock(&buffer.owner.contents));
                 for (i, content) in contents.iter().enumerate() {
                     if i > 0 {
                         cmd.barrier(&[Stage::Transfer], &[Stage::Transfer]);

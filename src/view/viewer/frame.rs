@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::Viewer;
 use crate::error::Result;
+use crate::passes::pass_parts::PartedPass;
 use crate::picture::{Light, write_png};
 use crate::render::{ReliefShading, Show};
 use crate::view::backdrop;
@@ -15,7 +16,7 @@ use crate::view::screen::Captured;
 use crate::view::snapshot::Snapshot;
 use crate::view::surface_pass::{self, SurfacePass};
 use crate::view::switches::Switches;
-use crate::vk::{Commands, Shown};
+use crate::vk::Shown;
 
 /// Times of one frame that is being drawn.
 struct Started {
@@ -44,33 +45,32 @@ struct Side {
 impl Side {
     fn record(
         &self,
-        cmd: &Commands,
+        pass: &mut PartedPass<'_>,
         rows: &Rows,
         surfaces: &SurfacePass,
         (panel_pass, panel): (&PanelPass, &Prepared),
         sky: bool,
         first: bool,
     ) {
-        let [left, top, width, height] = self.clip;
         if first {
             // A software driver compiles a shader at its first draw: all are drawn in the first
             // frame.
-            cmd.scissor(0, 0, 1, 1);
-            surfaces.record(cmd, rows, &self.shown);
-            surfaces.record_overlays(cmd, rows, &self.shown);
+            pass.clip([0, 0, 1, 1]);
+            surfaces.record(pass, rows, &self.shown);
+            surfaces.record_overlays(pass, rows, &self.shown);
         }
         if sky && !self.covered {
-            panel_pass.record_layer(cmd, panel, Layer::Backdrop, self.clip);
+            panel_pass.record_layer(pass.commands(), panel, Layer::Backdrop, self.clip);
         }
-        cmd.scissor(left, top, width, height);
+        pass.clip(self.clip);
         if !self.covered {
-            surfaces.record(cmd, rows, &self.shown);
+            surfaces.record(pass, rows, &self.shown);
         }
         if let Some(layer) = self.picture {
-            panel_pass.record_layer(cmd, panel, layer, self.clip);
+            panel_pass.record_layer(pass.commands(), panel, layer, self.clip);
         }
         if self.shown.has_overlays() {
-            surfaces.record_overlays(cmd, rows, &self.shown);
+            surfaces.record_overlays(pass, rows, &self.shown);
         }
     }
 }
@@ -199,16 +199,16 @@ impl Viewer {
             capture,
             ..
         } = self;
-        screen.show(capture.is_some(), |cmd| {
+        screen.show(capture.is_some(), |pass| {
             for side in &sides {
                 let surfaces = match left {
                     Some(Left::Held(held)) if side.held => &held.surfaces,
                     _ => &*surfaces,
                 };
-                side.record(cmd, &rows, surfaces, (&*panel_pass, panel), sky, first);
+                side.record(pass, &rows, surfaces, (&*panel_pass, panel), sky, first);
             }
-            cmd.scissor(0, 0, width, height);
-            panel_pass.record(cmd, panel);
+            pass.clip([0, 0, width, height]);
+            panel_pass.record(pass.commands(), panel);
         })
     }
 

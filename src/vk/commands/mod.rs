@@ -153,10 +153,15 @@ impl Commands {
         let queue = self.device.queue();
         let uploads = Self::of_uploads(&self.device)?;
         let parts = self.parts.borrow();
-        let buffers = uploads.iter().map(Self::raw).chain(parts.iter().copied());
+        let of_uploads = uploads.as_ref().map(|uploads| uploads.parts.borrow());
+        let buffers = of_uploads
+            .iter()
+            .flat_map(|parts| parts.iter())
+            .chain(parts.iter());
         let infos: Vec<_> = buffers
-            .map(|buffer| [vk::CommandBufferSubmitInfo::default().command_buffer(buffer)])
+            .map(|&buffer| [vk::CommandBufferSubmitInfo::default().command_buffer(buffer)])
             .collect();
+        drop(of_uploads);
         let at = |stage| {
             move |&semaphore: &vk::Semaphore| {
                 vk::SemaphoreSubmitInfo::default()
