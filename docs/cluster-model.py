@@ -8,21 +8,22 @@
 A rank has one device and the cores of it. What all ranks need of the scene is sent once. Of each
 source drawn, one of the ranks draws the item buffer, all receive it, and each finds the form
 factors to its share of the elements; the first rank receives the coupling, solves, and asks for the
-next batch. Reading, set-up and writing are the first rank's. """
+next batch. All search for near sources. Reading, other set-up and writing are the first rank's."""
 
 import sys
 
 # Seconds on one core of lavapipe, fitted to one bake by one process: `LP_NUM_THREADS=1 taskset -c 0
-# mesolux bake cornell --patches 100000 --no-cache --checkpoint 0 --json`, of 34.2 s. Divided by
-# ranks:
+# mesolux bake cornell --patches 100000 --no-cache --checkpoint 0 --json`, of 34.2 s at `da0abae`.
+# Divided by ranks:
 PAIR = 1.98e-7  # of an element and a source drawn: sorted, looked at by rays, binned, kept
 DRAW = 2.67e-3  # of a source: its item buffer
 GATHER = 4.8e-9  # of an element and a source
-# Not divided, of an element: set-up, reading and writing, and once for pipelines.
-FIRST = 2.86e-5
+SEARCH = 1.62e-5  # of an element: its near sources
+# Not divided, of an element: other set-up, reading and writing, and once for pipelines.
+FIRST = 1.24e-5
 ONCE = 0.3
 # What each of several ranks needs more than its even part: to wait for the slower one, to pack and
-# unpack, and for MPI. Fitted to two ranks of the same bake, 20.5 s.
+# unpack, and for MPI. Fitted to two ranks of the same bake, 20.5 s, which did not share the search.
 TOGETHER = 1.12
 # Bytes sent: of the scene, an element; of an item buffer of 128² pixels; of a rank's part of a
 # row.
@@ -48,7 +49,8 @@ def seconds(ranks, elements, gigabits, drawn=None, cores=None):
     wire = gigabits * 1e9 / 8
     first = FIRST * elements / (cores or 1) + ONCE
     cores = cores or ranks
-    work = (PAIR * elements + DRAW + GATHER * elements) * drawn / cores
+    work = (PAIR * elements + DRAW + GATHER * elements) * drawn + SEARCH * elements
+    work /= cores
     if ranks == 1:
         return first + work
     sent = SCENE * elements + drawn * (ITEMS + ranks * PART)

@@ -99,12 +99,9 @@ pub fn run(options: &Options) -> Result<()> {
     let done = match ranks.rank() {
         0 => bake(options, || {
             let device = open()?;
-            let count = ranks.count();
-            tracing::info!(
-                "device: {} and those of {} others",
-                device.name(),
-                count - 1
-            );
+            let (name, others) = (device.name(), ranks.count() - 1);
+            let of = if others == 1 { "process" } else { "processes" };
+            tracing::info!("device: {name}, and one in each of {others} other {of}");
             Ok(Crew::with_ranks(&device, Arc::clone(&ranks)))
         }),
         _ => open().and_then(|device| ranks.serve(&device)),

@@ -99,6 +99,11 @@ impl<T: Casts> ShadowTree<T> {
         Self::flat(&bvh, &triangles)
     }
 
+    /// Of lists as those of another.
+    pub fn of_lists(nodes: Vec<ShadowNode>, triangles: Vec<T>) -> Self {
+        Self { nodes, triangles }
+    }
+
     /// At least one.
     pub fn nodes(&self) -> &[ShadowNode] {
         match &self.nodes[..] {

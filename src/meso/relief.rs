@@ -117,6 +117,22 @@ pub struct Class {
 }
 
 impl Relief {
+    /// Frames alone, of elements of these classes: tangents and bitangents.
+    pub fn of_frames(class: Vec<u32>, [tangent, bitangent]: [Vec<Vec3>; 2]) -> Self {
+        Self {
+            directions: Options::default().directions,
+            transport: Transport::default(),
+            class,
+            tangent,
+            bitangent,
+            scale: Vec::new(),
+            responses: Vec::new(),
+            classes: Vec::new(),
+            texels: None,
+            highest_albedo: 0.0,
+        }
+    }
+
     pub fn is_meso(&self, element: usize) -> bool {
         self.class[element] != NONE
     }

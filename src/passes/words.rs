@@ -18,6 +18,11 @@ impl Words {
         bytemuck::cast_slice(&self.0)
     }
 
+    /// The same as a list of its own, which values that are aligned to more than words need.
+    pub fn collected<T: Pod>(&self) -> Vec<T> {
+        bytemuck::pod_collect_to_vec(&self.0)
+    }
+
     pub fn words(&self) -> &[u32] {
         &self.0
     }

@@ -5,11 +5,18 @@ use std::sync::Arc;
 use super::exchange::{Exchange, Meeting};
 use super::messages::{MemberData, MemberShare};
 #[cfg(feature = "mpi")]
+use super::near_search::{NearSearch, joined, own};
+#[cfg(feature = "mpi")]
 use super::ranks::{OnRanks, Ranks};
 use super::team::Others;
 use super::threads::Threads;
 use super::{Estimator, Settings, choose_device, open_device};
 use crate::error::{Error, Result};
+use crate::mesh::elements::Elements;
+use crate::mesh::near::{NearPairs, Nearness, pairs_of};
+use crate::mesh::shadow_tree::ShadowTree;
+use crate::mesh::sources::Source;
+use crate::passes::types::ShadowOccluder;
 use crate::vk::{Candidate, Device, Instance, SOFTWARE};
 
 /// Opens the devices asked for: one as [`open_device`] does, or several, divided by commas. One
@@ -151,6 +158,35 @@ impl Crew {
             weights[0] = (1.0 - HOST_WORK * members as f64).max(LEAST_WEIGHT);
         }
         Ok(weights)
+    }
+
+    /// Finds the near sources of all elements, each process those of some sources.
+    ///
+    /// # Errors
+    /// Processes that are gone.
+    pub(super) fn near_pairs(
+        &self,
+        elements: &Elements,
+        sources: &[Source],
+        tree: &ShadowTree<ShadowOccluder>,
+        nearness: &Nearness,
+    ) -> Result<NearPairs> {
+        #[cfg(feature = "mpi")]
+        if let Some(ranks) = &self.ranks {
+            let search = NearSearch::new(elements, sources, tree, nearness);
+            let found = ranks.search(search, || {
+                let own: Vec<&Source> = own(sources, [0, ranks.count()]).collect();
+                pairs_of(elements, own, tree, nearness)
+            })?;
+            let (first, others) = found;
+            return Ok(NearPairs::new(
+                elements,
+                sources,
+                joined(sources, first, &others),
+            ));
+        }
+        let found = pairs_of(elements, sources, tree, nearness);
+        Ok(NearPairs::new(elements, sources, found))
     }
 
     /// Starts the other members; none where the first is alone.

@@ -178,7 +178,10 @@ impl Makers {
         };
         let set = (self.next + SETS - self.evaluated.len() - 1) % SETS;
         let (mut made, [began, ended]) = self.of(asked.kind).take(set, asked)?;
-        let idle = self.ended.map(|ended| (began - ended).max(0.0));
+        // What is shared out of the next batch was drawn in between.
+        let next = self.evaluated.front().or(self.waiting.front());
+        let drawn: f64 = next.map_or(0.0, |next| next.drawing.iter().sum());
+        let idle = self.ended.map(|ended| (began - ended - drawn).max(0.0));
         made.stages.idle = idle.unwrap_or(0.0);
         self.ended = (!self.evaluated.is_empty()).then_some(ended);
         Ok(Some(made))

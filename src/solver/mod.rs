@@ -22,6 +22,8 @@ mod makers;
 mod member;
 mod messages;
 mod near;
+#[cfg(feature = "mpi")]
+mod near_search;
 mod packed;
 mod places;
 mod problem;
@@ -159,7 +161,7 @@ impl Solver {
         settings.check()?;
         let device = crew.check(settings)?;
         let start = Instant::now();
-        let (problem, scene) = Problem::new(device, elements, lights, settings, kept)?;
+        let (problem, scene) = Problem::new(crew, elements, lights, settings, kept)?;
         let bound = Bound::new(&problem);
         let method = match settings.estimator {
             Estimator::Paper => {

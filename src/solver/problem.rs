@@ -1,9 +1,8 @@
 //! What is solved: a scene on the host, and on the device that holds its light.
 
-use std::sync::Arc;
-
 use glam::{DVec3, Vec3};
 
+use super::devices::Crew;
 use super::messages::MemberData;
 use super::{Estimator, Settings, Visibility};
 use crate::constants::{LISTED_BITS, SOURCE_EYES};
@@ -25,7 +24,6 @@ use crate::passes::types::ShadowOccluder;
 use crate::scene::even_light::far_lights;
 use crate::scene::sky::Sky;
 use crate::scene::{Lights, PointLight, Scene};
-use crate::vk::Device;
 
 /// The light by which elements were grouped.
 #[derive(Debug, Clone)]
@@ -57,7 +55,7 @@ pub struct Problem {
 impl Problem {
     /// With the scene as lists for devices.
     pub(super) fn new(
-        device: &Arc<Device>,
+        crew: &Crew,
         mut elements: Elements,
         lights: &Lights,
         settings: &Settings,
@@ -101,7 +99,7 @@ impl Problem {
                 let list = &sources.list;
                 let near = match kept {
                     Some(kept) => kept.near(&elements, list)?,
-                    None => NearPairs::new(&elements, list, &tree, &settings.nearness),
+                    None => crew.near_pairs(&elements, list, &tree, &settings.nearness)?,
                 };
                 (tree, near)
             }
@@ -117,6 +115,7 @@ impl Problem {
         let scene = SceneData::new(&elements, &sources, &connections, &occluders, &near);
         let wanted = settings.batch.clamp(1, scene.source_count.max(1));
         let counts = (scene.element_count, scene.occluder_count);
+        let device = crew.first()?;
         let slots = Hemicubes::fitting_slots(device, counts, settings.hemicube, wanted);
         let problem = Self {
             settings: settings.clone(),

@@ -110,21 +110,25 @@ pub struct NearPairs {
 }
 
 /// An element and a near source.
-struct Pair {
-    element: u32,
-    /// As a vector in the element's frame; without relief of its height alone.
-    factor: Vec3,
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Pair {
+    pub element: u32,
+    /// Form factor as a vector in the element's frame; without relief of its height alone.
+    pub factor: Vec3,
     /// Parts that it receives.
-    entries: u32,
+    pub entries: u32,
 }
 
 /// The pairs of one source by element, and of each the parts, with numbers of the source's own.
-#[derive(Default)]
-struct OfSource {
-    tree: PartTree,
-    pairs: Vec<Pair>,
-    entries: Vec<NearPart>,
-    rays: u64,
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct OfSource {
+    pub tree: PartTree,
+    pub pairs: Vec<Pair>,
+    /// Of the pairs, one after another.
+    pub entries: Vec<NearPart>,
+    /// Rays that were followed.
+    pub rays: u64,
 }
 
 impl OfSource {
@@ -139,27 +143,31 @@ impl OfSource {
     }
 }
 
+/// The pairs of each source, by rays among `occluders`.
+pub fn pairs_of<'a>(
+    elements: &Elements,
+    sources: impl IntoParallelIterator<Item = &'a Source, Iter: IndexedParallelIterator>,
+    occluders: &ShadowTree<ShadowOccluder>,
+    nearness: &Nearness,
+) -> Vec<OfSource> {
+    let receivers = Receiver::all(elements);
+    let search = Search {
+        elements,
+        occluders,
+        nearness: *nearness,
+        scattered: false,
+    };
+    (sources.into_par_iter())
+        .map(|source| match source.is_surface() {
+            true => search.source(source, &receivers),
+            false => OfSource::default(),
+        })
+        .collect()
+}
+
 impl NearPairs {
-    /// By rays among `occluders`.
-    pub fn new(
-        elements: &Elements,
-        sources: &[Source],
-        occluders: &ShadowTree<ShadowOccluder>,
-        nearness: &Nearness,
-    ) -> Self {
-        let receivers = Receiver::all(elements);
-        let search = Search {
-            elements,
-            occluders,
-            nearness: *nearness,
-            scattered: false,
-        };
-        let found: Vec<OfSource> = (sources.par_iter())
-            .map(|source| match source.is_surface() {
-                true => search.source(source, &receivers),
-                false => OfSource::default(),
-            })
-            .collect();
+    /// Of the pairs that [`pairs_of`] all sources has found.
+    pub fn new(elements: &Elements, sources: &[Source], found: Vec<OfSource>) -> Self {
         let weights = weights(elements, sources, &found);
         let near = Self::assembled(found, elements.plain_count(), elements.len());
         Self { weights, ..near }

@@ -98,7 +98,7 @@ impl Default for Grouping {
 }
 
 /// One source, in internal units.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Source {
     pub kind: u32,
     /// The hemicube's centre: on the surface, or at the point light.
@@ -125,6 +125,7 @@ pub struct Source {
     /// unit.
     pub emitted: Vec3,
     /// Of a beam: shares of its intensity about the frame of `normal`, `tangent`, `bitangent`.
+    #[serde(skip)]
     pub web: Option<Arc<Web>>,
     /// Members: a range of elements.
     pub first_element: u32,
@@ -135,7 +136,7 @@ pub struct Source {
 }
 
 /// A place on a source.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct SourcePlace {
     pub at: DVec3,
     /// Of the member that it lies on.
@@ -146,7 +147,7 @@ pub struct SourcePlace {
 pub const PART_MEMBERS: usize = 6;
 
 /// A few members of a curved source.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Part {
     pub centroid: DVec3,
     /// Sum of area times normal.

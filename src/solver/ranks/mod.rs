@@ -4,17 +4,16 @@
 //! scene, until the first has ended. All calls of MPI are made by one thread a process. It waits
 //! for what is asked without using its core, since a software device may need it.
 
+mod wire;
+
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::mpsc::{Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant};
 
-use mpi::environment::Universe;
-use mpi::topology::SimpleCommunicator;
-use mpi::traits::{Communicator, Destination, Root, Source};
-use mpi::{Rank, Tag, Threading};
+use mpi::traits::Communicator;
+use mpi::{Tag, Threading};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -22,9 +21,11 @@ use super::devices::started_together;
 use super::exchange::{Exchange, Gift, Gifts};
 use super::member::Member;
 use super::messages::{Command, MemberData, MemberShare, Reply};
+use super::near_search::{Found, NearSearch};
 use super::team::Others;
 use crate::error::{Error, Result};
 use crate::vk::Device;
+use wire::{ASKED, LEAST_GIVEN, MOST_GIVEN, Request, answer};
 
 /// The processes of an `mpirun`, as one of them reaches the others.
 pub struct Ranks {
@@ -37,38 +38,9 @@ pub struct Ranks {
     broken: AtomicBool,
 }
 
-/// What the thread that calls MPI is asked.
-enum Request {
-    Send(usize, Vec<u8>),
-    Receive(usize, Tag, Sender<Vec<u8>>),
-    /// To all others.
-    Give(Tag, Vec<u8>),
-    /// To all others, or from the first.
-    Broadcast(Vec<u8>, Sender<Vec<u8>>),
-    Abort,
-    End,
-}
-
-/// Of what is asked and answered; those of gifts follow.
-const ASKED: Tag = 1;
-
-/// Bytes of a message, at most: MPI counts them in 31 bits.
-const PIECE: usize = 1 << 28;
-
-/// Between two looks for a message.
-const SHORTEST_WAIT: Duration = Duration::from_micros(20);
-const LONGEST_WAIT: Duration = Duration::from_micros(500);
-
-/// Between two calls of MPI while nothing is asked, once nothing was given for so long.
-const PROGRESS: Duration = Duration::from_millis(1);
-const SOON: Duration = Duration::from_millis(20);
-
-/// Bytes that may be given and not yet taken, of which a gift may take a share: there are
-/// [`super::makers::UNDER_WAY`] rounds of a kind at most.
-const ROOM: usize = 1 << 30;
-const MOST_GIVEN: usize = ROOM / 8;
-/// What it takes to send anything.
-const LEAST_GIVEN: usize = 1 << 10;
+/// What a process is to begin; nothing where it is to end.
+const SEARCH: u8 = 1;
+const BAKE: u8 = 2;
 
 impl Ranks {
     /// Joins the other processes; none where this one was started alone.
@@ -127,7 +99,15 @@ impl Ranks {
     /// A device that fails where others do not wait for it. Where they do, all processes are ended,
     /// after a line that says why.
     pub fn serve(self: &Arc<Self>, device: &Arc<Device>) -> Result<()> {
-        while !self.receive(0)?.is_empty() {
+        loop {
+            match self.receive(0)?[..] {
+                [] => return Ok(()),
+                [SEARCH] => {
+                    self.search_own()?;
+                    continue;
+                }
+                _ => {}
+            }
             let data: MemberData = read(&self.broadcast(Vec::new())?)?;
             let own: MemberShare = read(&self.receive(0)?)?;
             let exchange = Box::new(RankExchange::new(self));
@@ -159,7 +139,32 @@ impl Ranks {
                 }
             }
         }
-        Ok(())
+    }
+
+    /// Finds the near pairs of its own sources.
+    fn search_own(&self) -> Result<()> {
+        let search: NearSearch = read(&self.broadcast(Vec::new())?)?;
+        self.send(0, written(&search.find([self.rank, self.count]))?)
+    }
+
+    /// Lets the other processes search, and collects what they have found when this one has found
+    /// its `own`.
+    ///
+    /// # Errors
+    /// Processes that are gone.
+    pub(super) fn search<T>(
+        &self,
+        search: NearSearch,
+        own: impl FnOnce() -> T,
+    ) -> Result<(T, Vec<Found>)> {
+        for rank in 1..self.count {
+            self.send(rank, vec![SEARCH])?;
+        }
+        self.broadcast(written(&search)?)?;
+        drop(search);
+        let own = own();
+        let found = (1..self.count).map(|rank| read(&self.receive(rank)?));
+        Ok((own, found.collect::<Result<_>>()?))
     }
 
     /// What has been done; or all processes end, after a line that says why.
@@ -247,84 +252,6 @@ fn read<T: DeserializeOwned>(message: &[u8]) -> Result<T> {
     postcard::from_bytes(message).map_err(damaged)
 }
 
-/// Calls MPI for what is asked, until it is to end.
-fn answer(universe: &mut Universe, asked: &Receiver<Request>) {
-    let world = universe.world();
-    // Pages of it that nothing is written to take no memory.
-    universe.set_buffer_size(ROOM);
-    let mut given = None;
-    loop {
-        // What was given goes on its way while MPI is called, and others wait for it at first.
-        let is_new = given.is_some_and(|given: Instant| given.elapsed() < SOON);
-        let wait = if is_new { SHORTEST_WAIT } else { PROGRESS };
-        let request = match asked.recv_timeout(wait) {
-            Ok(request) => request,
-            Err(RecvTimeoutError::Disconnected) => return,
-            Err(RecvTimeoutError::Timeout) => {
-                let _ = world.any_process().immediate_probe_with_tag(ASKED);
-                continue;
-            }
-        };
-        match request {
-            Request::Send(to, message) => {
-                let to = world.process_at_rank(to as Rank);
-                let length = (message.len() as u64).to_le_bytes();
-                to.send_with_tag(&length[..], ASKED);
-                for piece in message.chunks(PIECE) {
-                    to.send_with_tag(piece, ASKED);
-                }
-            }
-            Request::Receive(from, tag, to) => drop(to.send(receive(&world, from, tag))),
-            Request::Give(tag, message) => {
-                give(&world, tag, &message);
-                given = Some(Instant::now());
-            }
-            Request::Broadcast(mut message, to) => {
-                let first = world.process_at_rank(0);
-                let mut length = message.len() as u64;
-                first.broadcast_into(&mut length);
-                message.resize(length as usize, 0);
-                for piece in message.chunks_mut(PIECE) {
-                    first.broadcast_into(piece);
-                }
-                drop(to.send(message));
-            }
-            Request::Abort => world.abort(2),
-            Request::End => return,
-        }
-    }
-}
-
-/// The next message from a process. Looks for it again and again: the calls of MPI that wait use
-/// their core.
-fn receive(world: &SimpleCommunicator, from: usize, tag: Tag) -> Vec<u8> {
-    let from = world.process_at_rank(from as Rank);
-    let mut wait = SHORTEST_WAIT;
-    while from.immediate_probe_with_tag(tag).is_none() {
-        thread::sleep(wait);
-        wait = (2 * wait).min(LONGEST_WAIT);
-    }
-    let mut length = [0u8; 8];
-    from.receive_into_with_tag(&mut length[..], tag);
-    let mut message = vec![0; u64::from_le_bytes(length) as usize];
-    for piece in message.chunks_mut(PIECE) {
-        from.receive_into_with_tag(piece, tag);
-    }
-    message
-}
-
-/// Sends to all others, without waiting for them.
-fn give(world: &SimpleCommunicator, tag: Tag, message: &[u8]) {
-    let length = (message.len() as u64).to_le_bytes();
-    for rank in (0..world.size()).filter(|&rank| rank != world.rank()) {
-        let to = world.process_at_rank(rank);
-        to.buffered_send_with_tag(&length[..], tag);
-        for piece in message.chunks(PIECE) {
-            to.buffered_send_with_tag(piece, tag);
-        }
-    }
-}
-
 struct RankExchange {
     ranks: Arc<Ranks>,
     /// What this one has given and not collected, of each kind.
@@ -382,7 +309,7 @@ impl OnRanks {
         own: Vec<MemberShare>,
     ) -> Result<(Self, Box<dyn Exchange>)> {
         for rank in 1..ranks.count {
-            ranks.send(rank, vec![1])?;
+            ranks.send(rank, vec![BAKE])?;
         }
         ranks.broadcast(written(data)?)?;
         for (rank, own) in (1..).zip(own) {

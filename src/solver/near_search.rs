@@ -1,0 +1,206 @@
+//! Near pairs that the processes of a crew find together, each those of some sources.
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use crate::mesh::elements::Elements;
+use crate::mesh::near::{Nearness, OfSource, PartTree, pairs_of};
+use crate::mesh::shadow_tree::ShadowTree;
+use crate::mesh::sources::Source;
+use crate::meso::Relief;
+use crate::passes::types::ShadowOccluder;
+use crate::passes::words::Words;
+
+/// What is looked at: see [`Elements`], [`Relief`] and [`ShadowTree`].
+#[derive(Serialize, Deserialize)]
+pub(super) struct NearSearch {
+    vertices: Words,
+    corners: Words,
+    centroid: Words,
+    normal: Words,
+    area: Words,
+    /// Class, tangent and bitangent of a scene with relief.
+    relief: Option<[Words; 3]>,
+    /// Surfaces; of each no places.
+    sources: Vec<Source>,
+    nodes: Words,
+    occluders: Words,
+    nearness: Nearness,
+}
+
+impl NearSearch {
+    pub fn new(
+        elements: &Elements,
+        sources: &[Source],
+        tree: &ShadowTree<ShadowOccluder>,
+        nearness: &Nearness,
+    ) -> Self {
+        let relief = |of: &Relief| {
+            [
+                Words::of(&of.class),
+                Words::of(&of.tangent),
+                Words::of(&of.bitangent),
+            ]
+        };
+        let surfaces = sources.iter().filter(|source| source.is_surface());
+        let bare = |source: &Source| Source {
+            places: Vec::new(),
+            parts: Vec::new(),
+            ..source.clone()
+        };
+        Self {
+            vertices: Words::of(&elements.vertices),
+            corners: Words::of(elements.corners.as_flattened()),
+            centroid: Words::of(&elements.centroid),
+            normal: Words::of(&elements.normal),
+            area: Words::of(&elements.area),
+            relief: elements.relief.as_ref().map(relief),
+            sources: surfaces.map(bare).collect(),
+            nodes: Words::of(tree.nodes()),
+            occluders: Words::of(&tree.triangles),
+            nearness: *nearness,
+        }
+    }
+
+    /// The pairs of one in so many surfaces, by their order.
+    pub fn find(self, [turn, of]: [usize; 2]) -> Found {
+        let relief = self.relief.map(|[class, tangent, bitangent]| {
+            let axes = [&tangent, &bitangent].map(|axis| axis.values::<Vec3>().to_vec());
+            Relief::of_frames(class.into_words(), axes)
+        });
+        let elements = Elements {
+            vertices: self.vertices.collected(),
+            corners: self.corners.collected(),
+            centroid: self.centroid.collected(),
+            normal: self.normal.collected(),
+            area: self.area.collected(),
+            relief,
+            ..Elements::default()
+        };
+        let tree = ShadowTree::of_lists(self.nodes.collected(), self.occluders.collected());
+        let own: Vec<&Source> = own(&self.sources, [turn, of]).collect();
+        Found::new(&pairs_of(&elements, own, &tree, &self.nearness))
+    }
+}
+
+/// The surfaces among some sources whose turn it is.
+pub(super) fn own(sources: &[Source], [turn, of]: [usize; 2]) -> impl Iterator<Item = &Source> {
+    let surfaces = sources.iter().filter(|source| source.is_surface());
+    surfaces.skip(turn).step_by(of)
+}
+
+/// What was found of some sources.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Found {
+    /// Members, pairs and entries of each source.
+    counts: Vec<[u32; 3]>,
+    rays: Vec<u64>,
+    members: Words,
+    pairs: Words,
+    entries: Words,
+}
+
+impl Found {
+    fn new(found: &[OfSource]) -> Self {
+        fn joined<T: bytemuck::Pod>(found: &[OfSource], list: impl Fn(&OfSource) -> &[T]) -> Words {
+            Words::of(&found.iter().flat_map(list).copied().collect::<Vec<T>>())
+        }
+        let counts = |of: &OfSource| {
+            [of.tree.members.len(), of.pairs.len(), of.entries.len()].map(|count| count as u32)
+        };
+        Self {
+            counts: found.iter().map(counts).collect(),
+            rays: found.iter().map(|of| of.rays).collect(),
+            members: joined(found, |of| &of.tree.members),
+            pairs: joined(found, |of| &of.pairs),
+            entries: joined(found, |of| &of.entries),
+        }
+    }
+
+    /// Each source's.
+    fn each(&self) -> impl Iterator<Item = OfSource> {
+        fn taken<T: bytemuck::Pod>(left: &mut &[T], count: u32) -> Vec<T> {
+            let (taken, rest) = left.split_at(count as usize);
+            *left = rest;
+            taken.to_vec()
+        }
+        let mut members = self.members.values();
+        let mut pairs = self.pairs.values();
+        let mut entries = self.entries.values();
+        let each = self.counts.iter().zip(&self.rays);
+        each.map(move |(&[of_tree, of_pairs, of_entries], &rays)| OfSource {
+            tree: PartTree {
+                members: taken(&mut members, of_tree),
+            },
+            pairs: taken(&mut pairs, of_pairs),
+            entries: taken(&mut entries, of_entries),
+            rays,
+        })
+    }
+}
+
+/// The pairs of all sources, of what each process has found of its own.
+pub(super) fn joined(sources: &[Source], own: Vec<OfSource>, others: &[Found]) -> Vec<OfSource> {
+    let mut of_first = own.into_iter();
+    let mut of_others: Vec<_> = others.iter().map(Found::each).collect();
+    let members = others.len() + 1;
+    let mut surfaces = 0;
+    let next = |source: &Source| {
+        if !source.is_surface() {
+            return OfSource::default();
+        }
+        let turn = surfaces % members;
+        surfaces += 1;
+        match turn.checked_sub(1) {
+            None => of_first.next(),
+            Some(other) => of_others[other].next(),
+        }
+        .unwrap_or_default()
+    };
+    sources.iter().map(next).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::constants::NONE;
+    use crate::mesh::occluders::Occluders;
+    use crate::mesh::sources;
+    use crate::scene::{LoadOptions, load};
+
+    /// Of a scene with frames of relief and a light without a surface, by one and by three.
+    #[test]
+    fn pairs_do_not_depend_on_who_finds_them() {
+        let options = LoadOptions {
+            patches: Some(2000),
+            ..LoadOptions::default()
+        };
+        let scene = load("cornell", &options).expect("it is built in");
+        let mut elements = Elements::new(&scene);
+        let grouping = sources::Grouping::default();
+        let (mut built, connections) = sources::build(&mut elements, &scene.lights, &grouping, 0);
+        let count = elements.len();
+        let class = (0..count).map(|e| if 2 * e < count { NONE } else { 0 });
+        let axis = |axis: Vec3| vec![axis; count];
+        let axes = [axis(Vec3::X), axis(Vec3::Y)];
+        elements.relief = Some(Relief::of_frames(class.collect(), axes));
+        let casters = Occluders::elements(&elements).casters(&elements, &connections);
+        let tree = ShadowTree::new(casters);
+        let mut light = built.list[0].clone();
+        (light.kind, light.element_count) = (crate::constants::KIND_POINT, 0);
+        built.list.insert(3, light);
+        let (list, nearness) = (&built.list, Nearness::default());
+        let alone = pairs_of(&elements, list, &tree, &nearness);
+        let entries: usize = alone.iter().map(|of| of.entries.len()).sum();
+        assert!(entries > 1000, "{entries}");
+        let search = |turn| {
+            let search = NearSearch::new(&elements, list, &tree, &nearness);
+            let message = postcard::to_stdvec(&search).expect("it is written");
+            let read: NearSearch = postcard::from_bytes(&message).expect("it is read");
+            read.find([turn, 3])
+        };
+        let first: Vec<&Source> = own(list, [0, 3]).collect();
+        let first = pairs_of(&elements, first, &tree, &nearness);
+        assert!(joined(list, first, &[search(1), search(2)]) == alone);
+    }
+}
