@@ -122,6 +122,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
+    use crate::math::form_factor::spread_in_triangle;
     use crate::picture::View;
     use crate::scene::{Camera, Scene};
 
@@ -174,14 +175,8 @@ mod tests {
             let [x, y, w] = projection.rows(tile);
             for item in (5..count - 7).step_by(BLOCK) {
                 let [a, b, c] = [0, 1, 2].map(|k| corners[3 * item as usize + k]);
-                for [u, v] in [
-                    [0.0, 0.0],
-                    [1.0, 0.0],
-                    [0.0, 1.0],
-                    [0.3, 0.3],
-                    [0.8, 0.1],
-                    [0.1, 0.8],
-                ] {
+                for step in 0..36 {
+                    let [u, v] = spread_in_triangle(step).map(|share| share as f32);
                     let place = a + u * (b - a) + v * (c - a);
                     let (x, y, w) = (x.dot(place), y.dot(place), w.dot(place));
                     if w > 0.0 && x.abs() <= w && y.abs() <= w {

@@ -172,7 +172,7 @@ mod tests {
     #[test]
     fn pairs_do_not_depend_on_who_finds_them() {
         let options = LoadOptions {
-            patches: Some(2000),
+            patches: Some(3000),
             ..LoadOptions::default()
         };
         let scene = load("cornell", &options).expect("it is built in");
