@@ -102,7 +102,7 @@ fn the_cuts_of_draws_change_no_picture() {
         });
         let (by_tile, same, [drawn, _]) = picture(cuts);
         let (cut, many, _) = picture(Cuts {
-            part_indices: 1000,
+            part_triangles: 300,
             ..cuts
         });
         println!("{drawn} of {all} triangles, {few} and {many} parts");

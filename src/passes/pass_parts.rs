@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use crate::vk::{Commands, Framebuffer, RenderPass};
 
-/// Indices of a part of a submission, at most: 0.1 s by lavapipe's two cores.
-pub const PART_INDICES: u32 = 3 << 14;
+/// Triangles of a part of a submission, at most: 0.1 s by lavapipe's two cores.
+pub const PART_TRIANGLES: u32 = 1 << 14;
 
 /// Where something is drawn, and in which parts.
 #[derive(Clone, Copy)]
@@ -17,15 +17,15 @@ pub struct PassParts<'a> {
     pub size: (u32, u32),
     /// What colour is cleared to.
     pub clear: [u32; 4],
-    /// Indices of a part, at most.
-    pub indices: u32,
+    /// Triangles of a part, at most; one at least.
+    pub triangles: u32,
 }
 
 /// A render pass under way.
 pub struct PartedPass<'a> {
     cmd: &'a Commands,
     parts: PassParts<'a>,
-    /// Indices that the present part may still draw.
+    /// Triangles that the present part may still draw.
     left: u32,
     /// Left, top, width and height that draws are clipped to.
     clip: [u32; 4],
@@ -37,7 +37,7 @@ impl<'a> PartedPass<'a> {
         let pass = Self {
             cmd,
             parts,
-            left: parts.indices,
+            left: parts.triangles.max(1),
             clip: [0, 0, parts.size.0, parts.size.1],
         };
         pass.begin_render_pass(0);
@@ -70,13 +70,13 @@ impl<'a> PartedPass<'a> {
         self.cmd.scissor(left, top, width, height);
     }
 
-    /// Draws runs of indices, each of whole triangles, with what `bind` binds: at first, and again
-    /// in each part that begins.
+    /// Draws runs of triangles, three indices each, with what `bind` binds: at first, and again in
+    /// each part that begins.
     pub fn draw(&mut self, runs: impl IntoIterator<Item = Range<u32>>, bind: impl Fn(&Commands)) {
         let mut is_bound = false;
         for mut run in runs {
             while !run.is_empty() {
-                if self.left < 3 {
+                if self.left == 0 {
                     self.next_part();
                     is_bound = false;
                 }
@@ -84,8 +84,8 @@ impl<'a> PartedPass<'a> {
                     bind(self.cmd);
                     is_bound = true;
                 }
-                let count = (run.end - run.start).min(self.left - self.left % 3);
-                self.cmd.draw_indexed(run.start, count);
+                let count = (run.end - run.start).min(self.left);
+                self.cmd.draw_indexed(3 * run.start, 3 * count);
                 self.left -= count;
                 run.start += count;
             }
@@ -96,7 +96,7 @@ impl<'a> PartedPass<'a> {
         self.cmd.end_render_pass();
         self.cmd.part();
         self.begin_render_pass(1);
-        self.left = self.parts.indices.max(3);
+        self.left = self.parts.triangles.max(1);
     }
 
     pub fn end(self) {

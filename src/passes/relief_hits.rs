@@ -58,8 +58,8 @@ pub struct ShapeBuffers {
 pub struct Drawn {
     pub prisms: Vec<Range<u32>>,
     pub parameters: Parameters,
-    /// Indices of a part of the submission, at most.
-    pub part_indices: u32,
+    /// Triangles of a part of the submission, at most.
+    pub part_triangles: u32,
 }
 
 pub struct ReliefHits {
@@ -142,7 +142,7 @@ impl ReliefHits {
             framebuffer: &hits.framebuffer,
             size,
             clear: [0; 4],
-            indices: drawn.part_indices,
+            triangles: drawn.part_triangles,
         };
         let mut pass = PartedPass::begin(cmd, parts);
         shape.draw(&mut pass, &self.pipeline, set, drawn);
@@ -228,12 +228,10 @@ impl ShapeBuffers {
         set: &DescriptorSet,
         drawn: &Drawn,
     ) {
-        let of_prism = HULL.len() as u32;
-        let indices = drawn
-            .prisms
-            .iter()
-            .map(|run| of_prism * run.start..of_prism * run.end);
-        pass.draw(indices, |cmd| {
+        let of_prism = HULL.len() as u32 / 3;
+        let prisms = drawn.prisms.iter();
+        let triangles = prisms.map(|run| of_prism * run.start..of_prism * run.end);
+        pass.draw(triangles, |cmd| {
             cmd.bind_indices(&self.indices);
             cmd.bind_graphics(pipeline, set, Some(&self.vertices));
             cmd.push_graphics(pipeline, &drawn.parameters);

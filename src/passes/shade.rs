@@ -74,10 +74,10 @@ impl Parameters {
     }
 }
 
-/// Runs of vertices of one material.
+/// Runs of triangles of one material.
 #[derive(Clone)]
 pub struct Draw<'a> {
-    pub vertices: Vec<Range<u32>>,
+    pub triangles: Vec<Range<u32>>,
     pub texture: &'a DescriptorSet,
     /// LIT_… of [`crate::constants`].
     pub lit: u32,
@@ -221,7 +221,7 @@ impl Shade {
             framebuffer: &target.framebuffer,
             size: mesh.size,
             clear,
-            indices: mesh.part_indices,
+            triangles: mesh.part_triangles,
         };
         let mut pass = PartedPass::begin(cmd, parts);
         first(&mut pass);
@@ -230,7 +230,7 @@ impl Shade {
                 (true, Some(adding)) => adding,
                 _ => &self.lit[draw.lit as usize],
             };
-            pass.draw(draw.vertices, |cmd| {
+            pass.draw(draw.triangles, |cmd| {
                 cmd.bind_indices(mesh.indices);
                 cmd.bind_graphics(pipeline, draw.texture, Some(mesh.vertices));
                 cmd.push_graphics(pipeline, &draw.parameters);
@@ -253,8 +253,8 @@ pub struct Mesh<'a> {
     pub background: f32,
     /// Whether the target's depths are those of another pass.
     pub over_depths: bool,
-    /// Indices of a part of the submission, at most.
-    pub part_indices: u32,
+    /// Triangles of a part of the submission, at most.
+    pub part_triangles: u32,
 }
 
 impl Target {

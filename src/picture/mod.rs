@@ -12,6 +12,8 @@ pub use develop::{Codes, Development, Tone};
 pub(crate) use file::exposure_by_area;
 pub use file::{FileKind, Picture, SAMPLES};
 pub(crate) use file::{Samples, automatic_exposure, mean, write_png};
+#[cfg(test)]
+pub(crate) use projection::tests;
 pub(crate) use projection::{NEAR, Projection, Tile};
 
 use crate::error::{Error, Result};

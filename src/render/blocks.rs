@@ -123,33 +123,16 @@ mod tests {
 
     use super::*;
     use crate::math::form_factor::spread_in_triangle;
-    use crate::picture::View;
-    use crate::scene::{Camera, Scene};
+    use crate::math::sampling::Random;
+    use crate::picture::tests::seen_from;
 
     /// Every place that a tile shows is of a triangle that it draws; most tiles draw few.
     #[test]
     fn a_tile_draws_what_it_shows() {
-        let camera = Camera {
-            name: "test".into(),
-            position: DVec3::new(0.3, 0.2, 0.8),
-            look_at: DVec3::new(-0.2, 0.1, 0.0),
-            up: DVec3::Y,
-            fov_y: 50.0,
-        };
         let (width, height) = (160, 90);
-        let view = View {
-            camera: &camera,
-            width,
-            height,
-        };
-        let projection = Projection::new(&Scene::default(), &view).expect("a view");
-        let mut state = 1_u64;
-        let mut next = || {
-            state = state
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
-            (state >> 40) as f32 / (1 << 24) as f32 - 0.5
-        };
+        let projection = seen_from(DVec3::new(0.3, 0.2, 0.8), (width, height));
+        let mut random = Random::new(1, 0, 0);
+        let mut next = || random.unit() as f32 - 0.5;
         // Each block is of one triangle, so that no other one reaches where it does. Many cross the
         // plane of the eye.
         let mut corners = Vec::new();

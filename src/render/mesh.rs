@@ -216,13 +216,8 @@ impl Mesh {
         let corner = tile.corner(seen.samples);
         let (scene, lighting, cuts) = (seen.scene, seen.lighting, seen.cuts);
         let parameters = move |material| parameters(rows, material, lighting);
-        let shown = move |range: &KindRange| {
-            let runs = self.blocks.shown(range.triangles.clone(), tile, cuts);
-            let vertices = runs.into_iter().map(|run| 3 * run.start..3 * run.end);
-            vertices.collect()
-        };
         self.ranges.iter().map(move |range| Draw {
-            vertices: shown(range),
+            triangles: self.blocks.shown(range.triangles.clone(), tile, cuts),
             lit: range.lit,
             texture: match range.kind {
                 Kind::Front(m) if lighting.show.is_coloured() => textures.of_material(m),

@@ -160,7 +160,7 @@ impl Relief {
         Drawn {
             prisms: self.mesh.blocks.shown(all, tile, seen.cuts),
             parameters: self.rays(seen, tile),
-            part_indices: seen.cuts.part_indices,
+            part_triangles: seen.cuts.part_triangles,
         }
     }
 

@@ -147,9 +147,7 @@ impl ReliefMesh {
             states,
         })
     }
-}
 
-impl ReliefMesh {
     /// Prisms that a tile draws, and all.
     pub fn drawn(&self, tile: Tile, cuts: Cuts) -> [usize; 2] {
         let all = 0..self.prism_count;

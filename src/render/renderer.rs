@@ -12,7 +12,7 @@ use super::seen_scene::SeenScene;
 use super::textures::{Bound, Textures};
 use super::{Lighting, Overdraw, Show, View};
 use crate::error::Result;
-use crate::passes::pass_parts::PART_INDICES;
+use crate::passes::pass_parts::PART_TRIANGLES;
 use crate::passes::shade::{self, Shade, Target};
 use crate::passes::shadow_rays::LightBuffers;
 use crate::picture::{Light, Picture, Projection, SAMPLES, Tile};
@@ -28,15 +28,15 @@ const TILE: u32 = 40;
 pub struct Cuts {
     /// Whether a tile leaves out the triangles that do not reach into it.
     pub by_tile: bool,
-    /// Indices of a part of a submission, at most: three for each triangle.
-    pub part_indices: u32,
+    /// Triangles of a part of a submission, at most; a prism has eight.
+    pub part_triangles: u32,
 }
 
 impl Default for Cuts {
     fn default() -> Self {
         Self {
             by_tile: true,
-            part_indices: PART_INDICES,
+            part_triangles: PART_TRIANGLES,
         }
     }
 }
@@ -403,7 +403,7 @@ impl<'a> Renderer<'a> {
                     _ => 0.0,
                 },
                 over_depths,
-                part_indices: self.cuts.part_indices,
+                part_triangles: self.cuts.part_triangles,
             },
             |pass| {
                 if let Some((relief, target)) = of_relief {

@@ -174,16 +174,12 @@ impl Crew {
         #[cfg(feature = "mpi")]
         if let Some(ranks) = &self.ranks {
             let search = NearSearch::new(elements, sources, tree, nearness);
-            let found = ranks.search(search, || {
+            let (own, others) = ranks.search(search, || {
                 let own: Vec<&Source> = own(sources, [0, ranks.count()]).collect();
                 pairs_of(elements, own, tree, nearness)
             })?;
-            let (first, others) = found;
-            return Ok(NearPairs::new(
-                elements,
-                sources,
-                joined(sources, first, &others),
-            ));
+            let found = joined(sources, own, &others);
+            return Ok(NearPairs::new(elements, sources, found));
         }
         let found = pairs_of(elements, sources, tree, nearness);
         Ok(NearPairs::new(elements, sources, found))

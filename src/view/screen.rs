@@ -14,8 +14,8 @@ use crate::vk::{
     RenderPass, Shown, Stage, Surface, Swapchain,
 };
 
-/// Indices of a part of a frame, at most: its triangles follow no rays.
-const FRAME_INDICES: u32 = 3 << 17;
+/// Triangles of a part of a frame, at most: they follow no rays.
+const FRAME_TRIANGLES: u32 = 1 << 17;
 
 /// A window with its device, and its images while it has an area.
 pub struct Screen {
@@ -175,7 +175,7 @@ impl Screen {
                 framebuffer: &target.framebuffer,
                 size: (width, height),
                 clear: [0; 4],
-                indices: FRAME_INDICES,
+                triangles: FRAME_TRIANGLES,
             };
             let mut pass = PartedPass::begin(cmd, parts);
             record(&mut pass);

@@ -1,5 +1,6 @@
 //! The triangles that the surface pass draws, in order of their materials, those with relief last.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
@@ -39,10 +40,7 @@ pub const NOTHING: u32 = u32::MAX;
 /// Drawn triangles of one material.
 pub struct MeshRange {
     pub material: u32,
-    /// First vertex.
-    pub first: u32,
-    /// Number of vertices.
-    pub count: u32,
+    pub triangles: Range<u32>,
     pub relief: bool,
 }
 
@@ -70,14 +68,13 @@ impl SurfaceMesh {
         let mut ranges = Vec::new();
         let mut first = 0;
         for same in order.chunk_by(|&a, &b| material(a) == material(b)) {
-            let count = 3 * same.len() as u32;
+            let end = first + same.len() as u32;
             ranges.push(MeshRange {
                 material: material(same[0]),
-                first,
-                count,
+                triangles: first..end,
                 relief: has_relief(same[0]),
             });
-            first += count;
+            first = end;
         }
         let vertices = vertices(scene, &order);
         let indices: Vec<u32> = (0..vertices.len() as u32).collect();

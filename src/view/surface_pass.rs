@@ -284,8 +284,7 @@ impl SurfacePass {
         range: &MeshRange,
         parameters: &view_mesh::Parameters,
     ) {
-        let run = range.first..range.first + range.count;
-        pass.draw(std::iter::once(run), |cmd| {
+        pass.draw(std::iter::once(range.triangles.clone()), |cmd| {
             cmd.bind_indices(&self.mesh.indices);
             cmd.bind_graphics(pipeline, set, Some(&self.mesh.vertices));
             cmd.push_graphics(pipeline, parameters);

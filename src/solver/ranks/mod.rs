@@ -160,8 +160,9 @@ impl Ranks {
         for rank in 1..self.count {
             self.send(rank, vec![SEARCH])?;
         }
-        self.broadcast(written(&search)?)?;
+        let message = written(&search)?;
         drop(search);
+        self.broadcast(message)?;
         let own = own();
         let found = (1..self.count).map(|rank| read(&self.receive(rank)?));
         Ok((own, found.collect::<Result<_>>()?))
