@@ -79,14 +79,19 @@ impl Factors {
         let direct = &rows * &axes;
         let inside = inside(visibility, &facets.sky, &shading.reflectance, &direct);
         let sight = Sight::new(visibility);
-        let corners = (0..field.facet_count() / 2 * CORNERS)
-            .into_par_iter()
-            .flat_map_iter(|at| {
-                let corner = Corner::new(field, at / CORNERS, at % CORNERS);
-                let row = corner.transfer(&sight, shading, &facets.scale);
+        let (axes, inside, facets) = (&axes, &inside, &facets);
+        let (sight, whitening, fit) = (&sight, &whitening, &fit);
+        let of_cell = move |cell: usize| {
+            let seen = [2 * cell, 2 * cell + 1].map(|q| {
+                let mut seen = [0.0; CELLS];
+                sight.seen(q, &mut seen);
+                seen
+            });
+            (0..CORNERS).flat_map(move |at| {
+                let corner = Corner::new(field, cell, at);
+                let row = corner.transfer(sight, &seen, shading, &facets.scale);
                 let row = whitening.apply(&fit.apply(&row));
                 let share = 1.0 / corner.facets.len() as f32;
-                let (axes, inside) = (&axes, &inside);
                 (0..rank).map(move |r| {
                     let own: f64 = row
                         .iter()
@@ -97,7 +102,9 @@ impl Factors {
                     (bounced * share).extend(own as f32)
                 })
             })
-            .collect();
+        };
+        let cells = (0..field.facet_count() / 2).into_par_iter();
+        let corners = cells.flat_map_iter(of_cell).collect();
         Self {
             rank,
             basis,
@@ -169,27 +176,33 @@ impl Corner {
         }
     }
 
-    /// Its response to the light from each fine cell: its facets' visibility, with its own normal
-    /// or the map's.
-    fn transfer(&self, sight: &Sight<'_>, shading: &Shading, scale: &[f32]) -> Vec<f32> {
+    /// Its response to the light from each fine cell: what its facets see, of those `seen` by both
+    /// of the cell, with its own normal or the map's.
+    fn transfer(
+        &self,
+        sight: &Sight<'_>,
+        seen: &[[f32; CELLS]; 2],
+        shading: &Shading,
+        scale: &[f32],
+    ) -> Vec<f32> {
         let normal = if shading.from_map {
             let sum: DVec3 = self.facets.clone().map(|q| shading.normals[q]).sum();
             sum.normalize_or(self.normal)
         } else {
             self.normal
         };
-        let share = 1.0 / self.facets.len() as f64;
-        let seen = |i: usize| self.facets.clone().map(|q| sight.of(q, i)).sum::<f64>() * share;
-        sight
-            .cells
-            .iter()
-            .zip(scale)
-            .enumerate()
-            .map(|(i, (cell, scale))| match normal.dot(cell.direction) {
-                cosine if cosine > 0.0 => scale * (cosine * seen(i)) as f32,
-                _ => 0.0,
-            })
-            .collect()
+        let [first, second] = seen;
+        let scaled = |seen: &[f32; CELLS]| seen.iter().zip(scale).map(|(s, by)| s * by).collect();
+        let mut row: Vec<f32> = match (self.facets.len(), self.facets.start % 2) {
+            (1, 0) => scaled(first),
+            (1, _) => scaled(second),
+            _ => {
+                let both = first.iter().zip(second).zip(scale);
+                both.map(|((a, b), by)| 0.5 * (a + b) * by).collect()
+            }
+        };
+        sight.times_cosine(normal, &mut row);
+        row
     }
 }
 

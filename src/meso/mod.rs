@@ -11,6 +11,7 @@ mod factors;
 mod footprints;
 mod height_field;
 mod height_pyramid;
+mod known_factors;
 mod relief;
 mod response;
 mod scattering;
@@ -23,6 +24,7 @@ pub use factors::{CORNERS, Factors, RANK_STEP};
 pub use footprints::Footprints;
 pub use height_field::{Facet, HeightField};
 pub use height_pyramid::HeightPyramid;
+pub use known_factors::KnownFactors;
 pub use relief::{
     Class, March, MesoTexel, Options, Relief, Texels, TextureFacet, Transport, visibility,
 };

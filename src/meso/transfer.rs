@@ -19,32 +19,55 @@ pub(super) struct Facets {
     pub(super) scale: Vec<f32>,
 }
 
-/// Share of each fine cell of the sky that a facet sees, 0..=1.
+/// What facets see of the sky, and how they face it; `[fine cell]`, each part of the cells in a
+/// list of its own, so that loops over them run in vectors.
 pub(super) struct Sight<'a> {
-    pub(super) cells: Vec<FineCell>,
-    /// Azimuth of each cell, for [`Visibility::horizon`].
+    /// For [`Visibility::horizons`].
     azimuths: Vec<Azimuth>,
+    /// z of the inner rim, and over the height of the cell, 1.
+    high: Vec<f32>,
+    over_height: Vec<f32>,
+    /// Of the middle.
+    direction: [Vec<f32>; 3],
     visibility: &'a Visibility,
 }
 
 impl<'a> Sight<'a> {
     pub(super) fn new(visibility: &'a Visibility) -> Self {
         let cells: Vec<FineCell> = FineCell::all().collect();
+        let of = |value: &dyn Fn(&FineCell) -> f64| -> Vec<f32> {
+            cells.iter().map(|cell| value(cell) as f32).collect()
+        };
+        let azimuth = |c: &FineCell| Azimuth::new(c.direction.y.atan2(c.direction.x));
         Self {
-            azimuths: cells
-                .iter()
-                .map(|c| Azimuth::new(c.direction.y.atan2(c.direction.x)))
-                .collect(),
-            cells,
+            azimuths: cells.iter().map(azimuth).collect(),
+            high: of(&|cell| cell.z_range[1]),
+            over_height: of(&|cell| 1.0 / (cell.z_range[1] - cell.z_range[0])),
+            direction: [0, 1, 2].map(|axis| of(&|cell| cell.direction[axis])),
             visibility,
         }
     }
 
-    pub(super) fn of(&self, facet: usize, i: usize) -> f64 {
-        let slope = self.visibility.horizon(facet, &self.azimuths[i]).max(0.0);
-        let horizon = slope / (1.0 + slope * slope).sqrt();
-        let [low, high] = self.cells[i].z_range;
-        ((high - horizon) / (high - low)).clamp(0.0, 1.0)
+    /// Share of each cell that a facet sees, 0..=1.
+    pub(super) fn seen(&self, facet: usize, seen: &mut [f32; CELLS]) {
+        let kept = self.visibility.horizons(facet);
+        for (seen, azimuth) in seen.iter_mut().zip(&self.azimuths) {
+            *seen = azimuth.horizon(kept).max(0.0);
+        }
+        let cells = self.high.iter().zip(&self.over_height);
+        for (seen, (high, over_height)) in seen.iter_mut().zip(cells) {
+            let horizon = *seen / (1.0 + *seen * *seen).sqrt();
+            *seen = ((high - horizon) * over_height).clamp(0.0, 1.0);
+        }
+    }
+
+    /// Cosine between a normal and each cell, 0 behind it, times what `row` has.
+    pub(super) fn times_cosine(&self, normal: DVec3, row: &mut [f32]) {
+        let normal = normal.as_vec3();
+        let [x, y, z] = &self.direction;
+        for (value, ((x, y), z)) in row.iter_mut().zip(x.iter().zip(y).zip(z)) {
+            *value *= (normal.x * x + normal.y * y + normal.z * z).max(0.0);
+        }
     }
 }
 
@@ -57,7 +80,7 @@ const MOST_SCALE: f64 = 4.0;
 impl Facets {
     pub(super) fn new(field: &HeightField, normals: &[DVec3], visibility: &Visibility) -> Self {
         let sight = Sight::new(visibility);
-        let cells = &sight.cells;
+        let cells: Vec<FineCell> = FineCell::all().collect();
         let count = field.facet_count();
         let area: Vec<f64> = (0..count).map(|q| field.facet(q).area).collect();
         let mut transfer = vec![0.0_f32; count * CELLS];
@@ -65,9 +88,10 @@ impl Facets {
             .par_chunks_mut(CELLS)
             .enumerate()
             .for_each(|(q, row)| {
-                for (i, cell) in cells.iter().enumerate() {
-                    row[i] = (sight.of(q, i) * normals[q].dot(cell.direction).max(0.0)) as f32;
-                }
+                let mut seen = [0.0; CELLS];
+                sight.seen(q, &mut seen);
+                row.copy_from_slice(&seen);
+                sight.times_cosine(normals[q], row);
             });
         // The light that falls on the tile from each direction must arrive at its facets.
         let tile = 0.5 * field.aspect * count as f64;
@@ -79,7 +103,7 @@ impl Facets {
         }
         let scale: Vec<f32> = arriving
             .iter()
-            .zip(cells)
+            .zip(&cells)
             .map(|(sum, cell)| (tile * cell.direction.z / sum.max(1e-300)).min(MOST_SCALE) as f32)
             .collect();
         let heights: f64 = cells.iter().map(|c| c.direction.z).sum();

@@ -28,8 +28,8 @@ const VERSION: &str = "relief visibility 1";
 pub const RAYS: usize = (RAY_STRATA * RAY_STRATA) as usize;
 
 impl Visibility {
-    /// The file of a height field in the cache, named by a hash of its content.
-    fn file(field: &HeightField, cache: &Path) -> PathBuf {
+    /// What tells the visibility of one height field from that of another: a hash of its content.
+    pub(super) fn key(field: &HeightField) -> [u8; 32] {
         let mut hash = Sha256::new();
         hash.update(VERSION);
         hash.update(format!(
@@ -41,7 +41,15 @@ impl Visibility {
             .heights
             .iter()
             .for_each(|h| hash.update(h.to_le_bytes()));
-        let name: String = hash.finalize().iter().map(|b| format!("{b:02x}")).collect();
+        hash.finalize().into()
+    }
+
+    /// Its file in the cache.
+    fn file(field: &HeightField, cache: &Path) -> PathBuf {
+        let name: String = Self::key(field)
+            .iter()
+            .map(|b| format!("{b:02x}"))
+            .collect();
         cache.join(format!("relief-{name}.bin"))
     }
 
@@ -76,11 +84,9 @@ impl Visibility {
         write_atomically(&Self::file(field, cache), |out| out.write_all(&bytes))
     }
 
-    /// Tangent of the horizon of a facet towards an azimuth, linear between the stored azimuths.
-    pub(super) fn horizon(&self, facet: usize, azimuth: &Azimuth) -> f64 {
-        let kept = &self.horizons[facet * AZIMUTHS as usize..][..AZIMUTHS as usize];
-        let [low, high] = azimuth.between.map(|i| f64::from(kept[i]));
-        low + (high - low) * azimuth.share
+    /// Tangents of the horizon of a facet, `[azimuth]`.
+    pub(super) fn horizons(&self, facet: usize) -> &[f32] {
+        &self.horizons[facet * AZIMUTHS as usize..][..AZIMUTHS as usize]
     }
 }
 
@@ -89,7 +95,7 @@ impl Visibility {
 pub(super) struct Azimuth {
     between: [usize; 2],
     /// Weight of the second.
-    share: f64,
+    share: f32,
 }
 
 impl Azimuth {
@@ -99,7 +105,13 @@ impl Azimuth {
         let low = at as usize;
         Self {
             between: [low, low + 1].map(|i| i % AZIMUTHS as usize),
-            share: at - low as f64,
+            share: (at - low as f64) as f32,
         }
+    }
+
+    /// Tangent of the horizon of a facet, linear between its stored ones, `[azimuth]`.
+    pub fn horizon(&self, kept: &[f32]) -> f32 {
+        let [low, high] = self.between.map(|i| kept[i]);
+        low + (high - low) * self.share
     }
 }

@@ -10,6 +10,7 @@ use crate::constants::{
     SHADING_NORMAL, SHADING_PARALLAX, SHADING_RELIEF, VIEW_ALBEDO, VIEW_HEIGHT, VIEW_IRRADIANCE,
     VIEW_NORMAL, VIEW_SHADED, VIEW_SLOTS,
 };
+use crate::meso::KnownFactors;
 use crate::picture::Light;
 use crate::scene::Scene;
 use crate::solver::BY_PAPER;
@@ -124,6 +125,8 @@ pub struct Lighting<'a> {
     pub hide_backs: bool,
     /// Folder that keeps the visibility of reliefs from run to run.
     pub cache: Option<&'a Path>,
+    /// Factors of reliefs that other renderers have found, and where they are left for further ones.
+    pub known: Option<&'a KnownFactors>,
 }
 
 impl<'a> Lighting<'a> {
@@ -139,6 +142,7 @@ impl<'a> Lighting<'a> {
             skip_open: true,
             hide_backs: false,
             cache: None,
+            known: None,
         }
     }
 

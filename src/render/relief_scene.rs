@@ -13,7 +13,7 @@ use crate::math::directions::Directions;
 use crate::mesh::elements::Elements;
 use crate::mesh::meso_vertices::MesoVertices;
 use crate::mesh::tiles::{Tile, tiles};
-use crate::meso::{Factors, visibility};
+use crate::meso::{Factors, KnownFactors, visibility};
 use crate::passes::relief::{Kind, Relief};
 use crate::passes::relief_hits::ReliefHits;
 use crate::passes::relief_overdraw::ReliefOverdraw;
@@ -39,7 +39,7 @@ pub struct ReliefScene {
     /// Index into `tiles`, `[triangle]`; `u32::MAX` for triangles without.
     pub surface_of: Vec<u32>,
     /// `[surface]`, in the order of `tiles`.
-    pub factors: Vec<Factors>,
+    pub factors: Vec<Arc<Factors>>,
     pub surfaces: Surfaces,
     pub vertices: MesoVertices,
     /// Moments at the vertices, `[vertex][slot][colour]`: all of the light and what is direct.
@@ -86,17 +86,23 @@ impl ReliefScene {
             }
         }
         let mut march = marcher(device);
-        let mut factors = Vec::with_capacity(tiles.len());
-        for tile in &tiles {
-            let (visibility, _) = visibility(&tile.field, lighting.cache, &mut march)?;
-            factors.push(Factors::new(
-                &directions,
-                &tile.field,
-                &visibility,
-                &tile.shading,
-                FACTOR_ERROR,
-            ));
-        }
+        let none = KnownFactors::default();
+        let reliefs = tiles.iter().map(|tile| (&tile.field, &tile.shading));
+        let factors =
+            lighting
+                .known
+                .unwrap_or(&none)
+                .of(&directions, reliefs, |field, shading| {
+                    let (visibility, _) = visibility(field, lighting.cache, &mut march)?;
+                    let error = FACTOR_ERROR;
+                    Ok(Factors::new(
+                        &directions,
+                        field,
+                        &visibility,
+                        shading,
+                        error,
+                    ))
+                })?;
         let vertices = MesoVertices::new(scene, &light.elements, &light.frames);
         let gather = |moments| vertices.gather(&directions, &light.frames, moments);
         Ok(Some(Self {

@@ -1,6 +1,7 @@
 //! Height maps and factors of a scene's relief in the form that the relief pass reads.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use bytemuck::Zeroable;
 use glam::{DVec2, Vec4};
@@ -63,7 +64,7 @@ pub struct Surfaces {
 
 impl Surfaces {
     /// `tiles` and `factors` are `[surface]`.
-    pub fn new(scene: &Scene, tiles: &[Tile], factors: &[Factors]) -> Self {
+    pub fn new(scene: &Scene, tiles: &[Tile], factors: &[Arc<Factors>]) -> Self {
         let mut all = Self::default();
         let mut pyramids: HashMap<u32, HeightTile> = HashMap::new();
         for (tile, factors) in tiles.iter().zip(factors) {

@@ -6,7 +6,7 @@
 //! of different stages would not match.
 
 use std::collections::VecDeque;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -17,6 +17,7 @@ use super::snapshot::{Snapshot, even_moments};
 use super::{DeviceChoice, Wake};
 use crate::bake::solution::DirectionalLight;
 use crate::error::Result;
+use crate::meso::KnownFactors;
 use crate::render::{
     Direct, Light, Lighting, Picture, ReliefShading, Renderer, SAMPLES, Show, View,
 };
@@ -116,7 +117,8 @@ impl Shared {
 }
 
 impl Detailer {
-    pub fn new(choice: &DeviceChoice, wake: Wake) -> Self {
+    /// `cache` is as [`Lighting::cache`].
+    pub fn new(choice: &DeviceChoice, cache: Option<PathBuf>, wake: Wake) -> Self {
         let shared = Arc::<Shared>::default();
         let (work, choice) = (Arc::clone(&shared), choice.clone());
         let thread = super::background("detail", move || {
@@ -125,6 +127,8 @@ impl Detailer {
                     shared: &work,
                     wake: &wake,
                     device,
+                    cache: cache.as_deref(),
+                    known: Arc::default(),
                     last: [None, None],
                 }
                 .run()
@@ -189,6 +193,9 @@ struct Work<'a> {
     shared: &'a Shared,
     wake: &'a Wake,
     device: Arc<Device>,
+    cache: Option<&'a Path>,
+    /// The factors of its reliefs, which only other heights or directions change.
+    known: Arc<KnownFactors>,
     /// The last pictures of each side that were drawn whole.
     last: [Option<Drawn>; 2],
 }
@@ -253,6 +260,7 @@ impl Work<'_> {
             .map(|e| *e + wanted.ambient)
             .collect();
         let relief = snapshot.relief.as_ref().map(|r| under(r, wanted.ambient));
+        let known = Arc::clone(&self.known);
         let lighting = Lighting {
             relief: relief
                 .as_ref()
@@ -262,6 +270,8 @@ impl Work<'_> {
             shading: wanted.shading,
             direct: wanted.direct,
             show: wanted.show,
+            cache: self.cache,
+            known: Some(&known),
             ..snapshot.lighting(&irradiance)
         };
         let view = view(&wanted);

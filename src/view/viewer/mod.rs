@@ -200,7 +200,7 @@ impl Viewer {
         egui.set_theme(egui::Theme::Dark);
         let mut viewer = Self {
             baker,
-            detailer: Detailer::new(&device, Arc::clone(&wake)),
+            detailer: Detailer::new(&device, settings.relief.cache.clone(), Arc::clone(&wake)),
             surfaces,
             panel_pass: PanelPass::new(screen.device(), screen.pass())?,
             screen,
