@@ -10,7 +10,7 @@ use super::buffers::{filled, upload};
 use super::groups;
 use super::types::ReceiverList;
 use crate::constants::{GROUP, NONE, RECEIVE_LISTS};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::vk::{Buffer, BufferUse, Device};
 
 /// Elements of one kind in whole blocks of GROUP, counted from the first of their kind. The first
@@ -97,6 +97,20 @@ impl RowShape {
     pub fn blocks(self) -> u32 {
         self.plain_blocks() + self.meso_blocks()
     }
+
+    /// Refuses more elements than a pass of the device takes: a workgroup for each block.
+    pub fn check(self, device: &str, max_workgroups: u32) -> Result<()> {
+        let most = u64::from(GROUP) * u64::from(max_workgroups);
+        let count = u64::from(self.plain.count.max(self.meso.count));
+        if count > most {
+            let what = format!(
+                "{count} elements, more than the {most} that {device} finds: fewer by --patches, \
+                 or several devices"
+            );
+            return Err(Error::Usage(what));
+        }
+        Ok(())
+    }
 }
 
 /// The form factors of a batch in f32. A clone is another handle to the same buffers.
@@ -180,5 +194,27 @@ impl FreshRows {
             occupied: zeroed("occupied blocks", 4 * slots * u64::from(shape.blocks()))?,
             facing_away: zeroed("facing away", 4 * slots)?,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of plain elements or of those with relief, whichever are more.
+    #[test]
+    fn more_blocks_than_workgroups_are_refused() {
+        let check =
+            |plain: u32, meso: u32| RowShape::whole(plain + meso, meso).check("a device", 3);
+        let most = 3 * GROUP;
+        for (plain, meso) in [(most, most), (0, most), (most, 0)] {
+            check(plain, meso).expect("it has room");
+        }
+        for (plain, meso) in [(most + 1, 0), (0, most + 1), (1, most + 1)] {
+            let refused = check(plain, meso).expect_err("no room");
+            let (count, said) = (most + 1, refused.to_string());
+            let expected = format!("{count} elements, more than the {most} that a device finds");
+            assert!(said.contains(&expected), "{said}");
+        }
     }
 }

@@ -17,7 +17,6 @@ use super::relief_light::ReliefSums;
 use super::row_maker::RowParts;
 use super::shares::Share;
 use super::{Settings, VISIBILITY_MEMORY};
-use crate::constants::GROUP;
 use crate::error::{Error, Result};
 use crate::passes::buffers::{SceneBuffers, State, download_parts, upload};
 use crate::passes::fresh_rows::{FreshRows, RowShape};
@@ -110,7 +109,7 @@ impl Member {
         } = own;
         let settings = &data.settings;
         let shape = share.shape;
-        check_room(device, shape)?;
+        shape.check(device.name(), device.limits().max_workgroups)?;
         let scene = SceneBuffers::new(device, &data.scene, shape)?;
         let state = State::new(device, &scene)?;
         let relief = (data.relief.as_ref())
@@ -371,21 +370,6 @@ impl Member {
 
 fn is_made(makers: &Makers, kind: RowKind) -> bool {
     kind == RowKind::Common || makers.kinds().contains(&kind)
-}
-
-/// A pass takes a workgroup for each block of elements.
-fn check_room(device: &Device, shape: RowShape) -> Result<()> {
-    let most = u64::from(GROUP) * u64::from(device.limits().max_workgroups);
-    let count = u64::from(shape.plain.count.max(shape.meso.count));
-    if count > most {
-        let what = format!(
-            "{count} elements, more than the {most} that {} finds: fewer by --patches, or several \
-             devices",
-            device.name()
-        );
-        return Err(Error::Usage(what));
-    }
-    Ok(())
 }
 
 fn unprepared() -> Error {
