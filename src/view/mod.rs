@@ -4,6 +4,7 @@
 //! system, script ─► Event ─► Viewer ─┬─► Panel (egui) ─────────┐
 //!                                    ├─► SurfacePass ──────────┼─► Screen ─► the window
 //!            Baker ─► Snapshot ─────►┤                         │
+//!                     Sketcher ─────►┤                         │
 //!                      Detailer ────►┴─► the detailed picture ─┘
 //! ```
 //!
@@ -12,12 +13,14 @@
 //! detailer's thread draws the view as `render` does while it stays. No frame waits for the other
 //! two threads. A software driver shares its own threads between the devices of an instance, so
 //! that each device has its own instance too; and the other two threads, with all that they start,
-//! run at a lower priority.
+//! run at a lower priority. What a point light that is moved brings directly is found by rays on
+//! the CPU first, by a thread of the window's priority (`sketch`).
 
 mod backdrop;
 mod baker;
 mod camera;
 mod compare;
+mod corner_light;
 mod detailer;
 mod event;
 mod history;
@@ -32,6 +35,7 @@ mod recent;
 mod runner;
 mod screen;
 mod script;
+mod sketch;
 mod slopes;
 mod snapshot;
 mod surface_mesh;
@@ -42,6 +46,7 @@ mod tracer;
 mod viewer;
 mod watch;
 mod window;
+mod worker;
 
 use std::path::Path;
 use std::sync::{Arc, Mutex};
@@ -147,14 +152,19 @@ const NICENESS: i32 = 10;
 /// Starts a thread at a lower priority; threads that it starts, and those of drivers that it loads,
 /// inherit it.
 fn background(name: &str, work: impl FnOnce() + Send + 'static) -> JoinHandle<()> {
+    foreground(name, move || {
+        // On Linux this applies to this thread only; if it is refused, frames are slower.
+        #[cfg(target_os = "linux")]
+        let _ = rustix::process::setpriority_process(None, NICENESS);
+        work();
+    })
+}
+
+/// Starts a thread of the priority of this one.
+fn foreground(name: &str, work: impl FnOnce() + Send + 'static) -> JoinHandle<()> {
     let started = std::thread::Builder::new()
         .name(name.to_owned())
-        .spawn(move || {
-            // On Linux this applies to this thread only; if it is refused, frames are slower.
-            #[cfg(target_os = "linux")]
-            let _ = rustix::process::setpriority_process(None, NICENESS);
-            work();
-        });
+        .spawn(work);
     started.expect("the system has room for another thread")
 }
 

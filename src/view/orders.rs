@@ -16,8 +16,13 @@ pub enum Order {
         epoch: u64,
     },
     /// Lights the scene of the last bake, of which emission and point lights have changed, by the
-    /// form factors that are kept.
-    Relight { scene: Arc<Scene>, epoch: u64 },
+    /// form factors that are kept. What a sketch shows of them need not be shown again before all
+    /// of their light.
+    Relight {
+        scene: Arc<Scene>,
+        epoch: u64,
+        sketched: bool,
+    },
     /// Saves the bake.
     Save,
     /// Finds the sources of a bake from a file.

@@ -20,6 +20,8 @@ pub enum Step {
     Frames(u64),
     /// Waits until the bake is done.
     Bake,
+    /// Waits until what changed lights bring directly is shown.
+    Direct,
     /// Waits until the last change of the lights is shown.
     Relit,
     /// Waits until the detailed picture of the view is shown.
@@ -139,6 +141,7 @@ fn parse(words: &[&str]) -> Option<Vec<Step>> {
         ["frames", count] => Some(vec![Step::Frames(count.parse().ok()?)]),
         ["open", ref name @ ..] if !name.is_empty() => Some(vec![Step::Open(name.join(" "))]),
         ["bake"] => Some(vec![Step::Bake]),
+        ["direct"] => Some(vec![Step::Direct]),
         ["relit"] => Some(vec![Step::Relit]),
         ["detail"] => Some(vec![Step::Detail]),
         ["overlays"] => Some(vec![Step::Overlays]),

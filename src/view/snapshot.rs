@@ -5,11 +5,12 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::corner_light::CornerLight;
 use crate::bake::solution::{Bake, DirectionalLight, Solution};
 use crate::error::Result;
 use crate::mesh::corners::Corners;
 use crate::picture::exposure_by_area;
-use crate::render::{Joined, Lighting, tone};
+use crate::render::{Lighting, tone};
 use crate::scene::{Scene, Triangle};
 use crate::solver::{Ambient, Solver, StopReason, Update};
 
@@ -30,11 +31,9 @@ pub struct Snapshot {
     pub irradiance: Vec<Vec3>,
     pub direct: Vec<Vec3>,
     pub relief: Option<DirectionalLight>,
-    /// The same at the corners, smoothed over each surface.
-    pub corners: Vec<[Vec3; 3]>,
-    pub corners_direct: Vec<[Vec3; 3]>,
-    /// Where there is light by direction.
-    pub slanted: Option<Slanted>,
+    pub at_corners: CornerLight,
+    /// Of the scene.
+    pub about: Arc<Corners>,
     /// What has not been shot, spread evenly.
     pub ambient: Ambient,
     /// What surfaces reflect is still of the light before.
@@ -44,67 +43,11 @@ pub struct Snapshot {
     pub progress: Progress,
 }
 
-/// How light on relief depends on its slope, at the corners, `[triangle][corner]`, smoothed as
-/// [`Corners::means`] does; zero on triangles without relief.
-///
-/// On a normal n that is no unit vector, F(n) = Σ max(0, n · m) over the moments m of the slots; a
-/// normal tilted by a slope s along the surface is n = N + s, and its irradiance F(n) / |n|.
-pub struct Slanted {
-    pub all: Vec<[Slant; 3]>,
-    pub direct: Vec<[Slant; 3]>,
-}
-
-/// Of each colour the vector t (scene axes) for which F(N + s) − F(N − s) is 2 s · t for tilts of
-/// [`TILT`]; and, per colour, how much the mean of F over such tilts is above F(N). W·m⁻².
-pub type Slant = [Vec3; 4];
-
-/// Slope at which light on slopes is found; `TILT` of `shared/view_mesh.glsl`.
-const TILT: f32 = 0.7;
-
-impl Slanted {
-    fn new(scene: &Scene, about: &Corners, light: &DirectionalLight) -> Self {
-        let slots = light.directions.len();
-        let corners = |moments: &[[Vec3; 3]]| {
-            let found: Vec<Slant> = (moments.par_chunks_exact(slots).zip(&light.frames))
-                .map(|(moments, frame)| slant(moments, frame))
-                .collect();
-            let mut slants = vec![[Vec3::ZERO; 4]; scene.triangles.len()];
-            for (found, &e) in found.into_iter().zip(&light.elements) {
-                slants[e as usize] = found;
-            }
-            about.means(&slants)
-        };
-        Self {
-            all: corners(&light.incident_moment),
-            direct: corners(&light.incident_moment_direct),
-        }
-    }
-}
-
-/// Of one element by its moments, `[slot][colour]`, in its frame.
-fn slant(moments: &[[Vec3; 3]], frame: &[Vec3; 3]) -> Slant {
-    let lit = |normal: Vec3| {
-        let slots = moments.iter();
-        let sum = slots.map(|m| Vec3::from_array(m.map(|m| normal.dot(m).max(0.0))));
-        sum.sum::<Vec3>()
-    };
-    let level = lit(Vec3::Z);
-    let mut slant = [Vec3::ZERO; 4];
-    for (axis, along) in [Vec3::X, Vec3::Y].into_iter().zip(frame) {
-        let [ahead, behind] = [TILT, -TILT].map(|tilt| lit(Vec3::Z + tilt * axis));
-        for (of_colour, change) in slant.iter_mut().zip((ahead - behind).to_array()) {
-            *of_colour += *along * (change / (2.0 * TILT));
-        }
-        slant[3] += (ahead + behind) / 4.0 - level / 2.0;
-    }
-    slant
-}
-
 impl Snapshot {
     fn new(
         epoch: u64,
         scene: &Arc<Scene>,
-        about: &Corners,
+        about: &Arc<Corners>,
         (irradiance, direct): (Vec<Vec3>, Vec<Vec3>),
         relief: Option<DirectionalLight>,
         ambient: Ambient,
@@ -112,12 +55,9 @@ impl Snapshot {
     ) -> Self {
         Self {
             epoch,
-            corners: about.irradiance(&irradiance, Joined::Smooth),
-            corners_direct: about.irradiance(&direct, Joined::Smooth),
+            at_corners: CornerLight::new(about, [&irradiance, &direct], relief.as_ref()),
+            about: Arc::clone(about),
             exposure: exposure(scene, &irradiance, ambient.irradiance),
-            slanted: relief
-                .as_ref()
-                .map(|light| Slanted::new(scene, about, light)),
             scene: Arc::clone(scene),
             irradiance,
             direct,
@@ -135,7 +75,7 @@ impl Snapshot {
     pub fn of_solver(
         epoch: u64,
         scene: &Arc<Scene>,
-        about: &Corners,
+        about: &Arc<Corners>,
         solver: &Solver,
         progress: Progress,
     ) -> Result<Self> {
@@ -160,7 +100,7 @@ impl Snapshot {
     /// A device that fails.
     pub fn of_emitted(
         (epoch, scene, progress): (u64, &Arc<Scene>, Progress),
-        about: &Corners,
+        about: &Arc<Corners>,
         solver: &Solver,
         before: &Self,
     ) -> Result<Option<Self>> {
@@ -211,7 +151,7 @@ impl Snapshot {
             ..Progress::default()
         };
         let light = (bake.irradiance, bake.irradiance_direct);
-        let about = Corners::new(scene);
+        let about = Arc::new(Corners::new(scene));
         let ambient = Ambient::default();
         Self::new(0, scene, &about, light, bake.relief, ambient, progress)
     }
@@ -228,7 +168,7 @@ impl Snapshot {
         let even: Vec<_> = scene.triangles.iter().map(shade).collect();
         let progress = Progress::default();
         let light = (even.clone(), even);
-        let about = Corners::new(scene);
+        let about = Arc::new(Corners::new(scene));
         Self::new(0, scene, &about, light, None, Ambient::default(), progress)
     }
 
@@ -262,9 +202,7 @@ pub fn is_done(stop: StopReason) -> bool {
 /// The exposure for what does not emit. It does not depend on the view: a window that orbits does
 /// not flicker.
 fn exposure(scene: &Scene, irradiance: &[Vec3], ambient: Vec3) -> f32 {
-    let lit = scene
-        .triangles
-        .iter()
+    let lit: Vec<(f32, f64)> = (scene.triangles.par_iter())
         .zip(irradiance)
         .filter(|(t, _)| !scene.materials[t.material as usize].emits())
         .map(|(triangle, irradiance)| {
@@ -278,31 +216,15 @@ fn exposure(scene: &Scene, irradiance: &[Vec3], ambient: Vec3) -> f32 {
             let [a, b, c] = scene.corners(triangle);
             let area = DVec3::length((b - a).cross(c - a)) / 2.0;
             (tone::luminance(radiance.to_array()), area)
-        });
-    exposure_by_area(lit)
+        })
+        .collect();
+    exposure_by_area(lit.into_iter())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::scene::{Material, Triangle};
-
-    /// One slot: as steep as its light falls, and dark where it turns away.
-    #[test]
-    fn a_slope_receives_what_faces_it() {
-        let frame = [Vec3::Y, Vec3::Z, Vec3::X];
-        // Light from 63° off the normal, along the first axis: behind a slope of TILT away from it.
-        let from = Vec3::new(2.0, 0.0, 1.0);
-        let [r, g, b, lift] = slant(&[[from, Vec3::ZERO, from]], &frame);
-        let ahead = 1.0 + 2.0 * TILT;
-        assert!((r - Vec3::Y * ahead / (2.0 * TILT)).length() < 1e-6, "{r}");
-        assert_eq!((g, b), (Vec3::ZERO, r));
-        let expected = (ahead + 0.0 + 1.0 + 1.0) / 4.0 - 1.0;
-        assert!(
-            (lift - Vec3::new(expected, 0.0, expected)).length() < 1e-6,
-            "{lift}"
-        );
-    }
 
     /// Ten triangles of one area: the exposure is for the ninth of them by brightness.
     #[test]

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 
 use super::camera::Rows;
+use super::corner_light::{CornerLight, Slant};
 use super::slopes::{Slopes, mean_tile, slope_axes};
-use super::snapshot::{Slant, Snapshot};
 use super::surface_mesh::{About, MeshRange, NOTHING, SurfaceMesh, Vertex};
 use crate::error::Result;
 use crate::passes::pass_parts::PartedPass;
@@ -207,14 +207,13 @@ impl SurfacePass {
             .collect();
     }
 
-    /// Shows the light of a snapshot.
-    pub fn set_light(&mut self, light: &Snapshot) {
-        let (scene, slanted) = (&light.scene, light.slanted.as_ref());
+    /// Shows this light on `scene`, which is otherwise the same scene.
+    pub fn set_light(&mut self, scene: &Scene, light: &CornerLight) {
+        let slanted = light.slanted.as_ref();
         let all = slanted.map(|slants| &slants.all[..]);
         let direct = slanted.map(|slants| &slants.direct[..]);
-        self.all.write(&self.mesh, scene, &light.corners, all);
-        let corners = &light.corners_direct;
-        self.direct.write(&self.mesh, scene, corners, direct);
+        self.all.write(&self.mesh, scene, &light.all, all);
+        self.direct.write(&self.mesh, scene, &light.direct, direct);
     }
 
     /// Sets the source of each triangle, `[triangle]` in the order of the input.

@@ -14,10 +14,15 @@ pub struct Timing {
     /// From a change of the lights to the end of the first frame that shows what they emit, and of
     /// the first that shows all of their light.
     relit_direct: Vec<f64>,
+    /// When the lights were changed that the next frame shows first.
+    next_direct: Option<Instant>,
     relit: Vec<f64>,
     /// From the start of the program to the end of the first frame that shows light.
     first_light: Option<f64>,
 }
+
+/// Times that are told one by one, at most.
+const FEW: usize = 8;
 
 impl Timing {
     pub fn frame(&mut self, taken: Duration, baking: bool) {
@@ -40,6 +45,18 @@ impl Timing {
 
     pub fn relit_direct(&mut self, since: Instant) {
         self.relit_direct.push(since.elapsed().as_secs_f64());
+    }
+
+    /// The next frame is the first that shows what lights emit that were changed then.
+    pub fn relit_direct_next(&mut self, since: Instant) {
+        self.next_direct = Some(since);
+    }
+
+    /// A frame was shown.
+    pub fn relit_direct_shown(&mut self) {
+        if let Some(since) = self.next_direct.take() {
+            self.relit_direct(since);
+        }
     }
 
     pub fn relit(&mut self, since: Instant) {
@@ -88,8 +105,20 @@ impl Timing {
             ("direct light of changed lights", &self.relit_direct),
             ("all light of changed lights", &self.relit),
         ] {
-            let line = |seconds: &f64| format!("{what} on the screen after {seconds:.2} s");
-            lines.extend(times.iter().map(line));
+            match spread(times) {
+                // Of a light that is dragged.
+                Some((median, most)) if times.len() > FEW => lines.push(format!(
+                    "{what} on the screen after {:.2} s in the middle, {:.2} s at the 95th \
+                     percentile of {}",
+                    1e-3 * median,
+                    1e-3 * most,
+                    times.len()
+                )),
+                _ => {
+                    let line = |seconds: &f64| format!("{what} on the screen after {seconds:.2} s");
+                    lines.extend(times.iter().map(line));
+                }
+            }
         }
         lines
     }

@@ -1,12 +1,12 @@
 //! Views by the path tracer, on threads of the CPU, pass by pass for as long as a view stays.
 
-use std::sync::{Arc, Condvar, Mutex, MutexGuard};
-use std::thread::JoinHandle;
+use std::sync::Arc;
 use std::time::Duration;
 
 use super::detailer::{Drawn, Wanted, codes};
+use super::worker::{self, Worker};
 use super::{Wake, background};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::path_tracer::{PathTracer, Settings};
 use crate::picture::View;
 use crate::scene::{Scene, displace};
@@ -25,96 +25,18 @@ pub struct Traced {
 }
 
 /// The window's end of the thread.
-pub struct Tracer {
-    shared: Arc<Shared>,
-    thread: Option<JoinHandle<()>>,
+pub type Tracer = Worker<Wanted, Traced>;
+
+type Desk = worker::Desk<Wanted, Traced>;
+
+pub fn tracer(wake: Wake) -> Tracer {
+    Worker::new(|work| background("path tracer", work), wake, run)
 }
 
-#[derive(Default)]
-struct Shared {
-    state: Mutex<State>,
-    changed: Condvar,
-}
-
-#[derive(Default)]
-struct State {
-    wanted: Option<Wanted>,
-    /// Number of requests so far: a new one stops the picture in progress.
-    asked: u64,
-    traced: Option<Traced>,
-    error: Option<Error>,
-    closing: bool,
-}
-
-impl Shared {
-    fn state(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(|e| e.into_inner())
-    }
-
-    fn is_overtaken(&self, asked: u64) -> bool {
-        let state = self.state();
-        state.closing || state.asked != asked
-    }
-}
-
-impl Tracer {
-    pub fn new(wake: Wake) -> Self {
-        let shared = Arc::<Shared>::default();
-        let work = Arc::clone(&shared);
-        let thread = background("path tracer", move || run(&work, &wake));
-        Self {
-            shared,
-            thread: Some(thread),
-        }
-    }
-
-    /// Replaces the wanted picture; None wants none.
-    pub fn want(&self, wanted: Option<Wanted>) {
-        {
-            let mut state = self.shared.state();
-            state.asked += 1;
-            state.wanted = wanted;
-        }
-        self.shared.changed.notify_all();
-    }
-
-    /// The latest picture since the last call.
-    pub fn take(&self) -> Option<Traced> {
-        self.shared.state().traced.take()
-    }
-
-    /// What ended the last picture.
-    pub fn error(&self) -> Option<Error> {
-        self.shared.state().error.take()
-    }
-}
-
-impl Drop for Tracer {
-    fn drop(&mut self) {
-        self.shared.state().closing = true;
-        self.shared.changed.notify_all();
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
-    }
-}
-
-fn run(shared: &Shared, wake: &Wake) {
+fn run(desk: &Desk) {
     // The scene with its relief as geometry.
     let mut ready: Option<(Arc<Scene>, Scene)> = None;
-    loop {
-        let (wanted, asked) = {
-            let mut state = shared.state();
-            loop {
-                if state.closing {
-                    return;
-                }
-                if let Some(wanted) = state.wanted.take() {
-                    break (wanted, state.asked);
-                }
-                state = (shared.changed.wait(state)).unwrap_or_else(|e| e.into_inner());
-            }
-        };
+    while let Some((wanted, number)) = desk.next() {
         let scene = &wanted.snapshot.scene;
         let same = ready.as_ref().is_some_and(|(of, _)| Arc::ptr_eq(of, scene));
         let done = match same {
@@ -122,12 +44,11 @@ fn run(shared: &Shared, wake: &Wake) {
             false => geometry(scene).map(|fine| ready = Some((Arc::clone(scene), fine))),
         };
         let done = done.and_then(|()| match &ready {
-            Some((_, fine)) => trace(fine, (&wanted, asked), shared, wake),
+            Some((_, fine)) => trace(fine, &wanted, number, desk),
             None => Ok(()),
         });
         if let Err(error) = done {
-            shared.state().error = Some(error);
-            wake();
+            desk.fail(error);
         }
     }
 }
@@ -139,12 +60,7 @@ fn geometry(scene: &Scene) -> Result<Scene> {
     }
 }
 
-fn trace(
-    scene: &Scene,
-    (wanted, asked): (&Wanted, u64),
-    shared: &Shared,
-    wake: &Wake,
-) -> Result<()> {
+fn trace(scene: &Scene, wanted: &Wanted, number: u64, desk: &Desk) -> Result<()> {
     let tracer = PathTracer::new(scene)?;
     let view = View {
         camera: &wanted.camera,
@@ -157,11 +73,11 @@ fn trace(
         ..Settings::default()
     };
     tracer.render(&view, &settings, |progress, film| {
-        if shared.is_overtaken(asked) {
+        if desk.is_overtaken(number) {
             return false;
         }
         let picture = film.picture();
-        shared.state().traced = Some(Traced {
+        desk.give(Traced {
             drawn: Drawn {
                 of: wanted.clone(),
                 codes: codes(&picture, [0, 0], wanted.exposure),
@@ -173,8 +89,7 @@ fn trace(
             elapsed: progress.elapsed,
             noise: film.relative_error(),
         });
-        wake();
-        !shared.is_overtaken(asked)
+        !desk.is_overtaken(number)
     })?;
     Ok(())
 }

@@ -68,6 +68,22 @@ fn a_light_is_dragged_by_its_mark() {
     assert!(difference(&dragged, &room.picture("before.png")) > 1.0);
 }
 
+/// The direct light of a light that is moved, which is sketched, is what is solved after it.
+#[test]
+fn a_moved_light_is_sketched() {
+    let room = Room::baked("room");
+    let script = format!(
+        "{QUIET}key 2\nframes 1\nscreenshot before.png\nset lamp bulb position -0.5 0.3 0.2\ndirect
+         screenshot sketched.png\nrelit\nbake\nframes 1\nscreenshot solved.png"
+    );
+    view(room.path(), "room.safetensors", &script);
+    let [before, sketched, solved] =
+        ["before.png", "sketched.png", "solved.png"].map(|name| room.picture(name));
+    let [off, moved] = [&sketched, &before].map(|other| difference(other, &solved));
+    println!("codes differ by {off:.3} from what is solved, by {moved:.1} before");
+    assert!(moved > 3.0 && off < 1.0, "{off} and {moved}");
+}
+
 /// On the left of the line what was held stays, on its right what is changed shows.
 #[test]
 fn the_view_is_compared_to_itself() {

@@ -23,7 +23,7 @@ use crate::error::Result;
 use crate::mesh::corners::Corners;
 use crate::mesh::elements::Elements;
 use crate::scene::Scene;
-use crate::solver::{Settings, Solver, Update, Visibility};
+use crate::solver::{Settings, Solver, StopReason, Update, Visibility};
 use first_light::{first_light, first_stage, flat, raises};
 use relighting::Relit;
 pub use saves::Saves;
@@ -75,6 +75,7 @@ impl Baker {
             solving: None,
             looked_at: None,
             shown: None,
+            shown_at: Instant::now(),
         };
         Self {
             orders: Some(orders),
@@ -154,8 +155,9 @@ struct Work {
     solving: Option<Solving>,
     /// Of a bake from a file: its sources, which nobody solves.
     looked_at: Option<Solver>,
-    /// The last light that was found.
+    /// The last light that was found, and when.
     shown: Option<Arc<Snapshot>>,
+    shown_at: Instant,
 }
 
 /// A bake under way or done.
@@ -173,6 +175,8 @@ struct Solving {
     first: bool,
     /// After its lights were changed: what is shown next.
     relit: Option<Relit>,
+    /// Whether what its lights emit is shown already.
+    sketched: bool,
     /// Share of unshot light from which on there is more to be seen than before this was begun.
     shown_from: f64,
 }
@@ -248,7 +252,11 @@ impl Work {
                 self.kept = None;
                 self.bake(scene, &settings, epoch)
             }
-            Order::Relight { scene, epoch } => self.relight(scene, epoch),
+            Order::Relight {
+                scene,
+                epoch,
+                sketched,
+            } => self.relight(scene, epoch, sketched),
             // At the next turn.
             Order::Save => Ok(()),
             Order::Sources => self.sources().map(|_| ()),
@@ -360,6 +368,7 @@ impl Work {
             budget: self.given.settings.budget.unwrap_or(Duration::MAX),
             first: false,
             relit: None,
+            sketched: false,
             corners: corners.unwrap_or_else(|| Arc::new(Corners::new(&scene))),
             shown_from: f64::INFINITY,
             scene,
@@ -374,6 +383,7 @@ impl Work {
     fn show(&mut self, epoch: u64, progress: Progress, snapshot: Snapshot) {
         let snapshot = Arc::new(snapshot);
         self.shown = Some(Arc::clone(&snapshot));
+        self.shown_at = Instant::now();
         {
             let mut latest = self.shared.latest();
             latest.progress = Some((epoch, progress));
@@ -418,6 +428,10 @@ impl Work {
         let stop = solving.solver.report().stop;
         solving.done = is_done(stop) || start.elapsed() >= budget;
         shared.saving.allow(!solving.first);
+        // What was asked meanwhile comes first; of other lights this would be out of date.
+        if stop == StopReason::Interrupted && shared.interrupt.load(Ordering::SeqCst) {
+            return Ok(());
+        }
         let progress = solving.progress(last, solving.done && !solving.first);
         if !solving.done && progress.update.unshot_share > solving.shown_from {
             solving.slice = SLICES[0];
@@ -445,7 +459,7 @@ fn latest(first: Order, orders: &Receiver<Order>) -> Order {
     while let Ok(next) = orders.try_recv() {
         wanted = match (wanted, next) {
             // A bake is of another scene; what is to be lit is that one then.
-            (Order::Bake { settings, .. }, Order::Relight { scene, epoch }) => Order::Bake {
+            (Order::Bake { settings, .. }, Order::Relight { scene, epoch, .. }) => Order::Bake {
                 scene,
                 settings,
                 epoch,

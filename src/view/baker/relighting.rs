@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 use super::first_light::first_stage;
 use super::{Snapshot, Work};
@@ -11,7 +12,7 @@ use crate::scene::Scene;
 use crate::solver::{Solver, Update};
 
 /// What is shown of changed lights before they are solved.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Relit {
     /// What they emit.
     Emitted,
@@ -19,17 +20,21 @@ pub(super) enum Relit {
     Coupled,
 }
 
+/// Lights that go on changing show all of their light no later than so long after it was last shown.
+const OVERDUE: Duration = Duration::from_secs(1);
+
 impl Work {
     /// By what has been drawn, or what a file has kept; where there is nothing, or another source
     /// emits than did, from nothing.
-    pub(super) fn relight(&mut self, scene: Arc<Scene>, epoch: u64) -> Result<()> {
+    pub(super) fn relight(&mut self, scene: Arc<Scene>, epoch: u64, sketched: bool) -> Result<()> {
         if let Some(mut before) = self.solving.take() {
             match before.solver.relight(&scene) {
                 Ok(()) => {
                     let stage = first_stage(&scene, &self.given.settings);
                     self.start(scene, before.solver, epoch, Some(before.corners));
                     if let Some(solving) = &mut self.solving {
-                        (solving.first, solving.relit) = (before.first, Some(Relit::Emitted));
+                        (solving.first, solving.sketched) = (before.first, sketched);
+                        solving.relit = Some(Relit::Emitted);
                     }
                     if before.first {
                         self.tell(epoch, Some(stage));
@@ -56,23 +61,28 @@ impl Work {
         Ok(())
     }
 
-    /// Shows the next step of a relighting. Whether there was one.
+    /// Shows the next step of a relighting. Whether there was one. Lights that go on changing stop
+    /// it, but for one in a while.
     pub(super) fn show_relit(&mut self) -> Result<bool> {
         let Some(solving) = &mut self.solving else {
             return Ok(false);
         };
-        let Some(step) = solving.relit else {
+        let Some(mut step) = solving.relit else {
             return Ok(false);
         };
-        match step {
-            Relit::Emitted => solving.solver.gather_emitted()?,
-            Relit::Coupled => {
-                let interrupt = &self.shared.interrupt;
-                let go_on = || !interrupt.load(Ordering::SeqCst);
-                if !solving.solver.gather_coupled(go_on)? {
-                    return Ok(true);
-                }
+        let overdue = self.shown_at.elapsed() >= OVERDUE;
+        let interrupt = &self.shared.interrupt;
+        let go_on = || overdue || !interrupt.load(Ordering::SeqCst);
+        if step == Relit::Emitted {
+            solving.solver.gather_emitted()?;
+            if solving.sketched {
+                step = Relit::Coupled;
+                solving.relit = Some(step);
             }
+        }
+        let whole = step != Relit::Coupled || (go_on() && solving.solver.gather_coupled(go_on)?);
+        if !whole {
+            return Ok(true);
         }
         let progress = solving.progress(Update::default(), false);
         let (scene, corners) = (&solving.scene, &solving.corners);

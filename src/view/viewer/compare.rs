@@ -13,7 +13,7 @@ use crate::view::detailer::{Drawn, Wanted};
 use crate::view::panel_pass::Layer;
 use crate::view::surface_pass::SurfacePass;
 use crate::view::switches::{PARTS, SHADINGS};
-use crate::view::tracer::Tracer;
+use crate::view::tracer::tracer;
 
 impl Viewer {
     /// Holds the view as it is on the left, or ends that.
@@ -31,7 +31,7 @@ impl Viewer {
                 return;
             }
         };
-        surfaces.set_light(&self.snapshot);
+        surfaces.set_light(&self.snapshot.scene, &self.snapshot.at_corners);
         self.set_left(Left::Held(Box::new(Held {
             snapshot: Arc::clone(&self.snapshot),
             switches: self.switches,
@@ -48,7 +48,7 @@ impl Viewer {
             return;
         }
         self.set_left(Left::Traced(Box::new(Traced {
-            tracer: Tracer::new(Arc::clone(&self.wake)),
+            tracer: tracer(Arc::clone(&self.wake)),
             wanted: None,
             differences: Vec::new(),
             progress: String::new(),
@@ -152,13 +152,13 @@ impl Viewer {
         }
         if !stays {
             if traced.wanted.take().is_some() {
-                traced.tracer.want(None);
+                traced.tracer.ask(None);
             }
             return;
         }
         traced.differences.clear();
         traced.progress.clear();
-        traced.tracer.want(wanted.clone());
+        traced.tracer.ask(wanted.clone());
         traced.wanted = wanted;
     }
 

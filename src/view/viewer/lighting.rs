@@ -3,13 +3,14 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::Viewer;
+use super::{SKETCHING, Viewer};
 use crate::bake::quality::{self, Quality};
 use crate::error::Result;
 use crate::math::directions::Directions;
 use crate::solver::{Estimator, Settings};
 use crate::view::lamps::{Lamp, lit};
 use crate::view::orders::Order;
+use crate::view::sketch::{self, Sketch};
 
 /// Changed lights that are not all shown yet.
 pub(in crate::view) struct Edited {
@@ -17,6 +18,12 @@ pub(in crate::view) struct Edited {
     since: Instant,
     /// Whether what they emit is shown.
     shown_direct: bool,
+}
+
+impl Edited {
+    pub(in crate::view) fn shows_direct(&self) -> bool {
+        self.shown_direct
+    }
 }
 
 impl Viewer {
@@ -97,11 +104,65 @@ impl Viewer {
         self.baker.order(Order::Relight {
             scene: Arc::clone(&self.scene),
             epoch: self.epoch,
+            sketched: self.can_sketch(),
         });
+        self.sketch();
+        // It would take the time of what is to be shown next.
+        if self.pictures.wanted.take().is_some() {
+            self.detailer.want(Vec::new());
+        }
+    }
+
+    fn can_sketch(&self) -> bool {
+        self.is_lit() && sketch::is_possible(&self.snapshot.scene, &self.scene)
+    }
+
+    /// Asks for a sketch of the lights as they are now; where none has changed, for what the next
+    /// sketch needs.
+    pub(super) fn sketch(&self) {
+        if self.can_sketch() {
+            self.sketcher.ask(Some(sketch::Wanted {
+                base: Arc::clone(&self.snapshot),
+                scene: Arc::clone(&self.scene),
+                epoch: self.epoch,
+                since: self.edited.as_ref().map_or_else(Instant::now, |e| e.since),
+            }));
+        }
+    }
+
+    /// Until when a frame waits for a sketch that is under way.
+    pub(super) fn sketch_due(&self) -> Option<Instant> {
+        let edited = self.edited.as_ref().filter(|edited| !edited.shown_direct)?;
+        let under_way = self.can_sketch() && !self.sketcher.has_found();
+        // Of several changes since the last frame, from the first.
+        under_way.then(|| self.unanswered.unwrap_or(edited.since) + SKETCHING)
+    }
+
+    /// Shows the last sketch until there is light of the same lights or later ones.
+    pub(super) fn take_sketch(&mut self) -> Result<()> {
+        if let Some(error) = self.sketcher.error() {
+            self.fail(error)?;
+        }
+        let found = self.sketcher.take();
+        if let Some(Sketch {
+            epoch,
+            since,
+            light,
+        }) = found.filter(|found| found.epoch > self.snapshot.epoch)
+        {
+            self.surfaces.set_light(&self.scene, &light);
+            self.sketched = Some(epoch);
+            self.timing.relit_direct_next(since);
+            if let Some(edited) = self.edited.as_mut().filter(|edited| edited.epoch == epoch) {
+                edited.shown_direct = true;
+            }
+        }
+        Ok(())
     }
 
     /// Notes when changed lights are on the screen.
     pub(super) fn note_edited(&mut self) {
+        self.timing.relit_direct_shown();
         let shown = |edited: &&mut Edited| self.snapshot.epoch >= edited.epoch;
         let Some(edited) = self.edited.as_mut().filter(shown) else {
             return;

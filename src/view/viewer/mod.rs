@@ -31,6 +31,7 @@ use super::notes::Notes;
 use super::orders::{Given, Order, Stage};
 use super::panel_pass::PanelPass;
 use super::screen::Screen;
+use super::sketch::{Sketcher, sketcher};
 use super::snapshot::{Progress, Snapshot};
 use super::surface_pass::SurfacePass;
 use super::switches::Switches;
@@ -43,13 +44,14 @@ use crate::scene::{Camera, Scene};
 use crate::solver::{Estimator, Settings};
 use files::Files;
 use input::Input;
-use lighting::Edited;
+pub(super) use lighting::Edited;
 use overlays::Overlays;
 use pictures::Pictures;
 
 pub struct Viewer {
     baker: Baker,
     detailer: Detailer,
+    sketcher: Sketcher,
     surfaces: SurfacePass,
     panel_pass: PanelPass,
     pub(super) screen: Screen,
@@ -77,6 +79,8 @@ pub struct Viewer {
     pub(super) relief_scale: f64,
 
     snapshot: Arc<Snapshot>,
+    /// Of what a sketch is shown in place of the snapshot's light.
+    sketched: Option<u64>,
     pub(super) epoch: u64,
     progress: Progress,
     bounds: Vec<[f64; 2]>,
@@ -134,6 +138,8 @@ pub struct Viewer {
 /// Shortest time between frames while there is no light to show: a software device draws them with
 /// the cores that the bake needs.
 const DARK: Duration = Duration::from_millis(300);
+/// Time that a frame waits for the sketch of changed lights, which is to be seen in it.
+const SKETCHING: Duration = Duration::from_millis(50);
 /// Name of pictures that are saved by a key, in the working directory.
 const PICTURE: &str = "mesolux";
 
@@ -201,6 +207,7 @@ impl Viewer {
         let mut viewer = Self {
             baker,
             detailer: Detailer::new(&device, settings.relief.cache.clone(), Arc::clone(&wake)),
+            sketcher: sketcher(Arc::clone(&wake)),
             surfaces,
             panel_pass: PanelPass::new(screen.device(), screen.pass())?,
             screen,
@@ -232,6 +239,7 @@ impl Viewer {
             metered: snapshot.exposure,
             lights: 0,
             snapshot,
+            sketched: None,
             pictures: Pictures::default(),
             left: None,
             line: Line::default(),
@@ -258,7 +266,9 @@ impl Viewer {
             closing: false,
         };
         let snapshot = &viewer.snapshot;
-        viewer.surfaces.set_light(snapshot);
+        viewer
+            .surfaces
+            .set_light(&snapshot.scene, &snapshot.at_corners);
         viewer.remember();
         Ok(viewer)
     }
@@ -281,7 +291,7 @@ impl Viewer {
 
     /// Whether a view that stays is refined: not while more of the light is about to come.
     fn refines(&self) -> bool {
-        self.switches.detail && self.is_lit() && !self.snapshot.lags
+        self.switches.detail && self.is_lit() && !self.snapshot.lags && self.edited.is_none()
     }
 
     /// Whether the detailed picture of the view is shown, with all its pixels and the last light.
@@ -315,10 +325,11 @@ impl Viewer {
         let paused = paused.filter(|_| self.refines() && wanted.is_none());
         let next = [changed, self.repaint, paused, self.notes.next_end()];
         let next = next.into_iter().flatten().min();
-        match self.awaits_light() {
-            true => next.map(|at| at.max(self.last_frame + DARK)),
-            false => next,
-        }
+        let held = match self.awaits_light() {
+            true => Some(self.last_frame + DARK),
+            false => self.sketch_due(),
+        };
+        next.map(|at| held.map_or(at, |held| at.max(held)))
     }
 
     /// Whether nothing but the progress of the bake would be new in a frame.

@@ -65,7 +65,8 @@ impl Viewer {
     pub(super) fn shown_detail(&self) -> Option<&Drawn> {
         let drawn = self.pictures.detail.as_ref()?;
         let now = &self.pictures.seen.as_ref()?.of;
-        let shown = self.switches.detail && drawn.of.looks_like(now);
+        // A sketch is of later lights.
+        let shown = self.switches.detail && self.sketched.is_none() && drawn.of.looks_like(now);
         (shown && is_fresh(&drawn.of.snapshot, &self.snapshot)).then_some(drawn)
     }
 
@@ -92,7 +93,7 @@ impl Viewer {
             self.want_traced(size, false);
             return;
         };
-        let stays = seen.since.elapsed() >= PAUSE;
+        let stays = seen.since.elapsed() >= PAUSE && self.edited.is_none();
         self.want_traced(size, stays);
         if !(self.refines() && stays) {
             return;

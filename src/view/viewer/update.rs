@@ -45,7 +45,13 @@ impl Viewer {
             self.overlays.items = Some(items);
         }
         if let Some(snapshot) = latest.snapshot {
-            self.surfaces.set_light(&snapshot);
+            // A sketch of later lights stays, and is made anew over this light.
+            let older = snapshot.epoch < self.epoch;
+            if !(older && self.sketched.is_some()) {
+                let light = &snapshot.at_corners;
+                self.surfaces.set_light(&snapshot.scene, light);
+                self.sketched = None;
+            }
             // Stages of one bake have one exposure: else a picture of one would not fit the next.
             let change = (snapshot.exposure - self.metered).abs();
             let same = snapshot.epoch == self.snapshot.epoch && self.is_lit();
@@ -54,7 +60,9 @@ impl Viewer {
             }
             self.snapshot = snapshot;
             self.lights += 1;
+            self.sketch();
         }
+        self.take_sketch()?;
         if let Some((epoch, stage)) = latest.stage
             && epoch == self.epoch
         {
