@@ -50,8 +50,9 @@ pub struct Options {
     /// Do what a script says, one step a line, then close: move X Y, press|release
     /// left|middle|right, wheel N, key [Ctrl+][Shift+]NAME [down|up], see front|right|top, resize W
     /// H, minimise, restore W H, set SWITCH VALUE, set lamp NAME colour|strength|position N...,
-    /// compare held|traced|off, line X, frames N, wait SECONDS, open SCENE|BAKE, bake, relit,
-    /// detail, compared, overlays, screenshot FILE, save FILE, save-bake FILE, lose-surface, close
+    /// compare held|traced|off, line X, frames N, wait SECONDS, open SCENE|BAKE, bake, direct,
+    /// relit, detail, compared, overlays, screenshot FILE, save FILE, save-bake FILE, lose-surface,
+    /// close
     #[arg(long, value_name = "FILE")]
     script: Option<PathBuf>,
     #[command(flatten)]

@@ -81,7 +81,7 @@ fn a_moved_light_is_sketched() {
         ["before.png", "sketched.png", "solved.png"].map(|name| room.picture(name));
     let [off, moved] = [&sketched, &before].map(|other| difference(other, &solved));
     println!("codes differ by {off:.3} from what is solved, by {moved:.1} before");
-    assert!(moved > 3.0 && off < 1.0, "{off} and {moved}");
+    assert!(moved > 5.0 && off < 0.3, "{off} and {moved}");
 }
 
 /// On the left of the line what was held stays, on its right what is changed shows.

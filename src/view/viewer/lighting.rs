@@ -151,8 +151,10 @@ impl Viewer {
         }) = found.filter(|found| found.epoch > self.snapshot.epoch)
         {
             self.surfaces.set_light(&self.scene, &light);
-            self.sketched = Some(epoch);
-            self.timing.relit_direct_next(since);
+            // One over other light before is no first one.
+            if self.sketched.replace(epoch) != Some(epoch) {
+                self.timing.relit_direct_next(since);
+            }
             if let Some(edited) = self.edited.as_mut().filter(|edited| edited.epoch == epoch) {
                 edited.shown_direct = true;
             }
