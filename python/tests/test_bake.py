@@ -78,7 +78,9 @@ def test_an_error_of_progress_is_raised() -> None:
 
 def test_ctrl_c_raises_keyboard_interrupt() -> None:
     program = (
-        "import mesolux, sys\n"
+        "import mesolux, signal, sys\n"
+        # A job in the background begins with it ignored.
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "def report(state): print('begun', flush=True)\n"
         f"try: mesolux.bake('cornell', patches=60000, device={DEVICE!r}, progress=report)\n"
         "except KeyboardInterrupt: sys.exit(42)\n"
