@@ -1,4 +1,4 @@
-//! Factors of reliefs that were found, for where only the light is another.
+//! Factors of reliefs, kept while only the light changes.
 
 use std::sync::{Arc, Mutex};
 
@@ -8,14 +8,14 @@ use super::{Factors, HeightField, Shading, Visibility};
 use crate::error::Result;
 use crate::math::directions::Directions;
 
-/// What tells the factors of one relief from those of another.
+/// A hash of everything the factors depend on.
 type Key = [u8; 32];
 
 /// Factors of the reliefs of a scene, in memory.
 #[derive(Default)]
 pub struct KnownFactors(Mutex<Vec<(Key, Arc<Factors>)>>);
 
-/// Of the heights, how they are shaded, and the directions.
+/// The key of a relief with its shading and directions.
 fn key(directions: &Directions, field: &HeightField, shading: &Shading) -> Key {
     let mut hash = Sha256::new();
     hash.update(directions.columns.to_le_bytes());
@@ -34,8 +34,8 @@ fn key(directions: &Directions, field: &HeightField, shading: &Shading) -> Key {
 }
 
 impl KnownFactors {
-    /// The factors of each relief, found by `find` where they are not known, `[relief]`. Of others
-    /// nothing is known any more.
+    /// The factors of each relief, `[relief]`, computed by `find` where they are not known. Those of
+    /// other reliefs are dropped.
     ///
     /// # Errors
     /// Those of `find`.
@@ -85,7 +85,7 @@ mod tests {
         }
     }
 
-    /// The same relief is found once, another one anew; what is left out is forgotten.
+    /// `find` is called once for each different relief; reliefs that are not asked for are dropped.
     #[test]
     fn what_is_known_is_not_found_again() {
         let known = KnownFactors::default();

@@ -28,7 +28,7 @@ const VERSION: &str = "relief visibility 1";
 pub const RAYS: usize = (RAY_STRATA * RAY_STRATA) as usize;
 
 impl Visibility {
-    /// What tells the visibility of one height field from that of another: a hash of its content.
+    /// A hash of everything the visibility of a height field depends on.
     pub(super) fn key(field: &HeightField) -> [u8; 32] {
         let mut hash = Sha256::new();
         hash.update(VERSION);

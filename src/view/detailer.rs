@@ -128,7 +128,7 @@ impl Detailer {
                     wake: &wake,
                     device,
                     cache: cache.as_deref(),
-                    known: Arc::default(),
+                    known: &KnownFactors::default(),
                     last: [None, None],
                 }
                 .run()
@@ -195,7 +195,7 @@ struct Work<'a> {
     device: Arc<Device>,
     cache: Option<&'a Path>,
     /// The factors of its reliefs, which only other heights or directions change.
-    known: Arc<KnownFactors>,
+    known: &'a KnownFactors,
     /// The last pictures of each side that were drawn whole.
     last: [Option<Drawn>; 2],
 }
@@ -260,7 +260,6 @@ impl Work<'_> {
             .map(|e| *e + wanted.ambient)
             .collect();
         let relief = snapshot.relief.as_ref().map(|r| under(r, wanted.ambient));
-        let known = Arc::clone(&self.known);
         let lighting = Lighting {
             relief: relief
                 .as_ref()
@@ -271,7 +270,7 @@ impl Work<'_> {
             direct: wanted.direct,
             show: wanted.show,
             cache: self.cache,
-            known: Some(&known),
+            known: Some(self.known),
             ..snapshot.lighting(&irradiance)
         };
         let view = view(&wanted);

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::event::Event;
 use super::script::Step;
-use super::viewer::{Edited, Viewer};
+use super::viewer::Viewer;
 use crate::error::{Error, Result};
 
 /// A script in progress.
@@ -83,7 +83,10 @@ impl Runner {
                 }
                 Step::Frames(count) => self.frames >= *count,
                 Step::Bake => viewer.is_baked(),
-                Step::Direct => viewer.edited.as_ref().is_none_or(Edited::shows_direct),
+                Step::Direct => viewer
+                    .edited
+                    .as_ref()
+                    .is_none_or(|edited| edited.shown_direct),
                 Step::Relit => viewer.edited.is_none(),
                 Step::Detail => viewer.is_detailed(),
                 Step::Overlays => viewer.has_overlays(),

@@ -8,12 +8,14 @@ use std::time::Instant;
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::corner_light::{CornerLight, Slant, Slanted, at_corners, slant};
 use super::snapshot::Snapshot;
 use super::worker::{self, Worker};
 use super::{Wake, foreground};
-use crate::error::Result;
+use crate::bake::solution::DirectionalLight;
+use crate::error::{Error, Result};
 use crate::mesh::corners::{Corners, Joined};
 use crate::scene::geometry::{ABOVE, Geometry};
 use crate::scene::{PointLight, Scene};
@@ -46,34 +48,36 @@ pub fn sketcher(wake: Wake) -> Sketcher {
 }
 
 fn run(desk: &worker::Desk<Wanted, Sketch>) {
-    let mut rays: Option<(rayon::ThreadPool, Rays)> = None;
+    let mut rays: Option<(ThreadPool, Rays)> = None;
     while let Some((wanted, _)) = desk.next() {
-        let changes = changes(&wanted);
-        let made = match rays.take() {
-            Some(made) => Ok(made),
-            None => made(&wanted.scene),
-        };
-        match made {
-            Ok((pool, mut of)) => {
-                let light = pool.install(|| of.sketch(&wanted.base, &changes));
-                rays = Some((pool, of));
-                if let Some(light) = light {
-                    desk.give(Sketch {
-                        epoch: wanted.epoch,
-                        since: wanted.since,
-                        light,
-                    });
+        let (pool, rays) = match &mut rays {
+            Some(ready) => ready,
+            none => match ready(&wanted.scene) {
+                Ok(ready) => none.insert(ready),
+                Err(error) => {
+                    desk.fail(error);
+                    continue;
                 }
-            }
-            Err(error) => desk.fail(error),
+            },
+        };
+        let changes = changes(&wanted);
+        if changes.is_empty() {
+            pool.install(|| rays.prepare(&wanted.base));
+            continue;
         }
+        let light = pool.install(|| rays.sketch(&wanted.base, &changes));
+        desk.give(Sketch {
+            epoch: wanted.epoch,
+            since: wanted.since,
+            light,
+        });
     }
 }
 
-/// Threads of the priority of this one, and what they ask.
-fn made(scene: &Scene) -> Result<(rayon::ThreadPool, Rays)> {
-    let pool = rayon::ThreadPoolBuilder::new().build();
-    let pool = pool.map_err(|error| crate::error::Error::Usage(error.to_string()))?;
+/// Threads of the priority of this one, and the triangles that they ask.
+fn ready(scene: &Scene) -> Result<(ThreadPool, Rays)> {
+    let pool = ThreadPoolBuilder::new().build();
+    let pool = pool.map_err(|error| Error::Usage(format!("threads for the window: {error}")))?;
     let rays = pool.install(|| Rays::new(scene))?;
     Ok((pool, rays))
 }
@@ -118,15 +122,15 @@ impl Rays {
         })
     }
 
-    /// Where nothing has changed, what will be replaced is made ready.
-    fn sketch(&mut self, base: &Snapshot, changes: &[Change<'_>]) -> Option<CornerLight> {
-        let about = &base.about;
-        if changes.is_empty() {
-            for light in &base.scene.lights.points {
-                self.brought(about, light);
-            }
-            return None;
+    /// Finds what the next sketch will take away.
+    fn prepare(&mut self, base: &Snapshot) {
+        for light in &base.scene.lights.points {
+            self.brought(&base.about, light);
         }
+    }
+
+    fn sketch(&mut self, base: &Snapshot, changes: &[Change<'_>]) -> CornerLight {
+        let about = &base.about;
         let terms: Vec<(Brought, Vec3)> = (changes.iter())
             .flat_map(|&[before, now]| [(before, -1.0), (now, 1.0)])
             .map(|(light, sign)| {
@@ -150,11 +154,12 @@ impl Rays {
             .map(|(all, (before, now))| {
                 std::array::from_fn(|k| (all[k] + now[k] - before[k]).max(Vec3::ZERO))
             });
-        Some(CornerLight {
+        let by_direction = before.slanted.as_ref().zip(base.relief.as_ref());
+        CornerLight {
             all: all.collect(),
-            slanted: (before.slanted.as_ref()).map(|before| slanted(base, before, &terms)),
+            slanted: by_direction.map(|(before, of)| slanted(about, before, of, &terms)),
             direct,
-        })
+        }
     }
 
     fn brought(&mut self, about: &Corners, light: &PointLight) -> Brought {
@@ -199,14 +204,14 @@ fn brought(geometry: &Geometry, about: &Corners, light: &PointLight) -> Vec<Vec3
         .collect()
 }
 
-/// How light depends on slopes after these lights were added, those before with the sign −.
-fn slanted(base: &Snapshot, before: &Slanted, terms: &[(Brought, Vec3)]) -> Slanted {
-    let Some(relief) = &base.relief else {
-        return Slanted {
-            all: before.all.clone(),
-            direct: before.direct.clone(),
-        };
-    };
+/// How light depends on the slopes of `relief` after these lights were added, those before with
+/// the sign −.
+fn slanted(
+    about: &Corners,
+    before: &Slanted,
+    relief: &DirectionalLight,
+    terms: &[(Brought, Vec3)],
+) -> Slanted {
     let added = (relief.elements.par_iter().zip(&relief.frames)).map(|(&e, frame)| {
         let mut sum: Slant = [Vec3::ZERO; 4];
         for (brought, intensity) in terms {
@@ -220,7 +225,7 @@ fn slanted(base: &Snapshot, before: &Slanted, terms: &[(Brought, Vec3)]) -> Slan
         }
         sum
     });
-    let added = at_corners(&base.about, &relief.elements, added.collect());
+    let added = at_corners(about, &relief.elements, added.collect());
     let with = |before: &[[Slant; 3]]| {
         let both = before.par_iter().zip(&added);
         let sum = |(before, added): (&[Slant; 3], &[Slant; 3])| {
@@ -303,7 +308,6 @@ mod tests {
         assert!(is_possible(&before, &now));
         let mut rays = Rays::new(&now).expect("a good scene");
         let light = rays.sketch(&wanted.base, &changes(&wanted));
-        let light = light.expect("the lamp has moved");
         let place = now.lights.points[0].position;
         let (mut lit, mut dark, mut worst) = (0, 0, 0.0_f64);
         for (e, triangle) in now
@@ -350,6 +354,6 @@ mod tests {
             scene: Arc::clone(&before),
             ..wanted
         };
-        assert!(rays.sketch(&same.base, &changes(&same)).is_none());
+        assert!(changes(&same).is_empty());
     }
 }

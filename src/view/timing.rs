@@ -21,7 +21,7 @@ pub struct Timing {
     first_light: Option<f64>,
 }
 
-/// Times that are told one by one, at most.
+/// Most times that are listed one by one; more are summarised.
 const FEW: usize = 8;
 
 impl Timing {

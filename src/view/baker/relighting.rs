@@ -20,7 +20,7 @@ pub(super) enum Relit {
     Coupled,
 }
 
-/// Lights that go on changing show all of their light no later than so long after it was last shown.
+/// While lights keep changing, all of their light is shown about this often.
 const OVERDUE: Duration = Duration::from_secs(1);
 
 impl Work {

@@ -147,13 +147,13 @@ impl Viewer {
             }
             _ => false,
         };
-        if same(&traced.wanted) {
-            return;
-        }
         if !stays {
             if traced.wanted.take().is_some() {
                 traced.tracer.ask(None);
             }
+            return;
+        }
+        if same(&traced.wanted) {
             return;
         }
         traced.differences.clear();

@@ -17,13 +17,7 @@ pub(in crate::view) struct Edited {
     epoch: u64,
     since: Instant,
     /// Whether what they emit is shown.
-    shown_direct: bool,
-}
-
-impl Edited {
-    pub(in crate::view) fn shows_direct(&self) -> bool {
-        self.shown_direct
-    }
+    pub(in crate::view) shown_direct: bool,
 }
 
 impl Viewer {

@@ -44,7 +44,7 @@ use crate::scene::{Camera, Scene};
 use crate::solver::{Estimator, Settings};
 use files::Files;
 use input::Input;
-pub(super) use lighting::Edited;
+use lighting::Edited;
 use overlays::Overlays;
 use pictures::Pictures;
 

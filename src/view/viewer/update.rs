@@ -45,7 +45,7 @@ impl Viewer {
             self.overlays.items = Some(items);
         }
         if let Some(snapshot) = latest.snapshot {
-            // A sketch of later lights stays, and is made anew over this light.
+            // A sketch of later lights stays until it has been repeated over this light.
             let older = snapshot.epoch < self.epoch;
             if !(older && self.sketched.is_some()) {
                 let light = &snapshot.at_corners;
