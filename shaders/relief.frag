@@ -34,6 +34,8 @@ layout(binding = 11) uniform usamplerBuffer shadow_triangles;
 layout(binding = 12) uniform usamplerBuffer parallel_lights;
 layout(scalar, binding = 13) readonly buffer Webs { float webs[]; };
 layout(binding = 14) uniform usamplerBuffer light_polygons;
+// See shared/horizons.glsl.
+layout(binding = 15) uniform usamplerBuffer horizons;
 
 // What a draw cannot need is left out of its pipeline: a software device works through every
 // branch.
@@ -45,6 +47,7 @@ layout(constant_id = 3) const uint SHARP = 1;
 layout(constant_id = 4) const uint CLUSTERED = 1;
 // Whether point lights have beams.
 layout(constant_id = 5) const uint BEAMS = 1;
+layout(constant_id = 6) const uint WAYS = 4;
 
 layout(push_constant, scalar) uniform Parameters {
     uint first_prism;    // of those of the material
@@ -62,6 +65,7 @@ layout(push_constant, scalar) uniform Parameters {
 
 #include "shared/height_march.glsl"
 #include "shared/prisms.glsl"
+#include "shared/horizons.glsl"
 #include "shared/light_points.glsl"
 #include "shared/light_polygons.glsl"
 #include "shared/shadow_rays.glsl"
@@ -77,6 +81,7 @@ const float MOST_CHORDS = 4.0;
 
 // A place on the relief.
 struct Place {
+    bool on_surface;     // of the height map, not at its mean height
     vec2 uv;
     vec3 share;          // of the triangle's corners a, b, c
     vec3 at;             // from the eye
@@ -105,6 +110,7 @@ Place place_of(Prism p, ReliefSurface surface, HeightTile tile, uvec4 hit) {
     place.uv = place.share.x * p.uv_a + place.share.y * p.uv_b + place.share.z * p.uv_c;
     uint which = hit.x >> PRISM_BITS & 3;
     bool plane = SHADING != SHADING_RELIEF || (hit.x & HIT_WIDE) != 0;
+    place.on_surface = !plane;
     place.gradient = plane ? vec2(0.0) : gradient_at(tile, place.uv);
 
     // The shares of the high corners make up that of the height.
@@ -153,24 +159,34 @@ Base base_of(Prism p, ReliefSurface surface, Place place) {
     return base;
 }
 
-// Whether the relief itself stands on the way from a place to a light. `leaves` is where the way
-// leaves the relief's shell if nothing does, internal units.
-//
+// A way from a place to a light, as far as the relief goes.
+struct Route {
+    float leaves;        // where it leaves the relief's shell if nothing does, internal units
+    bool hidden;         // it certainly meets the relief,
+    bool clear;          // or certainly does not
+    vec3 from;           // u, v, height
+    vec3 edge;           // where it leaves its own triangle, or the shell if it is straight
+    vec2 rates;          // of u and v past that
+    float run;           // how long it is then
+    float slope;         // its height there is edge.z + slope x + bend x² / 2
+    float bend;
+    float chords;        // 0: straight
+};
+
 // Over its own triangle the way is straight above the height map. Past it, the surface turns away
 // from the way as the smooth normals of the triangle say, by triangles like this one, so that the
 // way's height above it is a parabola: bumps beyond a triangle's horizon still rise into the light,
 // and the next triangle's do not shadow what they cannot.
-bool shadowed_by_relief(Prism p, ReliefSurface surface, HeightTile tile, Place place, Base base,
-                        vec3 towards, out float leaves) {
+Route route_of(Prism p, ReliefSurface surface, HeightTile tile, Place place, Base base, vec3 towards) {
     // Slopes over the triangle, not over the tetrahedron of the place, at whose borders they jump.
     float out_of = dot(base.normal, towards) / dot(base.normal, base.axis);
     vec3 tangential = towards - base.axis * out_of;
     vec3 rates = tangential * base.shares;
     vec3 local = vec3(rates.x * p.uv_a + rates.y * p.uv_b + rates.z * p.uv_c, out_of * base.steepness);
     float rise = surface.top - surface.lowest;
-    vec3 from = vec3(place.uv, place.height + LIFT * rise);
-    float short_of = surface.top - from.z;
-    HeightHit hit;
+    Route route;
+    route.from = vec3(place.uv, place.height + LIFT * rise);
+    float short_of = surface.top - route.from.z;
 
     // Find where the way leaves the triangle, how long it is over it, and how the surface bends
     // along it.
@@ -179,44 +195,50 @@ bool shadowed_by_relief(Prism p, ReliefSurface surface, HeightTile tile, Place p
     vec3 before = mix(vec3(NEVER), ends, greaterThan(rates, vec3(0.0)));
     float edge = max(min(min(after.x, after.y), after.z), 0.0);
     float chord = edge + max(min(min(before.x, before.y), before.z), 0.0);
-    float bend = dot(base.axes * rates, tangential) * base.steepness;
+    route.bend = dot(base.axes * rates, tangential) * base.steepness;
+    route.rates = local.xy;
 
-    leaves = local.z > 0.0 ? short_of / local.z : NEVER;
-    float past = leaves - edge;
-    bool straight = past <= 0.0 || local.z > 0.0 && abs(bend) * past * (past + chord) < 2.0 * STRAIGHT * rise;
+    route.leaves = local.z > 0.0 ? short_of / local.z : NEVER;
+    float past = route.leaves - edge;
+    bool straight = past <= 0.0 || local.z > 0.0 && abs(route.bend) * past * (past + chord) < 2.0 * STRAIGHT * rise;
 
-    // Past the edge the height is at_edge + slope x + bend x² / 2.
-    float at_edge = from.z + local.z * edge;
-    float slope = local.z + 0.5 * bend * chord;
-    float deepest = bend > 0.0 && slope < 0.0 ? at_edge - 0.5 * slope * slope / bend : at_edge;
-    if (!straight && (deepest < surface.lowest || bend <= 0.0 && slope <= 0.0)) {
-        return true;
-    }
-    float square = slope * slope + 2.0 * bend * (surface.top - at_edge);
+    float at_edge = route.from.z + local.z * edge;
+    route.slope = local.z + 0.5 * route.bend * chord;
+    float deepest = route.bend > 0.0 && route.slope < 0.0 ? at_edge - 0.5 * route.slope * route.slope / route.bend : at_edge;
+    route.hidden = !straight && (deepest < surface.lowest || route.bend <= 0.0 && route.slope <= 0.0);
+    // A surface that turns away lowers what is in the way.
+    route.clear = place.on_surface && (straight || route.bend >= 0.0) && rises_above(tile, place.uv, local);
+    float square = route.slope * route.slope + 2.0 * route.bend * (surface.top - at_edge);
     // In a hollow the way may sink again before it is out: what shadows it then is the scene.
     float root = sqrt(max(square, 0.0));
-    float run = slope > 0.0 && square > 0.0 ? 2.0 * (surface.top - at_edge) / (slope + root) : (root - slope) / bend;
+    route.run = route.slope > 0.0 && square > 0.0 ? 2.0 * (surface.top - at_edge) / (route.slope + root)
+                                                  : (root - route.slope) / route.bend;
     // A chord of the parabola lies off it by bend / 8 times its length's square.
-    float wanted = ceil(run * sqrt(abs(bend) / (8.0 * CHORD_OFF * rise)));
-    float chords = straight ? 0.0 : clamp(wanted, 1.0, MOST_CHORDS);
+    float wanted = ceil(route.run * sqrt(abs(route.bend) / (8.0 * CHORD_OFF * rise)));
+    route.chords = straight ? 0.0 : clamp(wanted, 1.0, MOST_CHORDS);
     if (!straight) {
-        leaves = edge + run;
+        route.leaves = edge + route.run;
     }
+    route.edge = straight ? vec3(route.from.xy + local.xy * route.leaves, surface.top)
+                          : vec3(route.from.xy + local.xy * edge, at_edge);
+    return route;
+}
 
+// Whether the relief itself stands on a way.
+bool meets_relief(HeightTile tile, Route route) {
     // One loop over all parts of the way: a software device works through each march that is
     // written.
-    vec3 next = straight ? vec3(from.xy + local.xy * leaves, surface.top)
-                         : vec3(from.xy + local.xy * edge, at_edge);
-    vec3 last = from;
-    for (float i = 0.0; i <= chords; i++) {
-        if (march(tile, last, next, hit)) {
-            return true;
-        }
+    vec3 last = route.from;
+    vec3 next = route.edge;
+    HeightHit hit;
+    bool met = false;
+    for (float i = 0.0; !met && i <= route.chords; i++) {
+        met = march(tile, last, next, hit);
         last = next;
-        float x = run * (i + 1.0) / chords;
-        next = vec3(from.xy + local.xy * (edge + x), at_edge + x * (slope + 0.5 * bend * x));
+        float x = route.run * (i + 1.0) / route.chords;
+        next = route.edge + vec3(route.rates * x, x * (route.slope + 0.5 * route.bend * x));
     }
-    return false;
+    return met;
 }
 
 // Light straight from emitters and point lights on the surface at a place, by its own normal,
@@ -232,26 +254,34 @@ vec3 sharp(Prism p, ReliefSurface surface, HeightTile tile, Place place) {
     vec3 seen = vec3(0.0);      // of the points of emitters
     vec3 of_all = vec3(0.0);
     vec3 points = vec3(0.0);    // of point lights
-    for (uint i = 0; i < samples; i++) {
-        LightPoint light = light_of_sample(i);
-        vec3 way = light.position - at;
-        float square = dot(way, way);
-        vec3 towards = way * inversesqrt(square);
-        float arrives = arriving(light, towards, dot(facet, towards), square);
-        if (arrives <= 0.0) {
-            continue;
+    for (uint first = 0; first < samples; first += WAYS) {
+        Ways ways;
+        vec3 whole[WAYS];
+        for (uint i = 0; i < WAYS; i++) {
+            LightPoint light = light_of_sample(min(first + i, samples - 1));
+            vec3 way = light.position - at;
+            float square = dot(way, way);
+            vec3 towards = way * inversesqrt(square);
+            float arrives = arriving(light, towards, dot(facet, towards), square);
+            bool shines = first + i < samples && arrives > 0.0;
+            Route route = route_of(p, surface, tile, place, base, towards);
+            whole[i] = shines ? light.strength * arrives : vec3(0.0);
+            ways.to[i] = end_of_way(light);
+            ways.clear[i] = route.leaves * inversesqrt(square);
+            ways.open[i] = shines && !route.hidden;
+            if (ways.open[i] && !route.clear) {
+                ways.open[i] = !meets_relief(tile, route);
+            }
         }
-        vec3 whole = light.strength * arrives;
-        float leaves;
-        bool open = !shadowed_by_relief(p, surface, tile, place, base, towards, leaves)
-                    && (p.state == PART_OPEN
-                        || !blocked(at, end_of_way(light), leaves * inversesqrt(square)));
-        vec3 arrived = open ? whole : vec3(0.0);
-        if (i < emitter_samples()) {
-            of_all += whole;
-            seen += arrived;
-        } else {
-            points += arrived;
+        if (p.state != PART_OPEN) {
+            follow(at, ways);
+        }
+        for (uint i = 0; i < WAYS; i++) {
+            vec3 arrived = ways.open[i] ? whole[i] : vec3(0.0);
+            bool of_emitter = first + i < emitter_samples();
+            of_all += of_emitter ? whole[i] : vec3(0.0);
+            seen += of_emitter ? arrived : vec3(0.0);
+            points += of_emitter ? vec3(0.0) : arrived;
         }
     }
     if (polygon_count > 0 && seen != vec3(0.0)) {
@@ -324,11 +354,10 @@ vec4 shade(uint prism, uvec4 hit) {
     float level = log2(max(footprint / float(tile.width) * float(textureSize(albedo, 0).x), 1e-6));
     vec3 rho = reflectance * textureLod(albedo, vec2(place.uv.x, 1.0 - place.uv.y), level).rgb;
 
-    // Loops that take one turn at most: a software device works through what a branch leaves out.
     bool wide = (hit.x & HIT_WIDE) != 0;
     bool lit = VIEW == VIEW_IRRADIANCE || VIEW == VIEW_SHADED && !wide;
     vec3 light = vec3(0.0);
-    for (uint turns = lit ? 1 : 0; turns > 0; turns--) {
+    if (lit) {
         if (FACTORED == 1) {
             light += factored(p, surface, place);
         }
@@ -340,7 +369,7 @@ vec4 shade(uint prism, uvec4 hit) {
         }
     }
     vec3 sent = vec3(0.0);
-    for (uint turns = VIEW == VIEW_SHADED && wide ? 1 : 0; turns > 0; turns--) {
+    if (VIEW == VIEW_SHADED && wide) {
         sent = mean_sent(p, place.share, to_eye);
     }
     vec3 shown;

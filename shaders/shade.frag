@@ -30,6 +30,7 @@ layout(binding = 7) uniform usamplerBuffer part_states;
 layout(constant_id = 0) const uint LIT = LIT_IN_PARTS;
 // Whether point lights have beams.
 layout(constant_id = 1) const uint BEAMS = 1;
+layout(constant_id = 2) const uint WAYS = 4;
 
 layout(push_constant, scalar) uniform Parameters {
     vec3 x;
@@ -114,23 +115,29 @@ vec3 straight() {
     // Points of emitters are asked only where they may be hidden in part, and none where all are.
     bool by_points = polygon_count == 0 || state == PART_UNSURE && !dark;
     uint end = state == PART_HIDDEN ? 0 : samples;
-    for (uint i = by_points ? 0 : emitters; i < end; i++) {
-        LightPoint light = light_of_sample(i);
-        vec3 way = light.position - at;
-        float square = dot(way, way);
-        vec3 towards = way * inversesqrt(square);
-        float arrives = arriving(light, towards, dot(normal, towards), square);
-        if (arrives <= 0.0) {
-            continue;
+    for (uint first = by_points ? 0 : emitters; first < end; first += WAYS) {
+        Ways ways;
+        vec3 whole[WAYS];
+        for (uint i = 0; i < WAYS; i++) {
+            LightPoint light = light_of_sample(min(first + i, end - 1));
+            vec3 way = light.position - at;
+            float square = dot(way, way);
+            vec3 towards = way * inversesqrt(square);
+            float arrives = arriving(light, towards, dot(normal, towards), square);
+            ways.open[i] = first + i < end && arrives > 0.0;
+            whole[i] = ways.open[i] ? light.strength * arrives : vec3(0.0);
+            ways.to[i] = end_of_way(light);
+            ways.clear[i] = 0.0;
         }
-        vec3 whole = light.strength * arrives;
-        bool is_open = state == PART_OPEN || !blocked(from, end_of_way(light), 0.0);
-        vec3 open = is_open ? whole : vec3(0.0);
-        if (i < emitters) {
-            of_all += whole;
-            seen += open;
-        } else {
-            points += open;
+        if (state != PART_OPEN) {
+            follow(from, ways);
+        }
+        for (uint i = 0; i < WAYS; i++) {
+            vec3 arrived = ways.open[i] ? whole[i] : vec3(0.0);
+            bool of_emitter = first + i < emitters;
+            of_all += of_emitter ? whole[i] : vec3(0.0);
+            seen += of_emitter ? arrived : vec3(0.0);
+            points += of_emitter ? vec3(0.0) : arrived;
         }
     }
     if (polygon_count > 0) {

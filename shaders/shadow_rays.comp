@@ -17,12 +17,18 @@ layout(push_constant, scalar) uniform Parameters {
     uint count;
 };
 
+const uint WAYS = 1;
 #include "shared/shadow_rays.glsl"
 
 void main() {
     uint item = gl_GlobalInvocationID.x;
     if (item < count) {
         ShadowRay ray = rays[item];
-        hits[item] = blocked(ray.from, ray.to, ray.clear) ? 1 : 0;
+        Ways ways;
+        ways.to[0] = ray.to;
+        ways.clear[0] = ray.clear;
+        ways.open[0] = true;
+        follow(ray.from, ways);
+        hits[item] = ways.open[0] ? 0 : 1;
     }
 }

@@ -96,6 +96,10 @@ shared! {
     LIGHT_SETS = 16;
     /// One more than the most triangles of a leaf in the tree of shadow casters.
     LEAF_TRIANGLES = 16;
+    /// Sectors of directions in which the horizon of a relief is known, and the bound that says
+    /// nothing.
+    HORIZON_SECTORS = 16;
+    HORIZON_UNKNOWN = 255;
     /// Texels of the widest sample that shows the relief itself; wider ones show its mean.
     WIDEST_SAMPLE = 2;
     /// How relief is drawn: displaced; only lit, at its mean height; the same, with the texture

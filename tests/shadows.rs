@@ -369,8 +369,8 @@ fn bumps_under_a_card() -> Scene {
     build.0.scene
 }
 
-/// The same of relief, on a floor, where other triangles of it do not count, and on a ball. The
-/// least share of prisms that see all of the lamp, and that see none of it, where there is a card.
+/// The same of relief, on a floor, where other triangles of it do not count, and on a ball; nor are
+/// ways marched that rise above the relief's horizon. The least share of prisms that see all of the lamp, and that see none of it, where there is a card.
 #[test]
 fn prisms_that_see_all_or_nothing_follow_no_ways() {
     const ALL: f64 = 0.3;
@@ -383,9 +383,10 @@ fn prisms_that_see_all_or_nothing_follow_no_ways() {
         ("a ball", &ball(6), &beside),
     ] {
         let solution = baked(scene);
-        let [with, without] = [true, false].map(|skip_open| {
+        let drawn = |shading, skip_open| {
             let lighting = Lighting {
                 part: Light::Direct,
+                shading,
                 skip_open,
                 ..Lighting::from(&solution)
             };
@@ -394,12 +395,18 @@ fn prisms_that_see_all_or_nothing_follow_no_ways() {
             let renderer = renderer.expect("a picture");
             let picture = renderer.picture().expect("a picture");
             (picture.radiance, renderer.prisms())
-        });
+        };
+        let [with, without] = [true, false].map(|skip| drawn(ReliefShading::Factored, skip));
         let [unsure, open, hidden] = with.1;
         println!("{name}: {open} prisms are open, {hidden} hidden, {unsure} neither");
         assert!(with.0 == without.0, "{name}: another picture");
         let all = unsure + open + hidden;
         assert_eq!(without.1, [all, 0, 0]);
+        let clusters = [true, false].map(|skip| drawn(ReliefShading::Clusters, skip).0);
+        assert!(
+            clusters[0] == clusters[1],
+            "{name}: another picture by clusters"
+        );
         if name == "a card" {
             assert!(open as f64 > ALL * all as f64 && hidden as f64 > NOTHING * all as f64);
         }

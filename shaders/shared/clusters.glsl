@@ -1,7 +1,7 @@
 // The paper's way of lighting relief: the light on a face comes as a few parallel lights,
 // src/mesh/clusters.rs, and a march over the height map finds which of them a place sees. Including
 // files have Prism, ReliefSurface, Place, facet_normal, LIFT, shared/texels.glsl,
-// shared/height_march.glsl and a `usamplerBuffer parallel_lights`.
+// shared/height_march.glsl, shared/horizons.glsl and a `usamplerBuffer parallel_lights`.
 
 // Texels of struct ParallelLight.
 const uint PARALLEL_TEXELS = 3;
@@ -15,21 +15,32 @@ vec3 clustered(Prism p, ReliefSurface surface, HeightTile tile, Place place) {
     }
     vec3 facet = facet_normal(place);
     vec3 from = vec3(place.uv, place.height + LIFT * (surface.top - surface.lowest));
-    for (uint i = p.first_cluster; i < p.first_cluster + p.cluster_count; i++) {
-        vec4 first = fetch(parallel_lights, PARALLEL_TEXELS * i);
-        vec4 second = fetch(parallel_lights, PARALLEL_TEXELS * i + 1);
-        vec4 third = fetch(parallel_lights, PARALLEL_TEXELS * i + 2);
-        vec3 towards = first.xyz;
-        mat3 fluence = mat3(first.w, second.xyz, second.w, third.x, third.yzw);
-        vec3 local = towards * place.slopes;
-        float cosine = dot(facet, towards);
-        if (local.z <= 0.0 || cosine <= 0.0) {
-            continue;
+    uint i = p.first_cluster;
+    uint end = i + p.cluster_count;
+    while (i < end) {
+        // On to the next light that the relief may hide, in a loop of its own: a software device
+        // marches wherever any lane does.
+        vec3 arriving = vec3(0.0);
+        vec3 local = vec3(0.0);
+        bool unsure = false;
+        while (!unsure && i < end) {
+            vec4 first = fetch(parallel_lights, PARALLEL_TEXELS * i);
+            vec4 second = fetch(parallel_lights, PARALLEL_TEXELS * i + 1);
+            vec4 third = fetch(parallel_lights, PARALLEL_TEXELS * i + 2);
+            vec3 towards = first.xyz;
+            mat3 fluence = mat3(first.w, second.xyz, second.w, third.x, third.yzw);
+            local = towards * place.slopes;
+            float cosine = dot(facet, towards);
+            bool shines = local.z > 0.0 && cosine > 0.0;
+            unsure = shines && !(place.on_surface && rises_above(tile, place.uv, local));
+            arriving = cosine * (fluence * place.share);
+            sum += shines && !unsure ? arriving : vec3(0.0);
+            i++;
         }
-        vec3 to = vec3(place.uv + local.xy / local.z * (surface.top - from.z), surface.top);
-        HeightHit hit;
-        if (!march(tile, from, to, hit)) {
-            sum += cosine * (fluence * place.share);
+        if (unsure) {
+            vec3 to = vec3(place.uv + local.xy / local.z * (surface.top - from.z), surface.top);
+            HeightHit hit;
+            sum += march(tile, from, to, hit) ? vec3(0.0) : arriving;
         }
     }
     return max(sum, vec3(0.0));

@@ -83,16 +83,9 @@ struct Patch {
 };
 
 Patch patch_of(HeightTile tile, ivec2 cell) {
-    ivec2 size = ivec2(tile.width, tile.height);
-    ivec2 next = cell + 1;
-    next -= size * ivec2(equal(next, size));
-    uint row = tile.first + cell.y * tile.width;
-    uint next_row = tile.first + next.y * tile.width;
-    float corner = value_of_pyramid(row + cell.x);
-    float right = value_of_pyramid(row + next.x);
-    float down = value_of_pyramid(next_row + cell.x);
-    float opposite = value_of_pyramid(next_row + next.x);
-    return Patch(corner, vec2(right - corner, down - corner), (opposite - down) - (right - corner));
+    vec4 corners = fetch(pyramid, tile.first / 4 + cell.y * tile.width + cell.x);
+    vec2 slope = corners.yz - corners.x;
+    return Patch(corners.x, slope, (corners.w - corners.z) - slope.x);
 }
 
 // The first place, 0..1, where a line from `at` to `at + along` over a patch goes from above or on
@@ -148,14 +141,19 @@ bool march(HeightTile tile, vec3 from, vec3 to, out HeightHit hit) {
     bvec2 forward = greaterThan(step.xy, vec2(0.0));
     bvec2 still = lessThan(abs(step.xy), vec2(LEAST_STEP));
     uint level = 0;
-    uint first = tile.first + tile.width * tile.height;
+    uint first = tile.first + 4 * tile.width * tile.height;
     ivec2 blocks = size;
 
     // A move passes a line between cells, of which there are so many; it is followed by one ascent
     // at most, and there are no more descents than ascents. With NaN there are no steps.
     float moves = (abs(step.x) + abs(step.y)) * (end - t.x) + 6.0;
     float most = min(2.0 * moves, MOST_STEPS);
-    for (float count = 0.0; count < most; count++) {
+    if (!(most > 0.0)) {
+        return false;
+    }
+    float count = 0.0;
+    // A software device goes once more through a loop whose condition stands before it.
+    do {
         hit.steps++;
 #ifdef ALL_STEPS
         ALL_STEPS++;
@@ -225,6 +223,6 @@ bool march(HeightTile tile, vec3 from, vec3 to, out HeightHit hit) {
             level++;
             blocks = (size + ((1 << level) - 1)) >> level;
         }
-    }
+    } while (++count < most);
     return false;
 }

@@ -20,8 +20,7 @@ vec3 unshadowed(vec3 at, vec3 normal) {
         if (is_far) {
             seen = dot(normal, first.xyz);
         }
-        // A software device works through what a branch leaves out, but not through a loop.
-        for (uint turns = is_far ? 0 : 1; turns > 0; turns--) {
+        if (!is_far) {
             vec3 a = first.xyz - at;
             vec3 b = vec3(first.w, second.xy) - at;
             vec3 c = vec3(second.zw, third.x) - at;

@@ -5,7 +5,7 @@
 // shared/types.glsl, so many texels each.
 const uint PRISM_TEXELS = 12;
 const uint SURFACE_TEXELS = 3;
-const uint TILE_TEXELS = 2;
+const uint TILE_TEXELS = 3;
 
 // A hit: x is 0 of samples that meet no relief, or 1 + the prism in the lower bits and then the
 // tetrahedron and the marks below; y and z are the shares of the corners b and c, and w the height.
@@ -68,7 +68,12 @@ HeightTile load_tile(uint surface) {
     t.width = words.y;
     t.height = words.z;
     t.top = words.w;
-    t.highest = fetch(tiles, TILE_TEXELS * surface + 1).x;
+    words = fetch_words(tiles, TILE_TEXELS * surface + 1);
+    t.highest = uintBitsToFloat(words.x);
+    t.first_horizon = words.y;
+    t.horizon_columns = words.z;
+    t.horizon_rows = words.w;
+    t.horizon_step = fetch(tiles, TILE_TEXELS * surface + 2).x;
     return t;
 }
 

@@ -1,7 +1,8 @@
 // Whether a triangle stands on a straight way: a walk through the tree of
 // src/passes/shadow_rays.rs. Nodes stand in depth-first order, and each knows the one to go on with
 // if its box is missed: no stack, however deep the tree. Including files have
-// shared/types.glsl, shared/texels.glsl, and `usamplerBuffer`s shadow_nodes and shadow_triangles.
+// shared/types.glsl, shared/texels.glsl, `usamplerBuffer`s shadow_nodes and shadow_triangles, and
+// WAYS, how many ways are followed together.
 
 // Components of a way below this count as this, so that their reciprocals are finite: boxes are
 // padded by far more.
@@ -10,61 +11,105 @@ const float LEAST_WAY = 1e-18;
 const uint NODE_TEXELS = 2;
 const uint CASTER_TEXELS = 3;
 
-// The share of the way where it meets the triangle's plane within the triangle, or -1. Two
-// triangles find the same volume over the edge that they share with the opposite sign, to the bit:
-// no way leads between them.
-float meets(vec3 corner_a, vec3 corner_b, vec3 corner_c, vec3 from, vec3 way) {
-    precise vec3 a = corner_a - from;
-    precise vec3 b = corner_b - from;
-    precise vec3 c = corner_c - from;
+// Ways that are followed together, so that what they look at is loaded once.
+struct Ways {
+    vec3 to[WAYS];
+    float clear[WAYS];    // triangles with a relief are passed over up to this share of the way
+    bool open[WAYS];      // those that are to be followed; then, those that nothing stands on
+};
+
+// A triangle as it stands about the start of ways.
+struct Caster {
+    vec3 a;
+    vec3 b;
+    vec3 c;
+    vec3 over_a;          // volumes over its edges, before they meet a way
+    vec3 over_b;
+    vec3 over_c;
+    bool relief;
+};
+
+Caster caster_at(uint triangle, vec3 from) {
+    uint first = CASTER_TEXELS * triangle;
+    uvec4 word_a = fetch_words(shadow_triangles, first);
+    precise vec3 a = uintBitsToFloat(word_a.xyz) - from;
+    precise vec3 b = fetch(shadow_triangles, first + 1).xyz - from;
+    precise vec3 c = fetch(shadow_triangles, first + 2).xyz - from;
     precise vec3 over_a = b.yzx * c.zxy - b.zxy * c.yzx;
     precise vec3 over_b = c.yzx * a.zxy - c.zxy * a.yzx;
     precise vec3 over_c = a.yzx * b.zxy - a.zxy * b.yzx;
-    precise float of_a = way.x * over_a.x + way.y * over_a.y + way.z * over_a.z;
-    precise float of_b = way.x * over_b.x + way.y * over_b.y + way.z * over_b.z;
-    precise float of_c = way.x * over_c.x + way.y * over_c.y + way.z * over_c.z;
+    return Caster(a, b, c, over_a, over_b, over_c, word_a.w == 1);
+}
+
+// Whether a way meets the triangle, past the share `clear` of it where the triangle has a relief.
+// Two triangles find the same volume over the edge that they share with the opposite sign, to the
+// bit: no way leads between them.
+bool stands_on(Caster t, vec3 way, float clear) {
+    precise float of_a = way.x * t.over_a.x + way.y * t.over_a.y + way.z * t.over_a.z;
+    precise float of_b = way.x * t.over_b.x + way.y * t.over_b.y + way.z * t.over_b.z;
+    precise float of_c = way.x * t.over_c.x + way.y * t.over_c.y + way.z * t.over_c.z;
     float least = min(min(of_a, of_b), of_c);
     float most = max(max(of_a, of_b), of_c);
     float whole = of_a + of_b + of_c;
-    if (least < 0.0 && most > 0.0 || whole == 0.0) {
-        return -1.0;
-    }
-    vec3 place = (of_a * a + of_b * b + of_c * c) / whole;
-    return dot(place, way) / dot(way, way);
+    vec3 place = (of_a * t.a + of_b * t.b + of_c * t.c) / whole;
+    float share = dot(place, way) / dot(way, way);
+    bool within = (least >= 0.0 || most <= 0.0) && whole != 0.0;
+    return within && share > (t.relief ? clear : 0.0) && share < 1.0;
 }
 
-// Triangles with a relief are passed over up to the share `clear` of the way.
-bool blocked(vec3 from, vec3 to, float clear) {
-    vec3 way = to - from;
-    vec3 sides = mix(vec3(1.0), vec3(-1.0), lessThan(way, vec3(0.0)));
-    vec3 each = sides / max(abs(way), vec3(LEAST_WAY));
+// Follows ways from a place. A way is asked of no triangle whose box it misses: what it meets is
+// the same in any company.
+void follow(vec3 from, inout Ways ways) {
+    vec3 way[WAYS];
+    vec3 each[WAYS];
+    bool any_open = false;
+    for (uint i = 0; i < WAYS; i++) {
+        way[i] = ways.to[i] - from;
+        each[i] = mix(vec3(1.0), vec3(-1.0), lessThan(way[i], vec3(0.0))) / max(abs(way[i]), vec3(LEAST_WAY));
+        any_open = any_open || ways.open[i];
+    }
     // Without casters the only texel is 0.
-    uint count = fetch_words(shadow_nodes, 0).w;
+    uint count = any_open ? fetch_words(shadow_nodes, 0).w : 0;
     uint at = 0;
     while (at < count) {
-        uvec4 low = fetch_words(shadow_nodes, NODE_TEXELS * at);
-        uvec4 high = fetch_words(shadow_nodes, NODE_TEXELS * at + 1);
-        vec3 one = (uintBitsToFloat(low.xyz) - from) * each;
-        vec3 other = (uintBitsToFloat(high.xyz) - from) * each;
-        vec3 in_at = min(one, other);
-        vec3 out_at = max(one, other);
-        float enter = max(max(in_at.x, in_at.y), max(in_at.z, 0.0));
-        float leave = min(min(out_at.x, out_at.y), min(out_at.z, 1.0));
-        if (enter > leave) {
-            at = low.w;
-            continue;
+        // On to the next leaf that a way enters, in a loop of its own: a software device works
+        // through what a branch leaves out. The condition stands before the loop: lanes that are
+        // done lose what they have found if others go on to a condition behind it (Mesa 22.3).
+        bool enters[WAYS];
+        for (uint i = 0; i < WAYS; i++) {
+            enters[i] = false;
         }
-        uint first = high.w / LEAF_TRIANGLES;
-        for (uint i = first; i < first + high.w % LEAF_TRIANGLES; i++) {
-            uvec4 a = fetch_words(shadow_triangles, CASTER_TEXELS * i);
-            vec3 b = fetch(shadow_triangles, CASTER_TEXELS * i + 1).xyz;
-            vec3 c = fetch(shadow_triangles, CASTER_TEXELS * i + 2).xyz;
-            float share = meets(uintBitsToFloat(a.xyz), b, c, from, way);
-            if (share > (a.w == 1 ? clear : 0.0) && share < 1.0) {
-                return true;
+        uint leaf = 0;
+        while (leaf == 0 && at < count) {
+            uvec4 low = fetch_words(shadow_nodes, NODE_TEXELS * at);
+            uvec4 high = fetch_words(shadow_nodes, NODE_TEXELS * at + 1);
+            vec3 low_from = uintBitsToFloat(low.xyz) - from;
+            vec3 high_from = uintBitsToFloat(high.xyz) - from;
+            bool entered = false;
+            for (uint i = 0; i < WAYS; i++) {
+                vec3 one = low_from * each[i];
+                vec3 other = high_from * each[i];
+                vec3 in_at = min(one, other);
+                vec3 out_at = max(one, other);
+                float enter = max(max(in_at.x, in_at.y), max(in_at.z, 0.0));
+                float leave = min(min(out_at.x, out_at.y), min(out_at.z, 1.0));
+                enters[i] = ways.open[i] && enter <= leave;
+                entered = entered || enters[i];
+            }
+            leaf = entered ? high.w : 0;
+            at = entered ? at + 1 : low.w;
+        }
+        uint first = leaf / LEAF_TRIANGLES;
+        for (uint k = first; k < first + leaf % LEAF_TRIANGLES; k++) {
+            Caster t = caster_at(k, from);
+            for (uint i = 0; i < WAYS; i++) {
+                ways.open[i] = ways.open[i] && !(enters[i] && stands_on(t, way[i], ways.clear[i]));
             }
         }
-        at++;
+        any_open = false;
+        for (uint i = 0; i < WAYS; i++) {
+            any_open = any_open || ways.open[i];
+        }
+        count = any_open ? count : 0;
     }
-    return false;
 }

@@ -162,6 +162,10 @@ struct HeightTile {
     uint height;
     uint top;           // the coarsest level that a march uses
     float highest;
+    uint first_horizon; // block of the buffer of horizons
+    uint horizon_columns; // blocks
+    uint horizon_rows;
+    float horizon_step; // slope of a step of the bounds
     uint unused_a;
     uint unused_b;
     uint unused_c;

@@ -20,12 +20,17 @@ pub struct HeightPyramid {
     /// Texels.
     pub width: u32,
     pub height: u32,
-    /// `[row][column]` of the texels as the map has them (rows from the top, heights in the map's
-    /// units), then `[level][row][column]` of the maxima.
+    /// The highest texel.
+    pub highest: f32,
+    /// `[row][column][corner]` of the cells, heights in the map's units, rows from the top, corners
+    /// in the order above; then `[level][row][column]` of the maxima; then zeros, to whole fours.
     pub values: Vec<f32>,
     /// Where each level starts in `values`.
     pub offsets: Vec<usize>,
 }
+
+/// Corners of a cell.
+const CORNERS: usize = 4;
 
 impl HeightPyramid {
     pub fn new(map: &HeightMap) -> Self {
@@ -34,20 +39,20 @@ impl HeightPyramid {
             width * height > 0 && map.values.len() == width * height,
             "a height map has a value for each of its texels"
         );
-        let mut values = map.values.clone();
         let texel = |column: usize, row: usize| map.values[row % height * width + column % width];
-        for row in 0..height {
-            for column in 0..width {
-                let upper = texel(column, row).max(texel(column + 1, row));
-                let lower = texel(column, row + 1).max(texel(column + 1, row + 1));
-                values.push(upper.max(lower));
-            }
-        }
+        let mut values: Vec<f32> = (0..height)
+            .flat_map(|row| (0..width).map(move |column| (column, row)))
+            .flat_map(|(i, j)| [(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)])
+            .map(|(i, j)| texel(i, j))
+            .collect();
+        let highest = |corners: &[f32]| corners.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        let maxima: Vec<f32> = values.chunks_exact(CORNERS).map(highest).collect();
+        values.extend(maxima);
         let sizes: Vec<_> = successors(Some((width, height)), |&(columns, rows)| {
             (columns.max(rows) > 1).then(|| (columns.div_ceil(2), rows.div_ceil(2)))
         })
         .collect();
-        let mut offsets = vec![width * height];
+        let mut offsets = vec![CORNERS * width * height];
         for pair in sizes.windows(2) {
             let [(columns, rows), (next_columns, next_rows)] = [pair[0], pair[1]];
             let from = offsets[offsets.len() - 1];
@@ -64,9 +69,12 @@ impl HeightPyramid {
                 }
             }
         }
+        let highest = values[values.len() - 1];
+        values.resize(values.len().next_multiple_of(4), 0.0);
         Self {
             width: map.width,
             height: map.height,
+            highest,
             values,
             offsets,
         }
@@ -75,11 +83,6 @@ impl HeightPyramid {
     /// The level of one block.
     pub fn top(&self) -> u32 {
         self.offsets.len() as u32 - 1
-    }
-
-    /// The highest texel.
-    pub fn highest(&self) -> f32 {
-        self.values[self.values.len() - 1]
     }
 
     /// Columns and rows of blocks at a level.

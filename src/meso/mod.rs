@@ -11,6 +11,7 @@ mod factors;
 mod footprints;
 mod height_field;
 mod height_pyramid;
+mod horizons;
 mod known_factors;
 mod relief;
 mod response;
@@ -24,6 +25,7 @@ pub use factors::{CORNERS, Factors, RANK_STEP};
 pub use footprints::Footprints;
 pub use height_field::{Facet, HeightField};
 pub use height_pyramid::HeightPyramid;
+pub use horizons::Horizons;
 pub use known_factors::KnownFactors;
 pub use relief::{
     Class, March, MesoTexel, Options, Relief, Texels, TextureFacet, Transport, visibility,

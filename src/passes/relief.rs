@@ -9,8 +9,9 @@ use super::buffers::upload;
 use super::relief_hits::{Hits, ShapeBuffers};
 use super::shade::Shade;
 use super::shaders::relief::{Bindings, SHADER};
-use super::shadow_rays::LightBuffers;
+use super::shadow_rays::{LightBuffers, LightKinds};
 use super::types::ParallelLight;
+use crate::constants::HORIZON_SECTORS;
 use crate::error::Result;
 use crate::vk::{
     Blending, Buffer, BufferUse, Commands, DescriptorSet, Device, GraphicsPipeline, GraphicsState,
@@ -32,6 +33,8 @@ pub struct Lights<'a> {
     pub exits: &'a [Vec4],
     /// As the prisms count them.
     pub parallel_lights: &'a [ParallelLight],
+    /// [`Horizons::bounds`](crate::meso::Horizons::bounds), as the tiles count them.
+    pub horizons: &'a [[u8; HORIZON_SECTORS as usize]],
 }
 
 /// [`Lights`] on the device.
@@ -40,6 +43,7 @@ pub struct Buffers {
     coefficients: Buffer,
     exits: Buffer,
     parallel_lights: Buffer,
+    horizons: Buffer,
 }
 
 /// The prisms of one material.
@@ -59,8 +63,7 @@ pub struct Kind {
     pub factored: bool,
     pub sharp: bool,
     pub clustered: bool,
-    /// Whether point lights have beams.
-    pub beams: bool,
+    pub lights: LightKinds,
 }
 
 pub struct Relief {
@@ -75,8 +78,8 @@ impl Relief {
     /// # Errors
     /// A device that fails.
     pub fn new(device: &Arc<Device>, shade: &Shade, kind: Kind) -> Result<Self> {
-        let lights = [kind.factored, kind.sharp, kind.clustered, kind.beams].map(u32::from);
-        let constants = [&[kind.shading, kind.view], &lights[..]].concat();
+        let lit = [kind.factored, kind.sharp, kind.clustered, kind.lights.beams].map(u32::from);
+        let constants = [&[kind.shading, kind.view], &lit[..], &[kind.lights.ways]].concat();
         Ok(Self {
             pipeline: GraphicsPipeline::new(
                 device,
@@ -131,6 +134,7 @@ impl Relief {
                 parallel_lights: &buffers.parallel_lights,
                 webs: &lights.webs,
                 light_polygons: &lights.polygons,
+                horizons: &buffers.horizons,
             },
         )
     }
@@ -155,6 +159,7 @@ impl Buffers {
             coefficients: upload(device, "relief coefficients", lights.coefficients, texels)?,
             exits: upload(device, "relief exits", lights.exits, texels)?,
             parallel_lights: upload(device, "relief clusters", lights.parallel_lights, texels)?,
+            horizons: upload(device, "relief horizons", lights.horizons, texels)?,
         })
     }
 }

@@ -11,7 +11,7 @@ use glam::{Vec2, Vec3};
 use super::buffers::upload;
 use super::pass_parts::{PartedPass, PassParts};
 use super::shaders::shade::{Bindings, SHADER};
-use super::shadow_rays::{LightBuffers, LightCounts};
+use super::shadow_rays::{LightBuffers, LightCounts, LightKinds};
 use super::types::LitTriangle;
 use crate::constants::{LIT_IN_PARTS, LIT_NOT, LIT_OPEN};
 use crate::error::Result;
@@ -113,11 +113,11 @@ const FORMAT: Format = Format::R32G32B32A32_SFLOAT;
 const TEXEL_BYTES: u64 = 16;
 
 impl Shade {
-    /// Only with `adds` draws can add, and only with `beams` point lights shine in beams.
+    /// Only with `adds` draws can add.
     ///
     /// # Errors
     /// A device that fails.
-    pub fn new(device: &Arc<Device>, adds: bool, beams: bool) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, adds: bool, lights: LightKinds) -> Result<Self> {
         let colour = Attachment::copied(FORMAT);
         let [pass, further] = RenderPass::in_parts(device, "shade", colour)?;
         let over_depths = RenderPass::over_depths(device, "shade", colour)?;
@@ -128,7 +128,7 @@ impl Shade {
         let state = GraphicsState {
             name: "shade",
             shaders: &SHADER,
-            constants: &[LIT_NOT, 0],
+            constants: &[LIT_NOT, 0, 1],
             vertex_stride: size_of::<Vertex>() as u32,
             attributes: &[
                 attribute(
@@ -149,7 +149,7 @@ impl Shade {
             ..state
         };
         let lit = |how| {
-            let constants = [how, beams.into()];
+            let constants = [how, lights.beams.into(), lights.ways];
             let state = GraphicsState {
                 constants: &constants,
                 ..state

@@ -34,6 +34,15 @@ pub struct LightCounts {
     pub polygons: u32,
 }
 
+/// What shaders of light points are made for.
+#[derive(Debug, Clone, Copy)]
+pub struct LightKinds {
+    /// Whether point lights have beams.
+    pub beams: bool,
+    /// Ways to lights that a sample follows together, at least 1.
+    pub ways: u32,
+}
+
 /// Lights that are seen from places.
 #[derive(Debug, Default)]
 pub struct Lights {

@@ -5,7 +5,7 @@ use glam::Vec3;
 
 use crate::constants::{KIND_SURFACE, NONE};
 use crate::mesh::{meshlets, sources};
-use crate::meso::HeightPyramid;
+use crate::meso::{HeightPyramid, Horizons};
 pub use crate::structs::*;
 
 impl Source {
@@ -98,14 +98,22 @@ impl Slot {
 }
 
 impl HeightTile {
-    /// `first` counts the values before this pyramid's in the buffer.
-    pub fn new(pyramid: &HeightPyramid, first: u32) -> Self {
+    /// `first` counts the values before this pyramid's in their buffer, and `first_horizon` the
+    /// blocks.
+    pub fn new(
+        (pyramid, first): (&HeightPyramid, u32),
+        (horizons, first_horizon): (&Horizons, u32),
+    ) -> Self {
         Self {
             first,
             width: pyramid.width,
             height: pyramid.height,
             top: pyramid.top(),
-            highest: pyramid.highest(),
+            highest: pyramid.highest,
+            first_horizon,
+            horizon_columns: horizons.columns,
+            horizon_rows: horizons.rows,
+            horizon_step: horizons.step,
             ..Self::zeroed()
         }
     }

@@ -117,15 +117,15 @@ pub struct Lighting<'a> {
     pub shading: ReliefShading,
     pub direct: Direct,
     pub show: Show,
-    /// Whether samples of plain triangles with nothing between them and the lights skip the shadow
-    /// rays: quicker, and the same picture.
+    /// Whether samples with nothing between them and the lights skip the shadow rays, and ways that
+    /// rise above a relief's horizon the march over it: quicker, and the same picture.
     pub skip_open: bool,
     /// Whether triangles seen from behind are left out, so that one looks into a room through its
     /// walls; else they are black.
     pub hide_backs: bool,
     /// Folder that keeps the visibility of reliefs from run to run.
     pub cache: Option<&'a Path>,
-    /// Factors of reliefs that other renderers have found, and where they are left for further ones.
+    /// Factors of reliefs, shared by renderers of one scene under different lights.
     pub known: Option<&'a KnownFactors>,
 }
 

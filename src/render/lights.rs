@@ -15,10 +15,10 @@ use crate::constants::{KIND_BEAM, KIND_POINT, KIND_SURFACE, LIGHT_POINTS, LIGHT_
 use crate::error::Result;
 use crate::mesh::shadow_tree::ShadowTree;
 use crate::mesh::sources::triangle_area;
-use crate::passes::shadow_rays::{LightBuffers, Lights};
+use crate::passes::shadow_rays::{LightBuffers, LightKinds, Lights};
 use crate::passes::types::{LightPoint, LightPolygon, ShadowTriangle};
 use crate::picture::Projection;
-use crate::scene::{Beam, Scene, Sun};
+use crate::scene::{Beam, Scene, Sun, Triangle};
 use crate::vk::Device;
 
 /// A light point in scene units.
@@ -66,6 +66,22 @@ pub(super) fn sun_disc(scene: &Scene, sun: &Sun) -> Vec<[DVec3; 3]> {
     (0..SIDES)
         .map(|i| [middle, corner(i), corner(i + 1)])
         .collect()
+}
+
+/// Ways to several lights at least are followed together.
+const MOST_WAYS: usize = 4;
+
+/// What shaders are made for where these lights are drawn sharply.
+pub(super) fn light_kinds(scene: &Scene) -> LightKinds {
+    let emits = |t: &Triangle| scene.materials[t.material as usize].emits();
+    let most = match scene.lights.suns.is_empty() && !scene.triangles.iter().any(emits) {
+        true => scene.lights.points.len().clamp(1, MOST_WAYS),
+        false => MOST_WAYS,
+    };
+    LightKinds {
+        beams: scene.lights.have_beams(),
+        ways: most as u32,
+    }
 }
 
 /// Most polygons whose light is found in closed form: each costs about as much as a light point.

@@ -135,6 +135,7 @@ impl ReliefMesh {
             coefficients: &prisms.lit.coefficients,
             exits: &prisms.lit.exits,
             parallel_lights: &clusters.as_ref().map_or_else(Vec::new, parallel_lights),
+            horizons: &kept.surfaces.horizons,
         };
         Ok(Self {
             shape: ShapeBuffers::new(device, &shape)?,

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
+use super::lights::light_kinds;
 use super::relief_surfaces::Surfaces;
 use super::{Light, Lighting, ReliefShading, Show};
 use crate::bake::marcher;
@@ -58,7 +59,7 @@ fn kind(scene: &Scene, lighting: &Lighting<'_>, shading: u32) -> Kind {
         factored: lighting.part != Light::Direct || !(sharp || clustered),
         sharp,
         clustered,
-        beams: scene.lights.have_beams(),
+        lights: light_kinds(scene),
     }
 }
 
@@ -88,22 +89,20 @@ impl ReliefScene {
         let mut march = marcher(device);
         let none = KnownFactors::default();
         let reliefs = tiles.iter().map(|tile| (&tile.field, &tile.shading));
-        let factors =
-            lighting
-                .known
-                .unwrap_or(&none)
-                .of(&directions, reliefs, |field, shading| {
-                    let (visibility, _) = visibility(field, lighting.cache, &mut march)?;
-                    let error = FACTOR_ERROR;
-                    Ok(Factors::new(
-                        &directions,
-                        field,
-                        &visibility,
-                        shading,
-                        error,
-                    ))
-                })?;
+        let known = lighting.known.unwrap_or(&none);
+        let factors = known.of(&directions, reliefs, |field, shading| {
+            let (seen, _) = visibility(field, lighting.cache, &mut march)?;
+            Ok(Factors::new(
+                &directions,
+                field,
+                &seen,
+                shading,
+                FACTOR_ERROR,
+            ))
+        })?;
         let vertices = MesoVertices::new(scene, &light.elements, &light.frames);
+        let lit = kind(scene, lighting, shading);
+        let skipped = lighting.skip_open && (lit.sharp || lit.clustered);
         let gather = |moments| vertices.gather(&directions, &light.frames, moments);
         Ok(Some(Self {
             passes: Arc::new(match lighting.show {
@@ -112,10 +111,10 @@ impl ReliefScene {
                 }
                 _ => ReliefPasses::Shaded(
                     ReliefHits::new(device, shading)?,
-                    Relief::new(device, shade, kind(scene, lighting, shading))?,
+                    Relief::new(device, shade, lit)?,
                 ),
             }),
-            surfaces: Surfaces::new(scene, &tiles, &factors),
+            surfaces: Surfaces::new(scene, &tiles, &factors, skipped),
             all: gather(&light.incident_moment),
             direct: gather(&light.incident_moment_direct),
             directions,

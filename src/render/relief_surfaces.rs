@@ -7,8 +7,9 @@ use bytemuck::Zeroable;
 use glam::{DVec2, Vec4};
 use rayon::prelude::*;
 
+use crate::constants::HORIZON_SECTORS;
 use crate::mesh::tiles::Tile;
-use crate::meso::{Factors, HeightPyramid};
+use crate::meso::{Factors, HeightPyramid, Horizons};
 use crate::passes::types::{HeightTile, ReliefSurface};
 use crate::scene::{HeightMap, Material, Scene};
 
@@ -58,13 +59,15 @@ pub struct Surfaces {
     pub steepest: Vec<f64>,
     /// Values of the tiles' pyramids, one pyramid for each material.
     pub pyramids: Vec<f32>,
+    /// Bounds of the tiles' horizons, those of one material after the other's.
+    pub horizons: Vec<[u8; HORIZON_SECTORS as usize]>,
     /// Corners' factors of the surfaces, one surface after the other.
     pub factors: Vec<Vec4>,
 }
 
 impl Surfaces {
-    /// `tiles` and `factors` are `[surface]`.
-    pub fn new(scene: &Scene, tiles: &[Tile], factors: &[Arc<Factors>]) -> Self {
+    /// `tiles` and `factors` are `[surface]`. Without `horizons`, every way to a light is marched.
+    pub fn new(scene: &Scene, tiles: &[Tile], factors: &[Arc<Factors>], horizons: bool) -> Self {
         let mut all = Self::default();
         let mut pyramids: HashMap<u32, HeightTile> = HashMap::new();
         for (tile, factors) in tiles.iter().zip(factors) {
@@ -72,11 +75,19 @@ impl Surfaces {
             let Some(map) = upward(material) else {
                 continue;
             };
-            let values = &mut all.pyramids;
+            let (values, bounds) = (&mut all.pyramids, &mut all.horizons);
             let height_tile = *pyramids.entry(tile.material).or_insert_with(|| {
                 let pyramid = HeightPyramid::new(&map);
-                let tile = HeightTile::new(&pyramid, values.len() as u32);
+                let horizons = match horizons {
+                    true => Horizons::new(&map),
+                    false => Horizons::unknown(),
+                };
+                let tile = HeightTile::new(
+                    (&pyramid, values.len() as u32),
+                    (&horizons, bounds.len() as u32),
+                );
                 values.extend(&pyramid.values);
+                bounds.extend(&horizons.bounds);
                 tile
             });
             let range = HeightRange::new(&map, f64::from(material.height_scale.abs()));

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::background::{BEHIND, draw_sky};
 use super::gathered::Gathered;
-use super::lights::light_buffers;
+use super::lights::{light_buffers, light_kinds};
 use super::mesh::Mesh;
 use super::relief::{Relief, ReliefTarget};
 use super::relief_scene::ReliefScene;
@@ -135,7 +135,7 @@ impl<'a> Renderer<'a> {
         );
         view.check()?;
         let glows = scene.materials.iter().any(|m| m.map_ke.is_some());
-        let shade = Shade::new(device, glows, scene.lights.have_beams())?;
+        let shade = Shade::new(device, glows, light_kinds(scene))?;
         let fixed = Fixed {
             textures: Textures::new(device, scene)?,
             relief: ReliefScene::new(device, &shade, scene, &lighting)?,

@@ -115,8 +115,14 @@ fn pyramid_holds_the_maxima() {
         let map = rough(size, &mut random);
         let pyramid = HeightPyramid::new(&map);
         let (width, height) = size;
-        assert_eq!(pyramid.values[..map.values.len()], map.values);
-        let mut offset = map.values.len();
+        let texel = |i: u32, j: u32| map.values[(j % height * width + i % width) as usize];
+        for (j, i) in (0..height).flat_map(|j| (0..width).map(move |i| (j, i))) {
+            let corners =
+                [(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)].map(|(i, j)| texel(i, j));
+            let held = &pyramid.values[4 * (j * width + i) as usize..][..4];
+            assert_eq!(held, corners, "{size:?}: ({i}, {j})");
+        }
+        let mut offset = 4 * map.values.len();
         for level in 0..=pyramid.top() {
             let (columns, rows) = pyramid.blocks(level);
             assert_eq!(pyramid.offsets[level as usize], offset);
@@ -126,7 +132,7 @@ fn pyramid_holds_the_maxima() {
                     let texels = |at: u32, size: u32| at << level..=size.min((at + 1) << level);
                     let highest = texels(row, height)
                         .flat_map(|j| texels(column, width).map(move |i| (i, j)))
-                        .map(|(i, j)| map.values[((j % height) * width + i % width) as usize])
+                        .map(|(i, j)| texel(i, j))
                         .fold(f32::NEG_INFINITY, f32::max);
                     let held = pyramid.values[offset + (row * columns + column) as usize];
                     assert_eq!(held, highest, "{size:?}, level {level}: ({column}, {row})");
@@ -134,7 +140,7 @@ fn pyramid_holds_the_maxima() {
             }
             offset += (columns * rows) as usize;
         }
-        assert_eq!(pyramid.values.len(), offset);
+        assert_eq!(pyramid.values.len(), offset.next_multiple_of(4));
         assert_eq!(pyramid.blocks(pyramid.top()), (1, 1));
     }
 }

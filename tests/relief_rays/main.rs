@@ -14,7 +14,7 @@ use common::{assert_silent, device};
 use compare::{RELIEF, check};
 use glam::{DVec3, Vec3};
 use maps::{ODD_SIZES, bricks, map, noise, ridges, rough};
-use mesolux::meso::HeightPyramid;
+use mesolux::meso::{HeightPyramid, Horizons};
 use mesolux::passes::relief_rays::ReliefRays;
 use mesolux::passes::types::{HeightHit, HeightRay, HeightTile};
 use mesolux::scene::HeightMap;
@@ -29,10 +29,10 @@ fn run(device: &Arc<Device>, map: &HeightMap, rays: &[[Vec3; 2]]) -> Vec<HeightH
 fn run_to(device: &Arc<Device>, map: &HeightMap, rays: &[[Vec3; 2]], top: u32) -> Vec<HeightHit> {
     let pyramid = HeightPyramid::new(map);
     // Something before the tile, as other materials' pyramids are.
-    const BEFORE: u32 = 7;
+    const BEFORE: u32 = 8;
     let mut values = vec![f32::INFINITY; BEFORE as usize];
     values.extend(&pyramid.values);
-    let mut tile = HeightTile::new(&pyramid, BEFORE);
+    let mut tile = HeightTile::new((&pyramid, BEFORE), (&Horizons::unknown(), 0));
     tile.top = tile.top.min(top);
     let rays: Vec<_> = rays
         .iter()
