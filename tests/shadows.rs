@@ -370,7 +370,8 @@ fn bumps_under_a_card() -> Scene {
 }
 
 /// The same of relief, on a floor, where other triangles of it do not count, and on a ball; nor are
-/// ways marched that rise above the relief's horizon. The least share of prisms that see all of the lamp, and that see none of it, where there is a card.
+/// ways marched that rise above the relief's horizon. The least share of prisms that see all of the
+/// lamp, and that see none of it, where there is a card.
 #[test]
 fn prisms_that_see_all_or_nothing_follow_no_ways() {
     const ALL: f64 = 0.3;

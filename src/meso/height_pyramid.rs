@@ -3,6 +3,7 @@
 
 use std::iter::successors;
 
+use super::factors::CORNERS;
 use crate::scene::HeightMap;
 
 /// The texels of a periodic height map and the maxima of its bilinear surface, level by level, for
@@ -28,9 +29,6 @@ pub struct HeightPyramid {
     /// Where each level starts in `values`.
     pub offsets: Vec<usize>,
 }
-
-/// Corners of a cell.
-const CORNERS: usize = 4;
 
 impl HeightPyramid {
     pub fn new(map: &HeightMap) -> Self {
@@ -70,7 +68,7 @@ impl HeightPyramid {
             }
         }
         let highest = values[values.len() - 1];
-        values.resize(values.len().next_multiple_of(4), 0.0);
+        values.resize(values.len().next_multiple_of(CORNERS), 0.0);
         Self {
             width: map.width,
             height: map.height,
