@@ -47,6 +47,7 @@ layout(constant_id = 3) const uint SHARP = 1;
 layout(constant_id = 4) const uint CLUSTERED = 1;
 // Whether point lights have beams.
 layout(constant_id = 5) const uint BEAMS = 1;
+// Ways to lights that are followed together.
 layout(constant_id = 6) const uint WAYS = 4;
 
 layout(push_constant, scalar) uniform Parameters {
@@ -177,7 +178,8 @@ struct Route {
 // from the way as the smooth normals of the triangle say, by triangles like this one, so that the
 // way's height above it is a parabola: bumps beyond a triangle's horizon still rise into the light,
 // and the next triangle's do not shadow what they cannot.
-Route route_of(Prism p, ReliefSurface surface, HeightTile tile, Place place, Base base, vec3 towards) {
+Route route_of(Prism p, ReliefSurface surface, HeightTile tile, Place place, Base base,
+               vec3 towards) {
     // Slopes over the triangle, not over the tetrahedron of the place, at whose borders they jump.
     float out_of = dot(base.normal, towards) / dot(base.normal, base.axis);
     vec3 tangential = towards - base.axis * out_of;
@@ -200,19 +202,26 @@ Route route_of(Prism p, ReliefSurface surface, HeightTile tile, Place place, Bas
 
     route.leaves = local.z > 0.0 ? short_of / local.z : NEVER;
     float past = route.leaves - edge;
-    bool straight = past <= 0.0 || local.z > 0.0 && abs(route.bend) * past * (past + chord) < 2.0 * STRAIGHT * rise;
+    bool straight = past <= 0.0
+                    || local.z > 0.0
+                           && abs(route.bend) * past * (past + chord) < 2.0 * STRAIGHT * rise;
 
     float at_edge = route.from.z + local.z * edge;
     route.slope = local.z + 0.5 * route.bend * chord;
-    float deepest = route.bend > 0.0 && route.slope < 0.0 ? at_edge - 0.5 * route.slope * route.slope / route.bend : at_edge;
-    route.hidden = !straight && (deepest < surface.lowest || route.bend <= 0.0 && route.slope <= 0.0);
+    float deepest = route.bend > 0.0 && route.slope < 0.0
+                        ? at_edge - 0.5 * route.slope * route.slope / route.bend
+                        : at_edge;
+    route.hidden = !straight
+                   && (deepest < surface.lowest || route.bend <= 0.0 && route.slope <= 0.0);
     // A surface that turns away lowers what is in the way.
-    route.clear = place.on_surface && (straight || route.bend >= 0.0) && rises_above(tile, place.uv, local);
+    route.clear = place.on_surface && (straight || route.bend >= 0.0)
+                  && rises_above(tile, place.uv, local);
     float square = route.slope * route.slope + 2.0 * route.bend * (surface.top - at_edge);
     // In a hollow the way may sink again before it is out: what shadows it then is the scene.
     float root = sqrt(max(square, 0.0));
-    route.run = route.slope > 0.0 && square > 0.0 ? 2.0 * (surface.top - at_edge) / (route.slope + root)
-                                                  : (root - route.slope) / route.bend;
+    route.run = route.slope > 0.0 && square > 0.0
+                    ? 2.0 * (surface.top - at_edge) / (route.slope + root)
+                    : (root - route.slope) / route.bend;
     // A chord of the parabola lies off it by bend / 8 times its length's square.
     float wanted = ceil(route.run * sqrt(abs(route.bend) / (8.0 * CHORD_OFF * rise)));
     route.chords = straight ? 0.0 : clamp(wanted, 1.0, MOST_CHORDS);

@@ -30,6 +30,7 @@ layout(binding = 7) uniform usamplerBuffer part_states;
 layout(constant_id = 0) const uint LIT = LIT_IN_PARTS;
 // Whether point lights have beams.
 layout(constant_id = 1) const uint BEAMS = 1;
+// Ways to lights that are followed together.
 layout(constant_id = 2) const uint WAYS = 4;
 
 layout(push_constant, scalar) uniform Parameters {

@@ -152,7 +152,8 @@ bool march(HeightTile tile, vec3 from, vec3 to, out HeightHit hit) {
         return false;
     }
     float count = 0.0;
-    // A software device goes once more through a loop whose condition stands before it.
+    // A software device goes once more through a loop whose condition stands before it. Nothing
+    // that the last turn finds is looked at behind it, see shared/shadow_rays.glsl.
     do {
         hit.steps++;
 #ifdef ALL_STEPS

@@ -18,7 +18,8 @@ bool rises_above(HeightTile tile, vec2 uv, vec3 rates) {
     vec2 far = abs(way);
     float greater = max(far.x, far.y);
     float lesser = min(far.x, far.y);
-    bvec4 bits = bvec4(way.x < 0.0, way.y < 0.0, far.y > far.x, lesser > MIDDLE_OF_SECTORS * greater);
+    bvec4 bits = bvec4(way.x < 0.0, way.y < 0.0, far.y > far.x,
+                       lesser > MIDDLE_OF_SECTORS * greater);
     uvec4 powers = uvec4(bits) * uvec4(1, 2, 4, 8);
     uint sector = powers.x + powers.y + powers.z + powers.w;
     uint steps = words[sector / 4] >> 8 * (sector % 4) & 0xff;

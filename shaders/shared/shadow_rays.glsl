@@ -65,7 +65,8 @@ void follow(vec3 from, inout Ways ways) {
     bool any_open = false;
     for (uint i = 0; i < WAYS; i++) {
         way[i] = ways.to[i] - from;
-        each[i] = mix(vec3(1.0), vec3(-1.0), lessThan(way[i], vec3(0.0))) / max(abs(way[i]), vec3(LEAST_WAY));
+        vec3 sides = mix(vec3(1.0), vec3(-1.0), lessThan(way[i], vec3(0.0)));
+        each[i] = sides / max(abs(way[i]), vec3(LEAST_WAY));
         any_open = any_open || ways.open[i];
     }
     // Without casters the only texel is 0.
