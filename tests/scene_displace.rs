@@ -109,19 +109,19 @@ fn edges(triangles: impl Iterator<Item = Triangle>) -> HashMap<[u32; 2], usize> 
 
 #[test]
 fn a_wave_on_a_plane_has_exact_heights_at_the_vertices() {
-    // Legs of 8 texels are halved three times, the diagonal of 11.3 four times: 16 rows of 8
-    // squares, halved.
+    // Nine rows of nine cells, the outer ones cut by the border. The nine along the diagonal are cut
+    // in two by it; of each of the others there are four triangles.
     for (scale, beside) in [(0.3_f32, false), (-0.125, false)] {
         let heights = waves(8);
         let flat = sheet(relief(heights.clone(), scale), beside);
         let high = displace(&flat).unwrap();
-        assert_eq!(high.triangles.len(), 2 * 128, "{scale}");
+        assert_eq!(high.triangles.len(), 72 * 4 + 9 * 2, "{scale}");
         assert_eq!(high.dropped_degenerate, 0);
         let mut moved = 0;
         for t in &high.triangles {
             for (p, uv) in high.corners(t).iter().zip(t.uv) {
                 let [u, v] = uv.map(f64::from);
-                assert_eq!((p.x, p.y), (2.0 * u, 2.0 * v));
+                assert!((p.x - 2.0 * u).abs().max((p.y - 2.0 * v).abs()) < 1e-15, "{p}");
                 let expected = f64::from(scale) * (heights.sample(u, v) - heights.mean());
                 assert!((p.z - expected).abs() < 1e-15, "{} {expected}", p.z);
                 moved += usize::from(p.z != 0.0);
@@ -145,23 +145,141 @@ fn a_wave_on_a_plane_has_exact_heights_at_the_vertices() {
 }
 
 #[test]
-fn an_edge_ends_at_one_texel() {
+fn no_triangle_reaches_over_more_than_a_cell() {
     for size in [1_u32, 2, 3, 5, 16] {
         let heights = map(size, |u, v| u + 2.0 * v);
         let high = displace(&sheet(relief(heights, 1.0), false)).unwrap();
-        let mut longest = 0.0_f64;
+        let cells = |uv: [f32; 2]| uv.map(|x| f64::from(x) * f64::from(size) - 0.5);
+        let mut widest = 0.0_f64;
         for t in &high.triangles {
-            for k in 0..3 {
-                let [a, b] = [t.uv[k], t.uv[(k + 1) % 3]];
-                let [u, v] = [0, 1].map(|i| f64::from(b[i] - a[i]) * f64::from(size));
-                longest = longest.max(u.hypot(v));
+            for axis in 0..2 {
+                let along = t.uv.map(|uv| cells(uv)[axis]);
+                let [low, high] =
+                    [f64::min, f64::max].map(|of| along.into_iter().reduce(of).unwrap());
+                let line = (low + 1e-4).ceil();
+                assert!(
+                    size == 1 || line > high - 1e-4,
+                    "{size}: a line in {low} to {high}"
+                );
+                widest = widest.max(high - low);
             }
         }
         // A map of one texel is flat: no relief, nothing to refine.
         match size {
             1 => assert_eq!(high.triangles.len(), 2),
-            _ => assert!(longest <= 1.0 && longest > 0.5, "{size}: {longest}"),
+            _ => assert!((widest - 1.0).abs() < 1e-4, "{size}: {widest}"),
         }
+    }
+}
+
+/// A closed shape of 32 triangles under textures turned, stretched and shifted at random, some of
+/// them along the lines between cells, some a line or a point.
+fn wrapped(seed: u64) -> Scene {
+    let mut state = seed;
+    let mut random = move || {
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (state >> 40) as f32 / (1 << 24) as f32
+    };
+    let (mut vertices, mut faces) = (Vec::new(), Vec::new());
+    let corner = [DVec3::X, DVec3::Y, DVec3::Z];
+    vertices.extend(corner.iter().flat_map(|&axis| [axis, -axis]));
+    for k in 0..8_u32 {
+        let [x, y, z] = [k & 1, 2 + (k >> 1 & 1), 4 + (k >> 2)];
+        faces.push(if k.count_ones() % 2 == 0 {
+            [x, y, z]
+        } else {
+            [x, z, y]
+        });
+    }
+    let mut middles = HashMap::new();
+    let mut quarters = Vec::new();
+    for [a, b, c] in faces {
+        let mut middle = |p: u32, q: u32| {
+            *middles.entry([p.min(q), p.max(q)]).or_insert_with(|| {
+                vertices.push((vertices[p as usize] + vertices[q as usize]).normalize());
+                vertices.len() as u32 - 1
+            })
+        };
+        let [d, e, f] = [middle(a, b), middle(b, c), middle(c, a)];
+        quarters.extend([[a, d, f], [d, b, e], [f, e, c], [d, e, f]]);
+    }
+    let mut scene = Scene {
+        name: "wrapped".into(),
+        vertices,
+        materials: vec![relief(waves(7), 0.05), plain()],
+        ..Scene::default()
+    };
+    // Shared where it can be: by vertex, shifted by whole repeats.
+    let shared: Vec<[f32; 2]> = scene
+        .vertices
+        .iter()
+        .map(|_| [random(), random()])
+        .collect();
+    for (k, vertices) in quarters.into_iter().enumerate() {
+        let shift = [random(), random()].map(|x| (8.0 * x).floor());
+        let uv = match k % 8 {
+            0..3 => vertices.map(|v| shared[v as usize]),
+            3 => vertices.map(|v| [0, 1].map(|i| shared[v as usize][i] + shift[i])),
+            4 => [0; 3].map(|_| [random(), random()].map(|x| 3.0 * x)),
+            // On lines: texels of a seventh, whose centres are at odd fourteenths.
+            5 => [0; 3].map(|_| [random(), random()].map(|x| ((20.0 * x).floor() + 0.5) / 7.0)),
+            6 => [0; 3].map(|_| [2.0 * random(), 0.3]),
+            _ => [shared[0]; 3],
+        };
+        scene
+            .triangles
+            .push(triangle(vertices, uv, u32::from(k == 9)));
+    }
+    scene
+}
+
+/// No gap, no overlap, and the same share of the texture, however the texture lies.
+#[test]
+fn any_texture_leaves_the_surface_closed() {
+    let texture = |scene: &Scene| -> f64 {
+        let area = |t: &Triangle| {
+            let [a, b, c] = t.uv.map(|uv| uv.map(f64::from));
+            ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).abs() / 2.0
+        };
+        scene.triangles.iter().map(area).sum()
+    };
+    for seed in 0..200 {
+        let flat = wrapped(seed);
+        let high = displace(&flat).unwrap();
+        let edges = edges(high.triangles.iter().copied());
+        for (&[a, b], &n) in &edges {
+            assert_eq!((n, edges.get(&[b, a])), (1, Some(&1)), "{seed}: {a} {b}");
+        }
+        assert_eq!(high.dropped_degenerate, 0, "{seed}");
+        let [before, after] = [texture(&flat), texture(&high)];
+        assert!(
+            (before - after).abs() < 1e-3 * before,
+            "{seed}: {before} {after}"
+        );
+    }
+}
+
+/// Where whole cells are, the surface passes through the bilinear map at all of its vertices.
+#[test]
+fn a_whole_cell_has_the_height_of_its_middle() {
+    let heights = map(6, |u, v| ((40.0 * u).sin() * (31.0 * v).cos() + 1.0) / 2.0);
+    let high = displace(&sheet(relief(heights.clone(), 0.2), false)).unwrap();
+    let middles: Vec<DVec3> = high
+        .vertices
+        .iter()
+        .copied()
+        .filter(|p| {
+            [p.x, p.y]
+                .iter()
+                .all(|x| ((3.0 * x).fract()).abs() < 1e-9 && *x > 0.0)
+        })
+        .collect();
+    assert!(middles.len() >= 20, "{}", middles.len());
+    for p in middles {
+        let expected = f64::from(0.2_f32) * (heights.sample(p.x / 2.0, p.y / 2.0) - heights.mean());
+        assert!((p.z - expected).abs() < 1e-12, "{p} {expected}");
     }
 }
 
