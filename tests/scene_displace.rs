@@ -121,7 +121,10 @@ fn a_wave_on_a_plane_has_exact_heights_at_the_vertices() {
         for t in &high.triangles {
             for (p, uv) in high.corners(t).iter().zip(t.uv) {
                 let [u, v] = uv.map(f64::from);
-                assert!((p.x - 2.0 * u).abs().max((p.y - 2.0 * v).abs()) < 1e-15, "{p}");
+                assert!(
+                    (p.x - 2.0 * u).abs().max((p.y - 2.0 * v).abs()) < 1e-15,
+                    "{p}"
+                );
                 let expected = f64::from(scale) * (heights.sample(u, v) - heights.mean());
                 assert!((p.z - expected).abs() < 1e-15, "{} {expected}", p.z);
                 moved += usize::from(p.z != 0.0);
