@@ -6,14 +6,13 @@ use std::sync::Arc;
 use glam::DVec3;
 use serde::Serialize;
 
-use super::relief_room::{ANGLES, CASES, room};
+use super::relief_room::{CASES, room};
 use crate::atomic_file::write_atomically;
 use crate::bake;
 use crate::error::{Error, Result};
-use crate::meso::Options as ReliefOptions;
 use crate::path_tracer::{PathTracer, Settings as Paths};
-use crate::render::{Comparison, Flip, Light, Lighting, Picture, View, render, side_by_side};
-use crate::scene::displace;
+use crate::render::{Comparison, Flip, Light, Lighting, Picture, Renderer, View, side_by_side};
+use crate::scene::{Scene, displace};
 use crate::solver::Settings;
 use crate::vk::Device;
 
@@ -23,18 +22,17 @@ pub struct Options<'a> {
     pub side: u32,
     /// Paths of each pixel, of direct and of indirect light each.
     pub paths: u32,
-    /// Only this material; None draws all.
-    pub material: Option<&'a str>,
-    /// Shading, direct light and cache of the pictures; its light is ignored.
-    pub lighting: Lighting<'a>,
+    /// Samples along a pixel's side, as [`Renderer::new`] takes them.
+    pub samples: u32,
+    pub settings: &'a Settings,
 }
 
 /// One picture against its reference.
 #[derive(Debug, Clone, Serialize)]
 pub struct Row {
-    pub material: String,
-    /// Degrees from straight above.
-    pub angle: f64,
+    pub scene: String,
+    /// The camera's name.
+    pub view: String,
     /// direct, indirect or global.
     pub light: &'static str,
     /// [`Comparison::rel_mse`] less `noise`.
@@ -48,7 +46,7 @@ pub struct Row {
 }
 
 pub const HEADER: &str =
-    "material  angle  light     relMSE    (noise)   bias      rms     HDR-FLIP";
+    "scene          view         light       relMSE  (noise)     bias      rms  HDR-FLIP";
 
 /// The reference, with the variance of its noise.
 pub struct Reference {
@@ -104,43 +102,44 @@ impl Reference {
     }
 }
 
-/// Bakes, draws and traces each material, prints a row a picture, writes the pictures beside their
-/// reference and difference into `folder` and updates `pictures.csv` and `pictures.json` there.
-/// `go_on` is called before each view; false stops.
+/// The room with a flat floor and those with a relief, or the one with this material.
 ///
 /// # Errors
-/// An unknown material; a device that fails; files that cannot be written.
+/// An unknown material.
+pub fn rooms(material: Option<&str>) -> Result<Vec<Scene>> {
+    let wanted = |name: &str| material.is_none_or(|only| only == name);
+    let cases = CASES.iter().filter(|case| wanted(case.name));
+    let rooms: Vec<Scene> = cases.map(room).collect();
+    match material {
+        Some(unknown) if rooms.is_empty() => Err(Error::Usage(format!(
+            "no material \"{unknown}\"; there is {}",
+            CASES.map(|case| case.name).join(", ")
+        ))),
+        _ => Ok(rooms),
+    }
+}
+
+/// Bakes, draws and traces each scene by all of its cameras, prints a row a picture, writes the
+/// pictures beside their reference and difference into `folder` and updates `pictures.csv` and
+/// `pictures.json` there. `go_on` is called before each view; false stops.
+///
+/// # Errors
+/// A device that fails; files that cannot be written.
 pub fn run(
     device: &Arc<Device>,
+    scenes: &[Scene],
     options: &Options<'_>,
     folder: &Path,
     mut go_on: impl FnMut() -> bool,
 ) -> Result<Vec<Row>> {
-    let wanted = |name: &str| options.material.is_none_or(|only| only == name);
-    if !CASES.iter().any(|case| wanted(case.name)) {
-        let names: Vec<_> = CASES.iter().map(|case| case.name).collect();
-        return Err(Error::Usage(format!(
-            "no material \"{}\"; there is {}",
-            options.material.unwrap_or_default(),
-            names.join(", ")
-        )));
-    }
     std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, e))?;
-    let settings = Settings {
-        relief: ReliefOptions {
-            cache: options.lighting.cache.map(Path::to_owned),
-            ..ReliefOptions::default()
-        },
-        ..Settings::default()
-    };
     crate::say!("{HEADER}");
     let mut rows = Vec::new();
-    for case in CASES.iter().filter(|case| wanted(case.name)) {
-        let scene = room(case);
-        let solution = bake::bake(device, &scene, &settings, |_| true)?;
-        let fine = displace(&scene)?;
+    for scene in scenes {
+        let solution = bake::bake(device, scene, options.settings, |_| true)?;
+        let fine = displace(scene)?;
         let tracer = PathTracer::new(&fine)?;
-        for (camera, angle) in scene.cameras.iter().zip(ANGLES) {
+        for camera in &scene.cameras {
             if !go_on() {
                 return Ok(rows);
             }
@@ -159,17 +158,16 @@ pub fn run(
             ] {
                 let lighting = Lighting {
                     part,
-                    shading: options.lighting.shading,
-                    direct: options.lighting.direct,
-                    cache: options.lighting.cache,
+                    cache: options.settings.relief.cache.as_deref(),
                     ..Lighting::from(&solution)
                 };
-                let picture = render(device, &scene, lighting, &view)?;
+                let renderer = Renderer::new(device, scene, lighting, &view, options.samples)?;
+                let picture = renderer.picture()?;
                 let found = Comparison::new(&picture, &reference.picture)?;
                 let noise = reference.noise();
                 let row = Row {
-                    material: case.name.into(),
-                    angle,
+                    scene: scene.name.clone(),
+                    view: camera.name.clone(),
                     light: name,
                     rel_mse: found.rel_mse - noise,
                     noise,
@@ -180,10 +178,7 @@ pub fn run(
                 crate::say!("{}", line(&row));
                 rows.push(row);
                 let beside = side_by_side(&picture, &reference.picture)?;
-                beside.write(
-                    &folder.join(format!("{}-{angle}-{name}.png", case.name)),
-                    None,
-                )?;
+                beside.write(&folder.join(file_name(rows.last().expect("pushed"))), None)?;
             }
             write(&rows, folder)?;
         }
@@ -191,11 +186,17 @@ pub fn run(
     Ok(rows)
 }
 
+/// Name of the file with a row's picture.
+pub fn file_name(row: &Row) -> String {
+    let name = format!("{}-{}-{}", row.scene, row.view, row.light);
+    name.replace(|c: char| !c.is_alphanumeric(), "-") + ".png"
+}
+
 fn line(row: &Row) -> String {
     format!(
-        "{:<9} {:>5}  {:<8} {:>9.2e} ({:.1e}) {:>+7.2} % {:>6.2} % {:>9.4}",
-        row.material,
-        row.angle,
+        "{:<14} {:<12} {:<8} {:>9.2e} ({:.1e}) {:>+6.2} % {:>6.2} %   {:.4}",
+        row.scene,
+        row.view,
         row.light,
         row.rel_mse,
         row.noise,
@@ -210,12 +211,12 @@ fn write(rows: &[Row], folder: &Path) -> Result<()> {
     let text = serde_json::to_string_pretty(rows).map_err(|e| Error::file(&json, e.to_string()))?;
     write_atomically(&json, |out| out.write_all(text.as_bytes()))?;
     write_atomically(&folder.join("pictures.csv"), |out| {
-        writeln!(out, "material,angle,light,rel_mse,noise,bias,rms,hdr_flip")?;
+        writeln!(out, "scene,view,light,rel_mse,noise,bias,rms,hdr_flip")?;
         for r in rows {
             writeln!(
                 out,
                 "{},{},{},{},{},{},{},{}",
-                r.material, r.angle, r.light, r.rel_mse, r.noise, r.bias, r.rms, r.flip
+                r.scene, r.view, r.light, r.rel_mse, r.noise, r.bias, r.rms, r.flip
             )?;
         }
         Ok(())

@@ -37,6 +37,12 @@ pub struct Options {
     /// Pixels across and down
     #[arg(long, value_name = "WxH", default_value = "800x800", value_parser = size)]
     size: (u32, u32),
+    /// Samples of each pixel: 16, 64, 256 or 1024
+    ///
+    /// More make edges and fine relief smoother, and take as many times as long.
+    #[arg(long, value_name = "N", default_value = "16", value_parser = samples_per_side,
+        conflicts_with = "reference")]
+    samples: u32,
     #[command(flatten)]
     bake_scene: BakeScene,
     #[command(flatten)]
@@ -64,6 +70,14 @@ pub fn size(text: &str) -> std::result::Result<(u32, u32), String> {
         w.parse().map_err(|_| wrong())?,
         h.parse().map_err(|_| wrong())?,
     ))
+}
+
+/// Along a side of a pixel.
+pub fn samples_per_side(text: &str) -> std::result::Result<u32, String> {
+    let sides = [1, 2, 4, 8].map(|times| times * SAMPLES);
+    let count = text.parse();
+    (sides.into_iter().find(|side| count == Ok(side * side)))
+        .ok_or_else(|| "must be 16, 64, 256 or 1024".to_owned())
 }
 
 pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
@@ -156,7 +170,7 @@ impl Options {
         let mut renderers = parts
             .map(|&part| {
                 let lighting = self.show.apply(lighting, part);
-                Renderer::new(device, scene, lighting, &self.view(first), SAMPLES)
+                Renderer::new(device, scene, lighting, &self.view(first), self.samples)
             })
             .collect::<Result<Vec<_>>>()?;
         let drawn = |renderers: &[Renderer<'_>]| {

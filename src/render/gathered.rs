@@ -12,6 +12,8 @@ const CONTRAST: f32 = 0.8;
 pub struct Gathered {
     width: u32,
     height: u32,
+    /// Samples drawn along a pixel's side, a multiple of SAMPLES.
+    samples: u32,
     radiance: Vec<[f32; 3]>,
     contrasts: Vec<(u32, Samples)>,
     /// Luminance of the metered pixels.
@@ -19,10 +21,11 @@ pub struct Gathered {
 }
 
 impl Gathered {
-    pub fn new((width, height): (u32, u32)) -> Self {
+    pub fn new((width, height): (u32, u32), samples: u32) -> Self {
         Self {
             width,
             height,
+            samples,
             radiance: vec![[0.0; 3]; width as usize * height as usize],
             contrasts: Vec::new(),
             metered: Vec::new(),
@@ -31,20 +34,30 @@ impl Gathered {
 
     /// Adds a tile's samples, in rows of `stride`.
     pub fn add(&mut self, tile: Tile, samples: &[[f32; 4]], stride: usize) {
-        let side = SAMPLES as usize;
+        let drawn = self.samples as usize;
+        let kept = SAMPLES as usize;
+        let each = drawn / kept;
+        let share = 1.0 / (each * each) as f32;
         let rows: Vec<Vec<(Samples, bool)>> = (0..tile.height as usize)
             .into_par_iter()
             .map(|row| {
                 (0..tile.width as usize)
                     .map(|column| {
-                        let sample = |i: usize| {
-                            samples[(row * side + i / side) * stride + column * side + i % side]
+                        let sample = |y: usize, x: usize| {
+                            samples[(row * drawn + y) * stride + column * drawn + x]
                         };
                         let colours = std::array::from_fn(|i| {
-                            let [r, g, b, _] = sample(i);
-                            [r, g, b]
+                            let mut sum = [0.0; 3];
+                            for k in 0..each * each {
+                                let (y, x) =
+                                    (i / kept * each + k / each, i % kept * each + k % each);
+                                let of = sample(y, x);
+                                (0..3).for_each(|c| sum[c] += of[c]);
+                            }
+                            sum.map(|c| c * share)
                         });
-                        (colours, (0..side * side).all(|i| sample(i)[3] > 0.5))
+                        let metered = |i: usize| sample(i / drawn, i % drawn)[3] > 0.5;
+                        (colours, (0..drawn * drawn).all(metered))
                     })
                     .collect()
             })

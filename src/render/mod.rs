@@ -1,5 +1,5 @@
 //! A simple shaded picture of a bake: irradiance smoothed over each surface, reflectance textures
-//! per sample, 4 × 4 samples a pixel.
+//! per sample, 4 × 4 samples a pixel or more.
 //!
 //! ```text
 //! irradiance ─► smooth ─┐
@@ -35,7 +35,7 @@ pub use compare::{Comparison, side_by_side};
 pub use flip::{Flip, PIXELS_PER_DEGREE, ldr};
 pub use lighting::{Direct, Lighting, ReliefShading, Show};
 pub use overdraw::Overdraw;
-pub use renderer::{Cuts, Renderer};
+pub use renderer::{Cuts, MOST_SAMPLES, Renderer};
 pub use slots::slot_colour;
 #[cfg(feature = "window")]
 pub(crate) use textures::upload as upload_texture;

@@ -20,8 +20,8 @@ use crate::scene::Scene;
 use crate::scene::sky::Sky;
 use crate::vk::{Commands, Device, Timestamps};
 
-/// Pixels along a side of a tile, each a submission: 0.1 s by lavapipe's two cores.
-const TILE: u32 = 40;
+/// Samples along a side of a tile, each a submission: 0.1 s by lavapipe's two cores.
+const TILE: u32 = 160;
 
 /// How draws of a view are cut. The picture does not depend on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,6 +40,9 @@ impl Default for Cuts {
         }
     }
 }
+
+/// Most samples along a pixel's side; SAMPLES divides it, and it a tile's side.
+pub const MOST_SAMPLES: u32 = 32;
 
 /// Marks pixels of plain triangles when pixels of relief are counted.
 const NOT_RELIEF: f32 = 2.0;
@@ -116,8 +119,8 @@ impl ViewParts {
 }
 
 impl<'a> Renderer<'a> {
-    /// `samples` is the number of samples along a pixel's side: SAMPLES for [`Self::picture`], 1
-    /// for [`Self::frames`].
+    /// `samples` is the number of samples along a pixel's side: SAMPLES or a multiple of it, up to
+    /// [`MOST_SAMPLES`], for [`Self::picture`], 1 for [`Self::frames`].
     ///
     /// # Errors
     /// As [`super::render`].
@@ -164,7 +167,7 @@ impl<'a> Renderer<'a> {
         Ok(())
     }
 
-    /// SAMPLES × SAMPLES samples a pixel, tile by tile.
+    /// All samples of the view, tile by tile.
     pub fn picture(&self) -> Result<Picture> {
         match self.fixed.lighting.show {
             Show::Overdraw => Ok(self.overdraw()?.picture()),
@@ -211,14 +214,20 @@ impl<'a> Renderer<'a> {
     /// While a tile is drawn, the samples of the one before are resolved.
     fn tiles(&self, mut go_on: impl FnMut(Tile, &Gathered) -> bool) -> Result<Option<Picture>> {
         let (width, height) = self.view.size;
-        let canvas = || self.canvas((width.min(TILE) * SAMPLES, height.min(TILE) * SAMPLES));
+        let samples = self.fixed.samples;
+        assert!(
+            samples % SAMPLES == 0 && samples <= MOST_SAMPLES,
+            "a multiple of {SAMPLES}"
+        );
+        let side = TILE / samples;
+        let canvas = || self.canvas((width.min(side) * samples, height.min(side) * samples));
         let canvases = [canvas()?, canvas()?];
-        let mut gathered = Gathered::new(self.view.size);
+        let mut gathered = Gathered::new(self.view.size, samples);
         let mut before = None;
-        for (i, tile) in Tile::of((width, height), TILE).enumerate() {
+        for (i, tile) in Tile::of((width, height), side).enumerate() {
             let canvas = &canvases[i % 2];
             let mut commands = Commands::record(&self.fixed.device, "shade", |cmd| {
-                self.record(cmd, canvas, tile, SAMPLES, None, || ());
+                self.record(cmd, canvas, tile, samples, None, || ());
                 Ok(())
             })?;
             commands.submit()?;
@@ -246,9 +255,16 @@ impl<'a> Renderer<'a> {
     ) -> Result<()> {
         commands.wait()?;
         let target = &canvas.target;
-        let (mut samples, stride) = (target.rows(tile.height * SAMPLES), target.width);
+        let per_side = self.fixed.samples;
+        let (mut samples, stride) = (target.rows(tile.height * per_side), target.width);
         if let Some(sky) = self.fixed.sky() {
-            draw_sky(sky, &self.view.projection, tile, &mut samples, stride);
+            draw_sky(
+                sky,
+                &self.view.projection,
+                (tile, per_side),
+                &mut samples,
+                stride,
+            );
         }
         gathered.add(tile, &samples, stride as usize);
         Ok(())
@@ -283,7 +299,7 @@ impl<'a> Renderer<'a> {
     pub fn drawn(&self) -> [usize; 2] {
         let ViewParts { mesh, relief, .. } = &self.view;
         let mut counts = [0; 2];
-        for tile in Tile::of(self.view.size, TILE) {
+        for tile in Tile::of(self.view.size, TILE / self.fixed.samples) {
             let plain = mesh.drawn(tile, self.cuts);
             let prisms = relief
                 .as_ref()

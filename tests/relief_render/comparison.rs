@@ -2,10 +2,10 @@
 
 use glam::Vec3;
 use mesolux::bench::pictures;
-use mesolux::render::{Comparison, Lighting, Picture, View, render, side_by_side};
+use mesolux::render::{Comparison, Picture, View, render, side_by_side};
 
 use crate::common::{assert_silent, device};
-use crate::{small, small_camera};
+use crate::{settings, small, small_camera};
 
 /// A picture of so many pixels a side, all alike.
 fn even(side: u32, value: [f32; 3]) -> Picture {
@@ -77,22 +77,18 @@ fn comparisons_have_closed_forms() {
 #[test]
 fn bench_writes_rows_and_pictures() {
     let folder = tempfile::tempdir().expect("a folder for the test");
-    let run = |material| {
-        let options = pictures::Options {
-            side: 8,
-            paths: 4,
-            material: Some(material),
-            lighting: Lighting {
-                cache: Some(folder.path()),
-                ..Lighting::from(&[][..])
-            },
-        };
-        pictures::run(&device(), &options, folder.path(), || true)
+    let settings = settings(64, 1e-2, Some(folder.path().to_owned()));
+    let options = pictures::Options {
+        side: 8,
+        paths: 4,
+        samples: 8,
+        settings: &settings,
     };
-    let rows = run("bumps").expect("rows");
+    let scenes = pictures::rooms(Some("bumps")).expect("it is there");
+    let rows = pictures::run(&device(), &scenes, &options, folder.path(), || true).expect("rows");
     assert_eq!(rows.len(), 9);
     for row in &rows {
-        let name = format!("{}-{}-{}.png", row.material, row.angle, row.light);
+        let name = pictures::file_name(row);
         let picture = image::open(folder.path().join(&name)).expect("a picture");
         assert_eq!((picture.width(), picture.height()), (24, 8), "{name}");
         assert!(row.noise > 0.0 && (0.0..1.0).contains(&row.flip), "{row:?}");
@@ -104,7 +100,9 @@ fn bench_writes_rows_and_pictures() {
     // A number read may differ from the one written in its last bit.
     let read_back = json[8]["rel_mse"].as_f64().expect("a number");
     assert!((read_back - rows[8].rel_mse).abs() <= 1e-15 * read_back.abs());
-    let error = run("nosuch").expect_err("no such material").to_string();
+    let error = pictures::rooms(Some("nosuch"))
+        .expect_err("no such material")
+        .to_string();
     assert!(
         error.contains("nosuch") && error.contains("bricks"),
         "{error}"

@@ -16,8 +16,9 @@ use mesolux::bench::relief_room::{REPEAT, TEXELS, bumps, camera, noise};
 use mesolux::math::directions::Directions;
 use mesolux::meso::{Options, Transport};
 use mesolux::render::{
-    Comparison, Light, Lighting, Picture, ReliefShading, SAMPLES, Show, View, render,
+    Comparison, Light, Lighting, Picture, ReliefShading, Renderer, SAMPLES, Show, View, render,
 };
+use mesolux::scene::sky::{Dome, Sky};
 use mesolux::scene::{Camera, Scene};
 use mesolux::solver::Settings;
 
@@ -156,6 +157,71 @@ const MOST_CRACKS: f32 = 0.0;
 
 /// From the front nothing is seen through a relief, from behind nothing of it. Lamps are beyond.
 /// Straight above and below, rays pass along diagonals and sides of the prisms.
+/// A picture of 64 samples a pixel is one of 16 with pixels half as wide, four to a pixel; with
+/// relief, a lamp's edge, and a sky behind them.
+#[test]
+fn more_samples_are_those_of_a_larger_picture() {
+    let mut build = Build::new();
+    let floor = build.material(0.7, 0.0);
+    let lamp = build.material(0.2, 30.0);
+    build.relief(floor, TEXELS / 2, |x, y| REPEAT * 0.15 * noise(x, y));
+    let cells = build.quad(DVec3::ZERO, DVec3::Z, DVec3::X, (3, 3), floor);
+    build.cover(cells, floor, (DVec3::Z, DVec3::X));
+    build.quad(
+        DVec3::new(0.3, 0.2, 0.2),
+        0.3 * DVec3::Z,
+        0.3 * DVec3::Y,
+        (1, 1),
+        lamp,
+    );
+    let mut scene = build.0.scene;
+    scene.lights.sky = Some(Sky {
+        up: DVec3::Y,
+        north: DVec3::Z,
+        scale: [0.2, 0.3, 0.5],
+        dome: Dome::TraditionalOvercast,
+    });
+    let solution = baked(&scene, &quick());
+    let camera = Camera {
+        name: "beside".into(),
+        position: DVec3::new(1.6, 0.5, 0.45),
+        look_at: DVec3::new(0.4, 0.15, 0.5),
+        up: DVec3::Y,
+        fov_y: 45.0,
+    };
+    let device = device();
+    let draw = |side, samples| {
+        let view = View {
+            camera: &camera,
+            width: side,
+            height: side,
+        };
+        let lighting = Lighting::from(&solution);
+        let renderer = Renderer::new(&device, &scene, lighting, &view, samples);
+        renderer.expect("a view").picture().expect("a picture")
+    };
+    let [fine, large] = [draw(SIDE, 2 * SAMPLES), draw(2 * SIDE, SAMPLES)];
+    let at = |x: u32, y: u32| large.radiance[(y * 2 * SIDE + x) as usize];
+    let (mut most, mut contrasts) = (0.0_f32, 0);
+    for (place, pixel) in (0..).zip(&fine.radiance) {
+        let (x, y) = (2 * (place % SIDE), 2 * (place / SIDE));
+        let four = [at(x, y), at(x + 1, y), at(x, y + 1), at(x + 1, y + 1)];
+        for c in 0..3 {
+            let mean = four.iter().map(|p| p[c]).sum::<f32>() / 4.0;
+            most = most.max((pixel[c] - mean).abs() / (mean + 0.01));
+            let [low, high] =
+                [f32::min, f32::max].map(|of| four.map(|p| p[c]).into_iter().fold(mean, of));
+            contrasts += u32::from(low < 0.5 * high);
+        }
+    }
+    println!("{most:e} apart at most, {contrasts} channels of pixels with edges");
+    assert!(most < 1e-5, "{most}");
+    assert!(contrasts > 300, "{contrasts}");
+    let top = &fine.radiance[..SIDE as usize];
+    assert!(top.iter().all(|p| p[2] > 0.0), "the sky is above");
+    assert_silent();
+}
+
 #[test]
 fn prisms_have_no_cracks() {
     let mut failures = Vec::new();
