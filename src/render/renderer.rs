@@ -216,7 +216,7 @@ impl<'a> Renderer<'a> {
         let (width, height) = self.view.size;
         let samples = self.fixed.samples;
         assert!(
-            samples % SAMPLES == 0 && samples <= MOST_SAMPLES,
+            samples.is_multiple_of(SAMPLES) && samples <= MOST_SAMPLES,
             "a multiple of {SAMPLES}"
         );
         let side = TILE / samples;

@@ -161,20 +161,18 @@ impl<'a> Fine<'a> {
             vertices: scene.vertices.clone(),
             triangles: Vec::new(),
         };
-        // In the order of the input, so that vertices have the same numbers in every run.
-        let (crossings, order) = fine.crossings()?;
-        for edge in order {
-            let knots = fine.knots_of(edge, &crossings[&edge], flat_edges.contains(&edge));
-            fine.knots.insert(edge, knots);
+        for of in fine.crossings()? {
+            let knots = fine.knots_of(&of, flat_edges.contains(&of.edge));
+            fine.knots.insert(of.edge, knots);
         }
         Ok(fine)
     }
 
-    /// Where the edges of triangles with relief cross the lines between cells, and the edges in the
-    /// order of the input.
-    fn crossings(&self) -> Result<(HashMap<[u32; 2], Crossings>, Vec<[u32; 2]>)> {
-        let mut crossings: HashMap<[u32; 2], Crossings> = HashMap::new();
-        let mut order = Vec::new();
+    /// Where the edges of triangles with relief cross the lines between cells; in the order of the
+    /// input, so that vertices have the same numbers in every run.
+    fn crossings(&self) -> Result<Vec<Crossings>> {
+        let mut places = HashMap::new();
+        let mut crossings: Vec<Crossings> = Vec::new();
         let mut count = 0.0;
         for triangle in &self.scene.triangles {
             let Some(relief) = &self.reliefs[triangle.material as usize] else {
@@ -187,10 +185,14 @@ impl<'a> Fine<'a> {
                 let along = to - from;
                 count += along.abs().element_sum();
                 check_count(count)?;
-                let edge = crossings.entry(sorted(a, b)).or_insert_with(|| {
-                    order.push(sorted(a, b));
-                    Crossings::default()
+                let place = *places.entry(sorted(a, b)).or_insert_with(|| {
+                    crossings.push(Crossings {
+                        edge: sorted(a, b),
+                        ..Crossings::default()
+                    });
+                    crossings.len() - 1
                 });
+                let edge = &mut crossings[place];
                 edge.length = edge.length.max(along.length());
                 for axis in 0..2 {
                     let [low, high] = [from[axis].min(to[axis]), from[axis].max(to[axis])];
@@ -201,11 +203,12 @@ impl<'a> Fine<'a> {
                 }
             }
         }
-        Ok((crossings, order))
+        Ok(crossings)
     }
 
     /// Makes a vertex for the crossings of an edge that are not too near to one another.
-    fn knots_of(&mut self, [a, b]: [u32; 2], of: &Crossings, fixed: bool) -> Vec<Knot> {
+    fn knots_of(&mut self, of: &Crossings, fixed: bool) -> Vec<Knot> {
+        let [a, b] = of.edge;
         let near = ON_LINE / 2.0 / of.length;
         let mut shares = of.shares.clone();
         shares.sort_by(f64::total_cmp);
@@ -339,11 +342,14 @@ impl<'a> Fine<'a> {
     }
 }
 
-/// Where an edge crosses the lines between cells, as shares of the way from its lower vertex to its
-/// higher, and its length in cells, the greatest of its triangles.
+/// Where an edge crosses the lines between cells.
 #[derive(Default)]
 struct Crossings {
+    /// The lower vertex first.
+    edge: [u32; 2],
+    /// Of the way from its lower vertex to its higher.
     shares: Vec<f64>,
+    /// In cells, the greatest of its triangles.
     length: f64,
 }
 
