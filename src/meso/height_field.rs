@@ -4,9 +4,10 @@ use glam::{DVec2, DVec3};
 
 use crate::scene::{HeightMap, Material};
 
-/// Most points along a side of the grid; a larger map is averaged down. 128² points are 32,768
-/// facets.
-pub const MOST_POINTS: u32 = 128;
+/// Most points of the grid: 65,536 facets. A larger map is averaged down.
+const MOST_POINTS: u32 = 1 << 15;
+/// Most along a side of it.
+const MOST_ALONG: u32 = 256;
 
 /// Heights at the points of a periodic grid and the facets between them, mean height 0. Lengths are
 /// in widths of a cell: the effect of a relief on light does not depend on its scale.
@@ -41,7 +42,7 @@ impl HeightField {
             .map_height
             .as_deref()
             .filter(|_| material.has_relief())?;
-        let (columns, rows) = (map.width.min(MOST_POINTS), map.height.min(MOST_POINTS));
+        let [columns, rows] = points([map.width, map.height], tile);
         let mean = map.mean();
         let cell = tile / DVec2::new(f64::from(columns), f64::from(rows));
         let scale = f64::from(material.height_scale) / cell.x;
@@ -134,6 +135,20 @@ impl HeightField {
     }
 }
 
+/// Points along the sides of the grid of a map of so many texels on a tile of that size: one for
+/// each texel, or for as few as make them fit, averaged first where they lie closer together.
+fn points(texels: [u32; 2], tile: DVec2) -> [u32; 2] {
+    let mut each = texels.map(|side| side.div_ceil(MOST_ALONG));
+    loop {
+        let points = [0, 1].map(|axis| texels[axis] / each[axis]);
+        if points[0] * points[1] <= MOST_POINTS {
+            return points;
+        }
+        let width = |axis: usize| tile[axis] / f64::from(points[axis]);
+        each[usize::from(width(1) < width(0))] += 1;
+    }
+}
+
 /// Mean of the texels of point (i, j), rows counted from the bottom.
 fn average(map: &HeightMap, columns: u32, rows: u32, i: u32, j: u32) -> f64 {
     let range = |at: u32, points: u32, size: u32| {
@@ -149,4 +164,30 @@ fn average(map: &HeightMap, columns: u32, rows: u32, i: u32, j: u32) -> f64 {
         }
     }
     sum / f64::from(count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A map that fits has a point for each texel; of another, as many are averaged along both
+    /// sides of its cells as keep these square.
+    #[test]
+    fn large_maps_are_averaged_down() {
+        let square = DVec2::ONE;
+        for (texels, tile, expected) in [
+            ([64, 64], square, [64, 64]),
+            ([256, 128], DVec2::new(2.0, 1.0), [256, 128]),
+            ([256, 128], square, [256, 128]),
+            ([512, 8], square, [256, 8]),
+            ([256, 256], square, [128, 256]),
+            ([256, 256], DVec2::new(2.0, 1.0), [256, 128]),
+            ([300, 200], DVec2::new(3.0, 2.0), [150, 200]),
+            ([512, 512], square, [170, 170]),
+            ([4096, 4096], square, [178, 178]),
+            ([16384, 1], square, [256, 1]),
+        ] {
+            assert_eq!(points(texels, tile), expected, "{texels:?} on {tile}");
+        }
+    }
 }
