@@ -155,8 +155,6 @@ fn shadings_differ_and_pictures_are_repeated() {
 /// Samples, of 147 456, that may be seen through between prisms.
 const MOST_CRACKS: f32 = 0.0;
 
-/// From the front nothing is seen through a relief, from behind nothing of it. Lamps are beyond.
-/// Straight above and below, rays pass along diagonals and sides of the prisms.
 /// A picture of 64 samples a pixel is one of 16 with pixels half as wide, four to a pixel; with
 /// relief, a lamp's edge, and a sky behind them.
 #[test]
@@ -222,6 +220,8 @@ fn more_samples_are_those_of_a_larger_picture() {
     assert_silent();
 }
 
+/// From the front nothing is seen through a relief, from behind nothing of it. Lamps are beyond.
+/// Straight above and below, rays pass along diagonals and sides of the prisms.
 #[test]
 fn prisms_have_no_cracks() {
     let mut failures = Vec::new();

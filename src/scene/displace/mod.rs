@@ -162,8 +162,9 @@ impl<'a> Fine<'a> {
             triangles: Vec::new(),
         };
         for of in fine.crossings()? {
-            let knots = fine.knots_of(&of, flat_edges.contains(&of.edge));
-            fine.knots.insert(of.edge, knots);
+            let edge = of.edge;
+            let knots = fine.knots_of(of, flat_edges.contains(&edge));
+            fine.knots.insert(edge, knots);
         }
         Ok(fine)
     }
@@ -207,10 +208,10 @@ impl<'a> Fine<'a> {
     }
 
     /// Makes a vertex for the crossings of an edge that are not too near to one another.
-    fn knots_of(&mut self, of: &Crossings, fixed: bool) -> Vec<Knot> {
+    fn knots_of(&mut self, of: Crossings, fixed: bool) -> Vec<Knot> {
         let [a, b] = of.edge;
         let near = ON_LINE / 2.0 / of.length;
-        let mut shares = of.shares.clone();
+        let mut shares = of.shares;
         shares.sort_by(f64::total_cmp);
         let mut last = 0.0;
         shares.retain(|&share| {
