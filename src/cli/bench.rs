@@ -38,8 +38,8 @@ enum What {
     /// Irradiance of bakes of one scene, on what has no relief, against path traced irradiance with
     /// the relief as geometry
     Irradiance(IrradianceOptions),
-    /// Pictures of relief against path traced geometry: relMSE, bias and HDR-FLIP by scene, view and
-    /// part of the light
+    /// Pictures of relief against path traced geometry: relMSE, bias and HDR-FLIP by scene, view
+    /// and part of the light
     Pictures(super::bench_pictures::Options),
     /// What precompute costs on each device of this machine, as a page with charts, as JSON and as
     /// Markdown: stages, rates, error against time, relighting, Table 1, frames
