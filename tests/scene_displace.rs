@@ -109,8 +109,8 @@ fn edges(triangles: impl Iterator<Item = Triangle>) -> HashMap<[u32; 2], usize> 
 
 #[test]
 fn a_wave_on_a_plane_has_exact_heights_at_the_vertices() {
-    // Nine rows of nine cells, the outer ones cut by the border. The nine along the diagonal are cut
-    // in two by it; of each of the others there are four triangles.
+    // Nine rows of nine cells, the outer ones cut by the border. The nine along the diagonal are
+    // cut in two by it; of each of the others there are four triangles.
     for (scale, beside) in [(0.3_f32, false), (-0.125, false)] {
         let heights = waves(8);
         let flat = sheet(relief(heights.clone(), scale), beside);

@@ -19,8 +19,8 @@ use crate::atomic_file::write_atomically;
 use crate::error::{Error, Result};
 use crate::input_file;
 
-/// Samples of a pixel along each side that a picture is made of by default, and that one keeps where
-/// they differ, each the mean of more where more are drawn.
+/// Samples of a pixel along each side that a picture is made of by default, and that one keeps
+/// where they differ, each the mean of more where more are drawn.
 pub const SAMPLES: u32 = 4;
 
 /// The samples of one pixel, W·m⁻²·sr⁻¹, RGB.
