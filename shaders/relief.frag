@@ -4,9 +4,11 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
+#extension GL_KHR_shader_subgroup_ballot : require
 #include "shared/types.glsl"
 #include "shared/texels.glsl"
 #include "shared/directions.glsl"
+#include "shared/any_lane.glsl"
 
 layout(location = 0) out vec4 radiance;
 
@@ -233,20 +235,35 @@ Route route_of(Prism p, ReliefSurface surface, HeightTile tile, Place place, Bas
     return route;
 }
 
-// Whether the relief itself stands on a way.
-bool meets_relief(HeightTile tile, Route route) {
-    // One loop over all parts of the way: a software device works through each march that is
+// On which of the ways that are asked for the relief itself stands, a bit each.
+uint meeting_relief(HeightTile tile, Route routes[WAYS], uint asked) {
+    // One loop over all parts of all ways: a software device works through each march that is
     // written.
-    vec3 last = route.from;
-    vec3 next = route.edge;
-    HeightHit hit;
-    bool met = false;
-    for (float i = 0.0; !met && i <= route.chords; i++) {
-        met = march(tile, last, next, hit);
-        last = next;
-        float x = route.run * (i + 1.0) / route.chords;
-        next = route.edge + vec3(route.rates * x, x * (route.slope + 0.5 * route.bend * x));
-    }
+    uint left = asked;
+    uint met = 0;
+    float part = 0.0;
+    do {
+        uint own = left & (~left + 1);
+        Route route = routes[0];
+        for (uint i = 1; i < WAYS; i++) {
+            if (own == 1u << i) {
+                route = routes[i];
+            }
+        }
+        // Its chords follow what lies over its own triangle.
+        vec2 x = route.run * vec2(part - 1.0, part) / route.chords;
+        vec2 height = x * (route.slope + 0.5 * route.bend * x);
+        vec3 begin = route.edge + vec3(route.rates * x.x, height.x);
+        vec3 end = route.edge + vec3(route.rates * x.y, height.y);
+        HeightHit hit;
+        begin = part == 0.0 ? route.from : begin;
+        end = part == 0.0 ? route.edge : end;
+        bool meets = left != 0 && march(tile, begin, end, hit);
+        met |= meets ? own : 0;
+        bool done = meets || part >= route.chords;
+        left = done ? left & ~own : left;
+        part = done ? 0.0 : part + 1.0;
+    } while (any_lane(left != 0));
     return met;
 }
 
@@ -254,7 +271,7 @@ bool meets_relief(HeightTile tile, Route route) {
 // shadowed by the relief and by the rest of the scene.
 vec3 sharp(Prism p, ReliefSurface surface, HeightTile tile, Place place) {
     vec3 at = place.at;
-    uint samples = p.state == PART_HIDDEN ? 0 : light_samples();
+    uint samples = light_samples();
     if (samples == 0) {
         return vec3(0.0);
     }
@@ -263,24 +280,30 @@ vec3 sharp(Prism p, ReliefSurface surface, HeightTile tile, Place place) {
     vec3 seen = vec3(0.0);      // of the points of emitters
     vec3 of_all = vec3(0.0);
     vec3 points = vec3(0.0);    // of point lights
-    for (uint first = 0; first < samples; first += WAYS) {
+    uint first = 0;
+    do {
         Ways ways;
         vec3 whole[WAYS];
+        Route routes[WAYS];
+        uint unsure = 0;
         for (uint i = 0; i < WAYS; i++) {
             LightPoint light = light_of_sample(min(first + i, samples - 1));
             vec3 way = light.position - at;
             float square = dot(way, way);
             vec3 towards = way * inversesqrt(square);
             float arrives = arriving(light, towards, dot(facet, towards), square);
-            bool shines = first + i < samples && arrives > 0.0;
+            bool shines = p.state != PART_HIDDEN && first + i < samples && arrives > 0.0;
             Route route = route_of(p, surface, tile, place, base, towards);
+            routes[i] = route;
             whole[i] = shines ? light.strength * arrives : vec3(0.0);
             ways.to[i] = end_of_way(light);
             ways.clear[i] = route.leaves * inversesqrt(square);
             ways.open[i] = shines && !route.hidden;
-            if (ways.open[i] && !route.clear) {
-                ways.open[i] = !meets_relief(tile, route);
-            }
+            unsure |= ways.open[i] && !route.clear ? 1u << i : 0;
+        }
+        uint met = meeting_relief(tile, routes, unsure);
+        for (uint i = 0; i < WAYS; i++) {
+            ways.open[i] = ways.open[i] && (met >> i & 1) == 0;
         }
         if (p.state != PART_OPEN) {
             follow(at, ways);
@@ -292,7 +315,8 @@ vec3 sharp(Prism p, ReliefSurface surface, HeightTile tile, Place place) {
             seen += of_emitter ? arrived : vec3(0.0);
             points += of_emitter ? vec3(0.0) : arrived;
         }
-    }
+        first += WAYS;
+    } while (first < samples);
     if (polygon_count > 0 && seen != vec3(0.0)) {
         seen = shadowed(unshadowed(at, facet), seen, of_all);
     }
@@ -314,19 +338,22 @@ vec3 factored(Prism p, ReliefSurface surface, Place place) {
     uint of_a = p.light_a * MOST_RANK * 2;
     uint of_b = p.light_b * MOST_RANK * 2;
     uint of_c = p.light_c * MOST_RANK * 2;
-    for (uint r = 0; r < surface.rank; r++) {
+    uint r = 0;
+    do {
         vec3 inside = place.share.x * fetch(coefficients, of_a + 2 * r).rgb
                     + place.share.y * fetch(coefficients, of_b + 2 * r).rgb
                     + place.share.z * fetch(coefficients, of_c + 2 * r).rgb;
         vec3 arriving = place.share.x * fetch(coefficients, of_a + 2 * r + 1).rgb
                       + place.share.y * fetch(coefficients, of_b + 2 * r + 1).rgb
                       + place.share.z * fetch(coefficients, of_c + 2 * r + 1).rgb;
-        vec4 factor = weight.x * fetch(factors, row + r)
-                    + weight.y * fetch(factors, row + surface.rank + r)
-                    + weight.z * fetch(factors, row + 2 * surface.rank + r)
-                    + weight.w * fetch(factors, row + 3 * surface.rank + r);
-        sum += factor.rgb * inside + factor.w * arriving;
-    }
+        uint own = row + min(r, surface.rank - 1);
+        vec4 factor = weight.x * fetch(factors, own)
+                    + weight.y * fetch(factors, own + surface.rank)
+                    + weight.z * fetch(factors, own + 2 * surface.rank)
+                    + weight.w * fetch(factors, own + 3 * surface.rank);
+        sum += r < surface.rank ? factor.rgb * inside + factor.w * arriving : vec3(0.0);
+        r++;
+    } while (any_lane(r < surface.rank));
     return max(sum, vec3(0.0));
 }
 

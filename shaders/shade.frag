@@ -3,8 +3,10 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
+#extension GL_KHR_shader_subgroup_ballot : require
 #include "shared/types.glsl"
 #include "shared/texels.glsl"
+#include "shared/any_lane.glsl"
 
 layout(location = 0) in vec3 corner_irradiance;
 layout(location = 1) in vec2 corner_uv;
@@ -113,14 +115,18 @@ vec3 straight() {
     vec3 points = vec3(0.0);    // of point lights
     uint emitters = emitter_samples();
     uint samples = light_samples();
+    if (samples == 0) {
+        return state == PART_HIDDEN ? vec3(0.0) : exact;
+    }
     // Points of emitters are asked only where they may be hidden in part, and none where all are.
     bool by_points = polygon_count == 0 || state == PART_UNSURE && !dark;
     uint end = state == PART_HIDDEN ? 0 : samples;
-    for (uint first = by_points ? 0 : emitters; first < end; first += WAYS) {
+    uint first = by_points ? 0 : emitters;
+    do {
         Ways ways;
         vec3 whole[WAYS];
         for (uint i = 0; i < WAYS; i++) {
-            LightPoint light = light_of_sample(min(first + i, end - 1));
+            LightPoint light = light_of_sample(min(first + i, samples - 1));
             vec3 way = light.position - at;
             float square = dot(way, way);
             vec3 towards = way * inversesqrt(square);
@@ -140,7 +146,8 @@ vec3 straight() {
             seen += of_emitter ? arrived : vec3(0.0);
             points += of_emitter ? vec3(0.0) : arrived;
         }
-    }
+        first += WAYS;
+    } while (any_lane(first < end));
     if (polygon_count > 0) {
         float lit = state == PART_HIDDEN ? 0.0 : 1.0;
         seen = state == PART_OPEN || dark ? exact : lit * shadowed(exact, seen, of_all);

@@ -96,6 +96,8 @@ shared! {
     LIGHT_SETS = 16;
     /// One more than the most triangles of a leaf in the tree of shadow casters.
     LEAF_TRIANGLES = 16;
+    /// Mark of a node of that tree in which all triangles have a relief.
+    RELIEF_NODE = 0x8000_0000;
     /// Sectors of directions in which the horizon of a relief is known, and the bound that says
     /// nothing.
     HORIZON_SECTORS = 16;

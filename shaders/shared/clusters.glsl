@@ -1,7 +1,8 @@
 // The paper's way of lighting relief: the light on a face comes as a few parallel lights,
 // src/mesh/clusters.rs, and a march over the height map finds which of them a place sees. Including
 // files have Prism, ReliefSurface, Place, facet_normal, LIFT, shared/texels.glsl,
-// shared/height_march.glsl, shared/horizons.glsl and a `usamplerBuffer parallel_lights`.
+// shared/height_march.glsl, shared/horizons.glsl, shared/any_lane.glsl and a `usamplerBuffer
+// parallel_lights`.
 
 // Texels of struct ParallelLight.
 const uint PARALLEL_TEXELS = 3;
@@ -17,7 +18,7 @@ vec3 clustered(Prism p, ReliefSurface surface, HeightTile tile, Place place) {
     vec3 from = vec3(place.uv, place.height + LIFT * (surface.top - surface.lowest));
     uint i = p.first_cluster;
     uint end = i + p.cluster_count;
-    while (i < end) {
+    do {
         // On to the next light that the relief may hide, in a loop of its own: a software device
         // marches wherever any lane does.
         vec3 arriving = vec3(0.0);
@@ -42,6 +43,6 @@ vec3 clustered(Prism p, ReliefSurface surface, HeightTile tile, Place place) {
             HeightHit hit;
             sum += march(tile, from, to, hit) ? vec3(0.0) : arriving;
         }
-    }
+    } while (any_lane(i < end));
     return max(sum, vec3(0.0));
 }

@@ -1,5 +1,6 @@
 // Where the ray through a sample meets the relief of the prism that is drawn. Included after
-// shared/height_march.glsl and shared/prisms.glsl; SHADING is one of SHADING_….
+// shared/height_march.glsl, shared/prisms.glsl and shared/any_lane.glsl; SHADING is one of
+// SHADING_….
 
 layout(location = 0) in vec3 corner_position;
 layout(location = 1) flat in uint corner_prism;
@@ -60,9 +61,6 @@ struct Met {
 
 // Where the ray first meets the relief (or, for `plane`, the mean height) within a part of it.
 bool meet_part(Part part, ReliefSurface surface, HeightTile tile, bool plane, out Met met) {
-    if (part.leave <= part.enter) {
-        return false;
-    }
     vec3 from = part.from;
     vec3 to = part.to;
     float t;
@@ -105,19 +103,22 @@ uint meet(Prism p, ReliefSurface surface, HeightTile tile, bool plane, out Met m
     float others = min(low.leave > low.enter ? low.enter : NEVER,
                        high.leave > high.enter ? high.enter : NEVER);
     bool in_middle_first = middle.leave > middle.enter && middle.enter < others;
+    uint nearer = from_high ? 2 : 0;
+    uint first = in_middle_first ? 1 : nearer;
+    uint second = in_middle_first ? nearer : 1;
+    uint left = (low.leave > low.enter ? 1 : 0) | (middle.leave > middle.enter ? 2 : 0)
+                | (high.leave > high.enter ? 4 : 0);
     uint found = 3;
-    for (uint round = 0; round < 3 && found == 3; round++) {
-        uint which;
-        if (in_middle_first) {
-            which = round == 0 ? 1 : (round == 1) == from_high ? 2 : 0;
-        } else {
-            which = round == 1 ? 1 : (round == 0) == from_high ? 2 : 0;
-        }
+    do {
+        uint which = (left >> first & 1) != 0 ? first : (left >> second & 1) != 0 ? second : 2 - nearer;
         Part part = which == 0 ? low : which == 1 ? middle : high;
-        if (meet_part(part, surface, tile, plane, met)) {
+        Met here;
+        if (left != 0 && meet_part(part, surface, tile, plane, here)) {
             found = which;
+            met = here;
         }
-    }
+        left = found == 3 ? left & ~(1u << which) : 0;
+    } while (any_lane(left != 0));
     return found;
 }
 

@@ -87,17 +87,19 @@ void follow(vec3 from, inout Ways ways) {
             vec3 low_from = uintBitsToFloat(low.xyz) - from;
             vec3 high_from = uintBitsToFloat(high.xyz) - from;
             bool entered = false;
+            // Of triangles with a relief alone, nothing is met before the ways are clear of theirs.
+            bool relief = high.w >= RELIEF_NODE;
             for (uint i = 0; i < WAYS; i++) {
                 vec3 one = low_from * each[i];
                 vec3 other = high_from * each[i];
                 vec3 in_at = min(one, other);
                 vec3 out_at = max(one, other);
-                float enter = max(max(in_at.x, in_at.y), max(in_at.z, 0.0));
+                float enter = max(max(in_at.x, in_at.y), max(in_at.z, relief ? ways.clear[i] : 0.0));
                 float leave = min(min(out_at.x, out_at.y), min(out_at.z, 1.0));
                 enters[i] = ways.open[i] && enter <= leave;
                 entered = entered || enters[i];
             }
-            leaf = entered ? high.w : 0;
+            leaf = entered ? high.w & ~RELIEF_NODE : 0;
             at = entered ? at + 1 : low.w;
         }
         uint first = leaf / LEAF_TRIANGLES;

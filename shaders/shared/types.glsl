@@ -269,6 +269,7 @@ struct ReliefSurface {
 };
 
 // A box of the tree of what casts shadows, in depth-first order: the first within it follows it.
+// `leaf` has RELIEF_NODE where all triangles within it have a relief.
 struct ShadowNode {
     vec3 low;           // from the eye, internal units
     uint skip;          // the node that follows all that is in this one

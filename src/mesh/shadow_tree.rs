@@ -8,7 +8,7 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::{Boundable, BvhBuildParams};
 
-use crate::constants::LEAF_TRIANGLES;
+use crate::constants::{LEAF_TRIANGLES, RELIEF_NODE};
 use crate::structs::{ShadowNode, ShadowOccluder, ShadowTriangle};
 
 /// Boxes are wider than their triangles by this share of the greatest coordinate, 2⁻²⁰: the walk's
@@ -18,11 +18,18 @@ const BOX_MARGIN: f32 = 1.0 / (1 << 20) as f32;
 /// A triangle that casts a shadow.
 pub trait Casts: Copy {
     fn corners(&self) -> [Vec3; 3];
+
+    /// Whether ways pass over it as far as the relief goes that they begin on.
+    fn has_relief(&self) -> bool;
 }
 
 impl Casts for ShadowTriangle {
     fn corners(&self) -> [Vec3; 3] {
         [self.a, self.b, self.c]
+    }
+
+    fn has_relief(&self) -> bool {
+        self.relief == 1
     }
 }
 
@@ -30,13 +37,18 @@ impl Casts for ShadowOccluder {
     fn corners(&self) -> [Vec3; 3] {
         [self.a, self.b, self.c]
     }
+
+    fn has_relief(&self) -> bool {
+        false
+    }
 }
 
 impl ShadowNode {
     /// Of a leaf.
     pub fn triangles(&self) -> std::ops::Range<usize> {
-        let first = self.leaf / LEAF_TRIANGLES;
-        first as usize..(first + self.leaf % LEAF_TRIANGLES) as usize
+        let leaf = self.leaf & !RELIEF_NODE;
+        let first = leaf / LEAF_TRIANGLES;
+        first as usize..(first + leaf % LEAF_TRIANGLES) as usize
     }
 }
 
@@ -96,7 +108,25 @@ impl<T: Casts> ShadowTree<T> {
             .collect();
         let params = BvhBuildParams::medium_build();
         let bvh = build_bvh2(&bounds, params, &mut Duration::default());
-        Self::flat(&bvh, &triangles)
+        let mut tree = Self::flat(&bvh, &triangles);
+        tree.mark_relief();
+        tree
+    }
+
+    /// Marks the nodes in which all triangles have a relief.
+    fn mark_relief(&mut self) {
+        for at in (0..self.nodes.len()).rev() {
+            let own = self.nodes[at].triangles();
+            let mut all = self.triangles[own].iter().all(Casts::has_relief);
+            let mut child = at + 1;
+            while child < self.nodes[at].skip as usize {
+                all &= self.nodes[child].leaf & RELIEF_NODE != 0;
+                child = self.nodes[child].skip as usize;
+            }
+            if all {
+                self.nodes[at].leaf |= RELIEF_NODE;
+            }
+        }
     }
 
     /// Of lists as those of another.
@@ -155,5 +185,37 @@ impl<T: Casts> ShadowTree<T> {
             }
         }
         tree
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bytemuck::Zeroable;
+
+    use super::*;
+
+    #[test]
+    fn nodes_of_reliefs_alone_are_marked() {
+        let triangles = (0..300).map(|i| {
+            let at = Vec3::new((i % 20) as f32, (i / 20) as f32, 0.0);
+            ShadowTriangle {
+                a: at,
+                b: at + Vec3::X,
+                c: at + Vec3::Y,
+                relief: (i % 20 < 12 && i != 44).into(),
+                ..ShadowTriangle::zeroed()
+            }
+        });
+        let tree = ShadowTree::new(triangles.collect());
+        let mut marked = 0;
+        for (at, node) in tree.nodes().iter().enumerate() {
+            let within = tree.nodes()[at..node.skip as usize].iter();
+            let all = within
+                .flat_map(|n| &tree.triangles[n.triangles()])
+                .all(|t| t.relief == 1);
+            assert_eq!(node.leaf & RELIEF_NODE != 0, all, "{at}: {node:?}");
+            marked += usize::from(all);
+        }
+        assert!(marked > 25 && marked < tree.nodes().len() - 25, "{marked}");
     }
 }

@@ -300,8 +300,8 @@ impl Instance {
             (f13.subgroup_size_control != 0, "subgroupSizeControl"),
             (f13.compute_full_subgroups != 0, "computeFullSubgroups"),
             (
-                votes_in_compute(&subgroup),
-                "subgroup vote and ballot in compute",
+                has_votes(&subgroup),
+                "subgroup vote and ballot in compute and fragment shaders",
             ),
         ];
         let missing = needed.into_iter().filter(|(has, _)| !has);
@@ -338,13 +338,13 @@ impl Support {
     }
 }
 
-fn votes_in_compute(subgroup: &vk::PhysicalDeviceSubgroupProperties<'_>) -> bool {
+fn has_votes(subgroup: &vk::PhysicalDeviceSubgroupProperties<'_>) -> bool {
     use vk::SubgroupFeatureFlags as F;
-    let compute = vk::ShaderStageFlags::COMPUTE;
+    let stages = vk::ShaderStageFlags::COMPUTE | vk::ShaderStageFlags::FRAGMENT;
     subgroup
         .supported_operations
         .contains(F::BASIC | F::VOTE | F::BALLOT)
-        && subgroup.supported_stages.contains(compute)
+        && subgroup.supported_stages.contains(stages)
 }
 
 /// A string of Vulkan; empty where it is malformed.
