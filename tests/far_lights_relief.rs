@@ -254,7 +254,8 @@ fn the_sun_on_relief_is_drawn_as_on_its_geometry() {
             };
             let drawn = render(&device(), &scene, lighting, &view(SIDE * FINER));
             let picture = averaged(&drawn.expect("a picture"));
-            let reference = Reference::new(&tracer, &view(SIDE), part, paths).expect("a picture");
+            let reference =
+                Reference::new(&tracer, &view(SIDE), part, paths, |_| true).expect("a picture");
             let noise = reference.noise();
             let reference = reference.picture;
             common::show(&format!("sun {elevation} {part:?}"), &picture, &reference);

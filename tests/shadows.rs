@@ -128,7 +128,7 @@ fn compare(
     let picture = render(&device(), scene, lighting, &view(camera)).expect("a picture");
     let fine = displace(scene).unwrap();
     let tracer = PathTracer::new(&fine).expect("the scene is good");
-    let reference = Reference::new(&tracer, &view(camera), Light::Direct, PATHS);
+    let reference = Reference::new(&tracer, &view(camera), Light::Direct, PATHS, |_| true);
     let reference = reference.expect("a picture");
     let noise = reference.noise();
     let reference = reference.picture;

@@ -56,15 +56,23 @@ pub struct Reference {
 }
 
 impl Reference {
+    /// `go_on` gets the paths a pixel that are traced now and then; false stops with those.
+    ///
     /// # Errors
     /// As [`PathTracer::render`].
-    pub fn new(tracer: &PathTracer<'_>, view: &View<'_>, light: Light, paths: u32) -> Result<Self> {
+    pub fn new(
+        tracer: &PathTracer<'_>,
+        view: &View<'_>,
+        light: Light,
+        paths: u32,
+        go_on: impl Fn(u32) -> bool,
+    ) -> Result<Self> {
         let settings = Paths {
             paths,
             light,
             ..Paths::default()
         };
-        let film = tracer.render(view, &settings, |_, _| true)?;
+        let film = tracer.render(view, &settings, |progress, _| go_on(progress.paths))?;
         Ok(Self {
             picture: film.picture(),
             variance: film.standard_error().iter().map(|e| e * e).collect(),
@@ -121,7 +129,8 @@ pub fn rooms(material: Option<&str>) -> Result<Vec<Scene>> {
 
 /// Bakes, draws and traces each scene by all of its cameras, prints a row a picture, writes the
 /// pictures beside their reference and difference into `folder` and updates `pictures.csv` and
-/// `pictures.json` there. `go_on` is called before each view; false stops.
+/// `pictures.json` there. `go_on` gets a line on what is under way, often; false stops, and leaves
+/// out what was not finished.
 ///
 /// # Errors
 /// A device that fails; files that cannot be written.
@@ -130,26 +139,54 @@ pub fn run(
     scenes: &[Scene],
     options: &Options<'_>,
     folder: &Path,
-    mut go_on: impl FnMut() -> bool,
+    go_on: impl Fn(String) -> bool,
 ) -> Result<Vec<Row>> {
     std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, e))?;
     crate::say!("{HEADER}");
     let mut rows = Vec::new();
+    let go_on = &go_on;
     for scene in scenes {
-        let solution = bake::bake(device, scene, options.settings, |_| true)?;
+        let solution = bake::bake(device, scene, options.settings, |update| {
+            let unshot = 100.0 * update.unshot_share;
+            go_on(format!("{}: baking, unshot {unshot:.3} %", scene.name))
+        })?;
+        if !go_on(format!("{}: displacing the reference", scene.name)) {
+            return Ok(rows);
+        }
         let fine = displace(scene)?;
         let tracer = PathTracer::new(&fine)?;
         for camera in &scene.cameras {
-            if !go_on() {
-                return Ok(rows);
-            }
+            let tracing = |light| {
+                move |paths| {
+                    let name = format!("{}, {}", scene.name, camera.name);
+                    let of = options.paths;
+                    go_on(format!(
+                        "{name}: tracing {light} light, {paths} of {of} paths"
+                    ))
+                }
+            };
             let view = View {
                 camera,
                 width: options.side,
                 height: options.side,
             };
-            let direct = Reference::new(&tracer, &view, Light::Direct, options.paths)?;
-            let indirect = Reference::new(&tracer, &view, Light::Indirect, options.paths)?;
+            let direct = Reference::new(
+                &tracer,
+                &view,
+                Light::Direct,
+                options.paths,
+                tracing("direct"),
+            )?;
+            let indirect = Reference::new(
+                &tracer,
+                &view,
+                Light::Indirect,
+                options.paths,
+                tracing("indirect"),
+            )?;
+            if !go_on(format!("{}, {}: drawing", scene.name, camera.name)) {
+                return Ok(rows);
+            }
             let global = direct.plus(&indirect);
             for (part, name, reference) in [
                 (Light::Direct, "direct", &direct),

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::progress::{catch_interrupts, interrupted};
+use super::progress::{Bar, catch_interrupts, interrupted};
 use super::render::samples_per_side;
 use super::solve_options::SolveOptions;
 use super::{Builtin, DeviceOptions};
@@ -58,8 +58,11 @@ pub fn run(options: &Options) -> Result<()> {
     };
     let device = options.device.open()?;
     catch_interrupts();
-    pictures::run(&device, &scenes, &wanted, &options.output, || {
+    let bar = Bar::new();
+    pictures::run(&device, &scenes, &wanted, &options.output, |text| {
+        bar.show(text);
         !interrupted()
     })?;
+    bar.finish();
     options.device.check()
 }

@@ -85,7 +85,7 @@ fn bench_writes_rows_and_pictures() {
         settings: &settings,
     };
     let scenes = pictures::rooms(Some("bumps")).expect("it is there");
-    let rows = pictures::run(&device(), &scenes, &options, folder.path(), || true).expect("rows");
+    let rows = pictures::run(&device(), &scenes, &options, folder.path(), |_| true).expect("rows");
     assert_eq!(rows.len(), 9);
     for row in &rows {
         let name = pictures::file_name(row);

@@ -67,7 +67,7 @@ fn pictures_are_those_of_the_displaced_scene() {
         for camera in &scene.cameras {
             let start = Instant::now();
             let trace = |light, paths| {
-                Reference::new(&tracer, &view(camera), light, paths).expect("a picture")
+                Reference::new(&tracer, &view(camera), light, paths, |_| true).expect("a picture")
             };
             let direct = trace(Light::Direct, DIRECT_PATHS);
             let indirect = trace(Light::Indirect, INDIRECT_PATHS);
