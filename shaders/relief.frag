@@ -271,7 +271,7 @@ uint meeting_relief(HeightTile tile, Route routes[WAYS], uint asked) {
 // shadowed by the relief and by the rest of the scene.
 vec3 sharp(Prism p, ReliefSurface surface, HeightTile tile, Place place) {
     vec3 at = place.at;
-    uint samples = light_samples();
+    uint samples = p.state == PART_HIDDEN ? 0 : light_samples();
     if (samples == 0) {
         return vec3(0.0);
     }
@@ -292,7 +292,7 @@ vec3 sharp(Prism p, ReliefSurface surface, HeightTile tile, Place place) {
             float square = dot(way, way);
             vec3 towards = way * inversesqrt(square);
             float arrives = arriving(light, towards, dot(facet, towards), square);
-            bool shines = p.state != PART_HIDDEN && first + i < samples && arrives > 0.0;
+            bool shines = first + i < samples && arrives > 0.0;
             Route route = route_of(p, surface, tile, place, base, towards);
             routes[i] = route;
             whole[i] = shines ? light.strength * arrives : vec3(0.0);

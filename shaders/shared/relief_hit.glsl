@@ -110,7 +110,8 @@ uint meet(Prism p, ReliefSurface surface, HeightTile tile, bool plane, out Met m
                 | (high.leave > high.enter ? 4 : 0);
     uint found = 3;
     do {
-        uint which = (left >> first & 1) != 0 ? first : (left >> second & 1) != 0 ? second : 2 - nearer;
+        uint which = (left >> first & 1) != 0 ? first
+                     : (left >> second & 1) != 0 ? second : 2 - nearer;
         Part part = which == 0 ? low : which == 1 ? middle : high;
         Met here;
         if (left != 0 && meet_part(part, surface, tile, plane, here)) {

@@ -94,7 +94,8 @@ void follow(vec3 from, inout Ways ways) {
                 vec3 other = high_from * each[i];
                 vec3 in_at = min(one, other);
                 vec3 out_at = max(one, other);
-                float enter = max(max(in_at.x, in_at.y), max(in_at.z, relief ? ways.clear[i] : 0.0));
+                float begin = relief ? ways.clear[i] : 0.0;
+                float enter = max(max(in_at.x, in_at.y), max(in_at.z, begin));
                 float leave = min(min(out_at.x, out_at.y), min(out_at.z, 1.0));
                 enters[i] = ways.open[i] && enter <= leave;
                 entered = entered || enters[i];

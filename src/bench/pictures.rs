@@ -156,35 +156,23 @@ pub fn run(
         let fine = displace(scene)?;
         let tracer = PathTracer::new(&fine)?;
         for camera in &scene.cameras {
-            let tracing = |light| {
-                move |paths| {
-                    let name = format!("{}, {}", scene.name, camera.name);
-                    let of = options.paths;
-                    go_on(format!(
-                        "{name}: tracing {light} light, {paths} of {of} paths"
-                    ))
-                }
-            };
             let view = View {
                 camera,
                 width: options.side,
                 height: options.side,
             };
-            let direct = Reference::new(
-                &tracer,
-                &view,
-                Light::Direct,
-                options.paths,
-                tracing("direct"),
-            )?;
-            let indirect = Reference::new(
-                &tracer,
-                &view,
-                Light::Indirect,
-                options.paths,
-                tracing("indirect"),
-            )?;
-            if !go_on(format!("{}, {}: drawing", scene.name, camera.name)) {
+            let name = format!("{}, {}", scene.name, camera.name);
+            let trace = |light, of| {
+                Reference::new(&tracer, &view, light, options.paths, |paths| {
+                    let all = options.paths;
+                    go_on(format!(
+                        "{name}: tracing {of} light, {paths} of {all} paths"
+                    ))
+                })
+            };
+            let direct = trace(Light::Direct, "direct")?;
+            let indirect = trace(Light::Indirect, "indirect")?;
+            if !go_on(format!("{name}: drawing")) {
                 return Ok(rows);
             }
             let global = direct.plus(&indirect);
