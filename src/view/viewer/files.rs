@@ -88,6 +88,11 @@ impl Viewer {
         self.dirty = true;
     }
 
+    /// Whether a dialog is open.
+    pub(super) fn has_dialog(&self) -> bool {
+        self.files.dialog.is_some()
+    }
+
     /// Draws the dialog that is open; returns what was picked.
     pub(super) fn draw_dialog(&mut self, context: &egui::Context) {
         let Some((dialog, purpose)) = &mut self.files.dialog else {

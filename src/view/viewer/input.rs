@@ -114,15 +114,21 @@ impl Viewer {
                 }
             }
             Event::Key { key, pressed } => {
-                self.input.queue(egui::Event::Key {
-                    key,
-                    physical_key: None,
-                    pressed,
-                    repeat: false,
-                    modifiers,
-                });
+                // Where it shows the panel, it does not choose a control, which would take the keys
+                // that follow.
+                if key != Key::Tab || self.panel_takes_keys() {
+                    self.input.queue(egui::Event::Key {
+                        key,
+                        physical_key: None,
+                        pressed,
+                        repeat: false,
+                        modifiers,
+                    });
+                }
                 self.key(key, pressed);
             }
+            // With Ctrl, letters are commands.
+            Event::Text(_) if modifiers.ctrl || modifiers.command => {}
             Event::Text(text) => self.input.queue(egui::Event::Text(text)),
             Event::Modifiers(modifiers) => self.input.modifiers = modifiers,
             Event::Focus(focused) => {
@@ -141,6 +147,11 @@ impl Viewer {
 
     fn is_over_panel(&self) -> bool {
         self.switches.panel && self.egui.wants_pointer_input()
+    }
+
+    /// Whether keys go to a field or to a dialog.
+    fn panel_takes_keys(&self) -> bool {
+        self.egui.wants_keyboard_input() || self.has_dialog()
     }
 
     fn move_pointer(&mut self, (x, y): (f32, f32)) {
@@ -234,7 +245,7 @@ impl Viewer {
 
     fn key(&mut self, key: Key, pressed: bool) {
         self.input.held.retain(|held| *held != key);
-        if !pressed || self.egui.wants_keyboard_input() {
+        if !pressed || self.panel_takes_keys() {
             return;
         }
         if self.input.grabbed.is_some() {
