@@ -1,6 +1,8 @@
 //! Sections of the panel.
 
-use egui::{CollapsingHeader, ComboBox, DragValue, RichText, Slider, Ui};
+use egui::{
+    CollapsingHeader, ComboBox, DragValue, Response, RichText, Slider, Ui, WidgetInfo, WidgetType,
+};
 use glam::DVec3;
 
 use super::{Asked, Changed, Status};
@@ -16,13 +18,33 @@ fn section(ui: &mut Ui, title: &str, open: bool, content: impl FnOnce(&mut Ui)) 
         .show(ui, content);
 }
 
+/// One of several, or what is on or off, which also tells a screen reader whether it is chosen.
+fn choice(ui: &mut Ui, chosen: bool, name: &str) -> Response {
+    let response = ui.selectable_label(chosen, name);
+    let enabled = ui.is_enabled();
+    response
+        .widget_info(|| WidgetInfo::selected(WidgetType::SelectableLabel, enabled, chosen, name));
+    response
+}
+
+/// One of several values.
+fn value<T: PartialEq>(ui: &mut Ui, value: &mut T, this: T, name: &str) -> Response {
+    let mut response = choice(ui, *value == this, name);
+    if response.clicked() && *value != this {
+        *value = this;
+        response.mark_changed();
+    }
+    response
+}
+
 pub fn scenes(ui: &mut Ui, status: &Status<'_>, asked: &mut Vec<Asked>) {
+    let reading = status.opening.map(|name| format!("reading {name}"));
     ComboBox::from_id_salt("scene")
         .width(ui.available_width())
-        .selected_text(status.scene)
+        .selected_text(reading.as_deref().unwrap_or(status.scene))
         .show_ui(ui, |ui| {
             for (i, name) in status.offered.iter().enumerate() {
-                if ui.selectable_label(name == status.scene, name).clicked() {
+                if choice(ui, name == status.scene, name).clicked() {
                     asked.push(Asked::Open(i));
                 }
             }
@@ -52,11 +74,9 @@ pub fn scenes(ui: &mut Ui, status: &Status<'_>, asked: &mut Vec<Asked>) {
             asked.push(Asked::SaveBake);
         }
     });
-    if let Some(opening) = status.opening {
-        ui.label(format!("reading {opening}"));
-    }
 }
 
+/// The controls below stay in their places while a bake goes on: what is not known yet has its line.
 pub fn progress(ui: &mut Ui, status: &Status<'_>, switches: &mut Switches) {
     ui.label(format!("{} triangles", status.triangles));
     ui.label(RichText::new(status.device).small().weak());
@@ -67,34 +87,31 @@ pub fn progress(ui: &mut Ui, status: &Status<'_>, switches: &mut Switches) {
         .detail
         .map_or(String::new(), |s| format!(", detail {s:.1} s"));
     ui.label(format!("frame {frame}{detail}"));
-    if let Some(stage) = status.stage {
-        ui.label(stage.line());
-    }
     let progress = &status.progress.update;
-    if progress.sources == 0 {
-        if !status.baking {
-            ui.label("from a file");
-        }
+    if progress.sources == 0 && !status.baking {
+        ui.label("from a file");
         return;
     }
     let bound = progress
         .error_bound
         .map_or("none".to_owned(), |b| format!("{:.2} %", 100.0 * b));
     let time = progress.elapsed.as_secs_f64();
-    ui.label(match (status.progress.done, progress.left) {
-        (true, _) => format!("baked in {time:.1} s"),
-        (false, Some(left)) => format!(
-            "baking, {time:.0} s, about {:.0} s left",
-            left.as_secs_f64()
-        ),
-        (false, None) => format!("baking, {time:.0} s"),
+    let left = progress.left.map(|left| left.as_secs_f64());
+    ui.label(match (status.stage, status.progress.done, left) {
+        (Some(stage), ..) => stage.line().to_owned(),
+        (None, true, _) => format!("baked in {time:.1} s"),
+        (None, false, Some(left)) => format!("baking, {time:.0} s, about {left:.0} s left"),
+        (None, false, None) => format!("baking, {time:.0} s"),
     });
-    let shot = (1.0 - progress.unshot_share).clamp(0.0, 1.0) as f32;
-    ui.add(egui::ProgressBar::new(shot).text(format!(
-        "{} shots, {:.2} % unshot",
-        progress.shots,
-        100.0 * progress.unshot_share
-    )));
+    let (shots, unshot) = (progress.shots, progress.unshot_share);
+    let (shot, told) = match progress.sources {
+        0 => (0.0, "no shots yet".to_owned()),
+        _ => (
+            (1.0 - unshot).clamp(0.0, 1.0) as f32,
+            format!("{shots} shots, {:.2} % unshot", 100.0 * unshot),
+        ),
+    };
+    ui.add(egui::ProgressBar::new(shot).text(told));
     ui.checkbox(&mut switches.bound, format!("error bound {bound} (B)"))
         .on_hover_text("no element errs by more, over the mean light; draws it over time");
     if switches.bound {
@@ -106,14 +123,13 @@ pub fn light(ui: &mut Ui, switches: &mut Switches, asked: &mut Vec<Asked>) {
     section(ui, "Picture", true, |ui| {
         ui.horizontal(|ui| {
             for ((name, part), key) in PARTS.into_iter().zip(["1", "2", "3"]) {
-                ui.selectable_value(&mut switches.part, part, name)
-                    .on_hover_text(key);
+                value(ui, &mut switches.part, part, name).on_hover_text(key);
             }
         });
         ui.horizontal(|ui| {
             ui.label("direct light");
             for (name, direct) in DIRECTS {
-                ui.selectable_value(&mut switches.direct, direct, name);
+                value(ui, &mut switches.direct, direct, name);
             }
         })
         .response
@@ -163,21 +179,26 @@ fn lamp(ui: &mut Ui, changed: &mut Changed<'_>, i: usize) -> bool {
     let mut edited = false;
     let lamp = &mut changed.lamps[i];
     ui.horizontal(|ui| {
-        ui.radio_value(changed.lamp, i, "").on_hover_text("L");
+        let chosen = ui.radio_value(changed.lamp, i, "").on_hover_text("L");
         let mut colour = lamp.colour;
-        if ui.color_edit_button_rgb(&mut colour).changed() {
+        let well = ui.color_edit_button_rgb(&mut colour);
+        if well.changed() {
             lamp.colour = colour;
             edited = true;
         }
         let mut strength = lamp.strength;
         let speed = (f64::from(strength) * 0.01).max(1e-3);
-        let value = DragValue::new(&mut strength);
-        let value = ui.add(value.range(0.0..=1e9).speed(speed));
-        if value.on_hover_text("+ and -").changed() {
+        let field = DragValue::new(&mut strength);
+        let field = ui.add(field.range(0.0..=1e9).speed(speed));
+        let field = field.on_hover_text("+ and -");
+        if field.changed() {
             lamp.strength = strength;
             edited = true;
         }
-        ui.label(&lamp.name);
+        let name = ui.label(&lamp.name).id;
+        for control in [chosen, well, field] {
+            control.labelled_by(name);
+        }
     });
     if let Some(DVec3 { x, y, z }) = &mut lamp.position {
         ui.horizontal(|ui| {
@@ -205,15 +226,15 @@ pub fn relief(ui: &mut Ui, changed: &mut Changed<'_>, asked: &mut Vec<Asked>) {
         ComboBox::from_label("shading (Z)")
             .selected_text(now)
             .show_ui(ui, |ui| {
-                for (name, value) in SHADINGS {
-                    ui.selectable_value(shading, value, name);
+                for (name, this) in SHADINGS {
+                    value(ui, shading, this, name);
                 }
             });
         ui.horizontal(|ui| {
             ui.label("directions (K)");
             for count in DIRECTIONS {
-                let choice = ui.selectable_value(changed.directions, count, count.to_string());
-                if choice.changed() {
+                let of_count = value(ui, changed.directions, count, &count.to_string());
+                if of_count.changed() {
                     asked.push(Asked::Bake);
                 }
             }
@@ -259,7 +280,7 @@ pub fn view(ui: &mut Ui, status: &Status<'_>, switches: &mut Switches, asked: &m
                 .width(110.0)
                 .show_ui(ui, |ui| {
                     for (i, name) in status.cameras.iter().enumerate() {
-                        if ui.selectable_label(false, name).clicked() {
+                        if choice(ui, false, name).clicked() {
                             asked.push(Asked::Camera(i));
                         }
                     }
@@ -287,7 +308,7 @@ pub fn compare(
         let against = status.against.as_ref().map(|(against, _)| *against);
         ui.horizontal(|ui| {
             let held = against == Some(Against::Held);
-            let hold = ui.selectable_label(held, "this view (V)").on_hover_text(
+            let hold = choice(ui, held, "this view (V)").on_hover_text(
                 "holds the light and the switches as they are now on the left of a line; what is \
                  changed then shows on its right",
             );
@@ -295,7 +316,7 @@ pub fn compare(
                 asked.push(if held { Asked::Part } else { Asked::Hold });
             }
             let traced = against == Some(Against::Traced);
-            let trace = ui.selectable_label(traced, "path tracer").on_hover_text(
+            let trace = choice(ui, traced, "path tracer").on_hover_text(
                 "traces the view on the left of a line, with relief as geometry, for as long as it \
                  stays",
             );
@@ -303,6 +324,10 @@ pub fn compare(
                 asked.push(if traced { Asked::Part } else { Asked::Trace });
             }
         });
+        let paper = ui.checkbox(changed.paper, "bake by the paper's method");
+        if paper.on_hover_text("as `bake --preset paper`").changed() {
+            asked.push(Asked::Bake);
+        }
         if let Some((_, name)) = &status.against {
             ui.label(format!("left: {name}"));
         }
@@ -311,10 +336,6 @@ pub fn compare(
         }
         if status.differences.len() > 1 {
             overlay::bounds(ui, status.differences);
-        }
-        let paper = ui.checkbox(changed.paper, "bake by the paper's method");
-        if paper.on_hover_text("as `bake --preset paper`").changed() {
-            asked.push(Asked::Bake);
         }
     });
 }
