@@ -51,8 +51,8 @@ pub struct Options {
     /// left|middle|right, wheel N, key [Ctrl+][Shift+]NAME [down|up], see front|right|top, resize W
     /// H, minimise, restore W H, set SWITCH VALUE, set lamp NAME colour|strength|position N...,
     /// compare held|traced|off, line X, frames N, wait SECONDS, open SCENE|BAKE, bake, direct,
-    /// relit, detail, compared, overlays, screenshot FILE, save FILE, save-bake FILE, lose-surface,
-    /// close
+    /// relit, detail, compared, overlays, await FILE, list FILE (controls and texts as JSON),
+    /// screenshot FILE, save FILE, save-bake FILE, lose-surface, close
     #[arg(long, value_name = "FILE")]
     script: Option<PathBuf>,
     #[command(flatten)]

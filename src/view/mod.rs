@@ -25,6 +25,7 @@ mod detailer;
 mod event;
 mod history;
 mod lamps;
+mod listing;
 mod notes;
 mod orders;
 mod overlay;

@@ -50,7 +50,10 @@ impl Runner {
     /// Whether frames are wanted without any change.
     pub fn wants_frames(&self) -> bool {
         let first = self.steps.front();
-        matches!(first, Some(Step::Frames(_) | Step::Screenshot(_)))
+        matches!(
+            first,
+            Some(Step::Frames(_) | Step::List(_) | Step::Screenshot(_))
+        )
     }
 
     /// Does all steps that can be done now. `resize` asks the system for a size.
@@ -100,6 +103,13 @@ impl Runner {
                 Step::Set(words) => {
                     set(viewer, words)?;
                     true
+                }
+                Step::Await(path) => path.exists(),
+                Step::List(path) => {
+                    if first {
+                        viewer.list(path.clone());
+                    }
+                    viewer.listing.is_none()
                 }
                 Step::Screenshot(path) => {
                     if first {

@@ -34,6 +34,10 @@ pub enum Step {
     Wait(f64),
     /// Sets a switch, or a property of a light.
     Set(Vec<String>),
+    /// Waits until there is a file of this name.
+    Await(PathBuf),
+    /// Writes what the window shows to a file: controls, texts, the camera.
+    List(PathBuf),
     /// Writes the window's content to a file.
     Screenshot(PathBuf),
     /// Writes the view to a file, drawn as by `render`.
@@ -149,6 +153,8 @@ fn parse(words: &[&str]) -> Option<Vec<Step>> {
         ["set", ref what @ ..] if what.len() > 1 => Some(vec![Step::Set(
             what.iter().map(|w| (*w).to_owned()).collect(),
         )]),
+        ["await", path] => Some(vec![Step::Await(path.into())]),
+        ["list", path] => Some(vec![Step::List(path.into())]),
         ["screenshot", path] => Some(vec![Step::Screenshot(path.into())]),
         ["save", path] => Some(vec![Step::Save(path.into())]),
         ["save-bake", path] => Some(vec![Step::SaveBake(path.into())]),

@@ -1,5 +1,6 @@
 //! Overlays of the view: the panel, marks of lights, light by direction, an item buffer.
 
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use egui::TextureHandle;
@@ -9,6 +10,7 @@ use super::input::Input;
 use crate::error::Result;
 use crate::render::Show;
 use crate::view::compare::Left;
+use crate::view::listing;
 use crate::view::overlay;
 use crate::view::panel::{self, Asked, Changed, Status};
 use crate::view::switches::Switches;
@@ -108,6 +110,12 @@ impl Viewer {
                 Asked::Part => self.part(),
             }
         }
+        if let Some(shown) = &output.platform_output.accesskit_update
+            && let Some(path) = self.listing.take()
+        {
+            context.disable_accesskit();
+            listing::write(&path, shown, &self.eye.camera, self.scale)?;
+        }
         self.panel_pass.update(&output.textures_delta)?;
         let delay = output
             .viewport_output
@@ -117,6 +125,13 @@ impl Viewer {
         let soon = delay < Duration::from_secs(3600);
         self.repaint = soon.then(|| Instant::now() + delay);
         Ok(context.tessellate(output.shapes, output.pixels_per_point))
+    }
+
+    /// Writes what the next frame shows to a file.
+    pub(in crate::view) fn list(&mut self, path: PathBuf) {
+        self.egui.enable_accesskit();
+        self.listing = Some(path);
+        self.dirty = true;
     }
 
     fn controls(&mut self, context: &egui::Context) -> Vec<Asked> {
@@ -216,7 +231,11 @@ impl Viewer {
     /// Draws marks of lights, light by direction and an item buffer over the view.
     fn marks(&mut self, context: &egui::Context, size: (u32, u32)) {
         let layer = egui::LayerId::new(egui::Order::Background, egui::Id::new("marks"));
-        let painter = context.layer_painter(layer);
+        let mut beside = context.content_rect();
+        if self.switches.panel {
+            beside.min.x += panel::WIDTH;
+        }
+        let painter = context.layer_painter(layer).with_clip_rect(beside);
         let marked_lamps = self.lamps.iter().enumerate();
         for (i, lamp) in marked_lamps.filter(|_| self.switches.panel) {
             if let Some(at) = lamp.position.and_then(|p| self.eye.pixel(p, size)) {

@@ -132,6 +132,8 @@ pub struct Viewer {
     start: Instant,
     pub(super) timing: Timing,
     pub(super) capture: Option<PathBuf>,
+    /// Where the next frame writes what it shows.
+    pub(super) listing: Option<PathBuf>,
     pub(super) closing: bool,
 }
 
@@ -263,6 +265,7 @@ impl Viewer {
             start,
             timing: Timing::default(),
             capture: None,
+            listing: None,
             closing: false,
         };
         let snapshot = &viewer.snapshot;
