@@ -11,8 +11,12 @@ pub struct Display {
 
 impl Display {
     pub fn new() -> Self {
+        Self::sized("1024x768")
+    }
+
+    pub fn sized(size: &str) -> Self {
         let mut server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", "1024x768x24"])
+            .args(["-displayfd", "1", "-screen", "0", &format!("{size}x24")])
             // A server that begins again after its last client refuses those that come meanwhile.
             .args(["-nolisten", "tcp", "-noreset"])
             .stdout(Stdio::piped())

@@ -2,8 +2,12 @@
 //! screen, nothing is left behind, and the validation layer stays silent.
 #![cfg(all(target_os = "linux", feature = "window"))]
 
+mod controls;
 mod display;
+mod driven;
+mod drop;
 mod harness;
+mod keys;
 mod screens;
 mod tools;
 
