@@ -22,7 +22,7 @@ pub struct Eye {
     size: f64,
 }
 
-/// Rows of a projection over (p, 1), p from the scene's middle in internal units.
+/// Rows of a projection over (p, 1), p as [`super::surface_mesh::SurfaceMesh`] has it.
 #[derive(Debug, Clone, Copy)]
 pub struct Rows {
     pub x: Vec4,
@@ -167,9 +167,8 @@ impl Eye {
         })
     }
 
-    /// Rows of the projection for a window of this size.
-    pub fn rows(&self, scene: &Scene, (width, height): (u32, u32)) -> Rows {
-        let (origin, unit) = scene.local_frame();
+    /// Rows of the projection for a window of this size, of places from `origin` in units.
+    pub fn rows(&self, (origin, unit): (DVec3, f64), (width, height): (u32, u32)) -> Rows {
         let eye = (self.camera.position - origin) / unit;
         let scale = 1.0 / (self.camera.fov_y / 2.0).to_radians().tan();
         let up = self.right().cross(self.forward());

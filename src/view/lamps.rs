@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::error::{Error, Result};
-use crate::scene::Scene;
+use crate::scene::{Scene, Triangle};
 
 /// A point light, or a material that emits.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,7 +14,8 @@ pub struct Lamp {
     pub colour: [f32; 3],
     /// Value of the strongest channel: W·sr⁻¹ of a point light, W·m⁻²·sr⁻¹ of a material.
     pub strength: f32,
-    /// Scene units; None for emitters, which cannot move, since their form factors are kept.
+    /// Scene units; of emitters, the middle of their surfaces. None of those that share corners with
+    /// other surfaces, which cannot move.
     pub position: Option<DVec3>,
 }
 
@@ -46,8 +47,40 @@ pub fn lamps(scene: &Scene) -> Vec<Lamp> {
     let materials = scene.materials.iter().enumerate();
     let materials = materials
         .filter(|(_, m)| m.emits())
-        .map(|(i, m)| lamp(&m.name, Place::Material(i), m.ke, None));
+        .map(|(i, m)| lamp(&m.name, Place::Material(i), m.ke, middle(scene, i)));
     points.chain(materials).collect()
+}
+
+/// The middle of an emitter's surfaces; none where it has none, or shares corners with others.
+fn middle(scene: &Scene, material: usize) -> Option<DVec3> {
+    let is_own = |t: &&Triangle| t.material as usize == material;
+    let own = own_vertices(scene, material);
+    let others = scene.triangles.iter().filter(|t| !is_own(t));
+    if others.flat_map(|t| t.vertices).any(|v| own[v as usize]) {
+        return None;
+    }
+    let corners = scene
+        .triangles
+        .iter()
+        .filter(is_own)
+        .flat_map(|t| scene.corners(t));
+    let (low, high) = corners.fold((DVec3::MAX, DVec3::MIN), |(low, high), p| {
+        (low.min(p), high.max(p))
+    });
+    low.cmple(high).all().then(|| (low + high) / 2.0)
+}
+
+/// Whether each vertex is one of a material's triangles.
+fn own_vertices(scene: &Scene, material: usize) -> Vec<bool> {
+    let mut own = vec![false; scene.vertices.len()];
+    for t in scene
+        .triangles
+        .iter()
+        .filter(|t| t.material as usize == material)
+    {
+        t.vertices.iter().for_each(|&v| own[v as usize] = true);
+    }
+    own
 }
 
 impl Lamp {
@@ -85,9 +118,21 @@ impl Lamp {
     }
 }
 
-/// The scene with its lights replaced by `lamps`.
-pub fn lit(scene: &Scene, lamps: &[Lamp]) -> Scene {
+/// The scene with its lights replaced by `lamps`, which were `home` in `base`: a scene of the same
+/// triangles, as it was read. An emitter back home has its vertices to the bit.
+pub fn lit(scene: &Scene, (base, home): (&Scene, &[Lamp]), lamps: &[Lamp]) -> Scene {
     let mut scene = scene.clone();
+    scene.vertices.clone_from(&base.vertices);
+    for (lamp, home) in lamps.iter().zip(home) {
+        if let (Place::Material(i), Some(from), Some(to)) =
+            (lamp.place, home.position, lamp.position)
+            && from != to
+        {
+            let own = own_vertices(base, i);
+            let own = scene.vertices.iter_mut().zip(own).filter(|(_, own)| *own);
+            own.for_each(|(vertex, _)| *vertex += to - from);
+        }
+    }
     for lamp in lamps {
         match lamp.place {
             Place::Point(i) => {
@@ -129,7 +174,8 @@ mod tests {
         let mut all = lamps(&scene);
         let names: Vec<_> = all.iter().map(|l| l.name.as_str()).collect();
         assert_eq!(names, ["bulb", "lamp"]);
-        let same = lit(&scene, &all);
+        let home = all.clone();
+        let same = lit(&scene, (&scene, &home), &all);
         assert_eq!(same.lights.points, scene.lights.points);
         assert_eq!(same.materials[1].ke, [4.0, 2.0, 0.0]);
         let words = |values: &str| -> Vec<String> { values.split(' ').map(Into::into).collect() };
@@ -139,12 +185,64 @@ mod tests {
         all[1].set("strength", &words("8")).expect("a strength");
         all[1]
             .set("position", &words("1 2 3"))
-            .expect_err("an emitter stays");
+            .expect_err("an emitter without surfaces stays");
         all[1]
             .set("strength", &words("-1"))
             .expect_err("no light is negative");
-        let other = lit(&scene, &all);
+        let other = lit(&scene, (&scene, &home), &all);
         assert_eq!(other.lights.points[0].position, DVec3::new(1.0, 2.0, 3.0));
         assert_eq!(other.materials[1].ke, [8.0, 4.0, 0.0]);
+    }
+
+    /// A square lamp of its own corners moves with them, and comes back to the bit; one that shares
+    /// a corner with the floor stays.
+    #[test]
+    fn an_emitter_moves_by_its_surfaces() {
+        let triangle = |vertices, material| Triangle {
+            vertices,
+            uv: [[0.0; 2]; 3],
+            emission_uv: None,
+            light_uv: None,
+            material,
+        };
+        let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
+        let mut scene = Scene {
+            vertices: vec![
+                at(0.0, 0.0, 0.0),
+                at(9.0, 0.0, 0.0),
+                at(0.0, 0.0, 9.0),
+                at(1.1, 2.0, 1.0),
+                at(1.7, 2.0, 1.0),
+                at(1.1, 2.0, 1.4),
+                at(1.7, 2.0, 1.4),
+            ],
+            triangles: vec![
+                triangle([0, 1, 2], 0),
+                triangle([3, 4, 5], 1),
+                triangle([5, 4, 6], 1),
+            ],
+            materials: vec![
+                Material::default(),
+                Material {
+                    ke: [1.0; 3],
+                    ..Material::default()
+                },
+            ],
+            ..Scene::default()
+        };
+        let home = lamps(&scene);
+        assert!((home[0].position.expect("it moves") - at(1.4, 2.0, 1.2)).length() < 1e-12);
+        let mut moved = home.clone();
+        moved[0].position = Some(at(2.4, 1.5, 1.2));
+        let there = lit(&scene, (&scene, &home), &moved);
+        let by = at(1.0, -0.5, 0.0);
+        for (v, (now, before)) in there.vertices.iter().zip(&scene.vertices).enumerate() {
+            let expected = if v < 3 { *before } else { *before + by };
+            assert!((*now - expected).length() < 1e-12, "vertex {v}: {now}");
+        }
+        let back = lit(&there, (&scene, &home), &home);
+        assert_eq!(back.vertices, scene.vertices);
+        scene.triangles[0].vertices[2] = 3;
+        assert_eq!(lamps(&scene)[0].position, None);
     }
 }

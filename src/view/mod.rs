@@ -13,8 +13,8 @@
 //! detailer's thread draws the view as `render` does while it stays. No frame waits for the other
 //! two threads. A software driver shares its own threads between the devices of an instance, so
 //! that each device has its own instance too; and the other two threads, with all that they start,
-//! run at a lower priority. What a point light that is moved brings directly is found by rays on
-//! the CPU first, by a thread of the window's priority (`sketch`).
+//! run at a lower priority. What a light that is moved brings directly is found by rays on the CPU
+//! first, by a thread of the window's priority (`sketch`).
 
 mod backdrop;
 mod baker;

@@ -16,7 +16,7 @@ use crate::vk::{Buffer, BufferUse, Device};
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub struct Vertex {
-    /// From the scene's middle, internal units.
+    /// In [`SurfaceMesh::frame`].
     pub position: Vec3,
     /// v down, as images are stored.
     pub uv: Vec2,
@@ -48,6 +48,9 @@ pub struct MeshRange {
 pub struct SurfaceMesh {
     pub vertices: Buffer,
     pub indices: Buffer,
+    /// Origin and unit of its corners, scene units: the middle and the internal unit of the scene
+    /// that it was made of.
+    pub frame: (DVec3, f64),
     /// Index in the scene, `[drawn triangle]`.
     pub order: Vec<u32>,
     pub ranges: Vec<MeshRange>,
@@ -76,16 +79,28 @@ impl SurfaceMesh {
             });
             first = end;
         }
-        let vertices = vertices(scene, &order);
+        let frame = scene.local_frame();
+        let vertices = vertices(scene, &order, frame);
         let indices: Vec<u32> = (0..vertices.len() as u32).collect();
         Ok(Self {
             vertices: upload(device, "surface vertices", &vertices, BufferUse::Geometry)?,
             indices: upload(device, "surface indices", &indices, BufferUse::Geometry)?,
             first_relief: order.partition_point(|&e| !has_relief(e)),
             heights: scene.materials.iter().map(|m| m.height_scale).collect(),
+            frame,
             order,
             ranges,
         })
+    }
+
+    /// Takes the places of the corners from `scene`, which is otherwise the same scene.
+    ///
+    /// # Errors
+    /// A device without the memory.
+    pub fn move_to(&mut self, device: &Arc<Device>, scene: &Scene) -> Result<()> {
+        let vertices = vertices(scene, &self.order, self.frame);
+        self.vertices = upload(device, "surface vertices", &vertices, BufferUse::Geometry)?;
+        Ok(())
     }
 
     /// `[drawn triangle]`; `sources` are `[triangle]` of the input, or empty.
@@ -111,8 +126,7 @@ impl SurfaceMesh {
 }
 
 /// `[drawn triangle][corner]`.
-fn vertices(scene: &Scene, order: &[u32]) -> Vec<Vertex> {
-    let (origin, unit) = scene.local_frame();
+fn vertices(scene: &Scene, order: &[u32], (origin, unit): (DVec3, f64)) -> Vec<Vertex> {
     order
         .iter()
         .flat_map(|&e| {

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 use super::camera::Rows;
 use super::corner_light::{CornerLight, Slant};
@@ -220,6 +220,19 @@ impl SurfacePass {
     pub fn set_sources(&mut self, scene: &Scene, sources: Vec<u32>) {
         self.sources = sources;
         self.set_about(scene);
+    }
+
+    /// Origin and unit of the places that it draws, scene units.
+    pub fn frame(&self) -> (DVec3, f64) {
+        self.mesh.frame
+    }
+
+    /// Sets the places of surfaces to those of `scene`, which is otherwise the same scene.
+    ///
+    /// # Errors
+    /// A device without the memory.
+    pub fn set_places(&mut self, device: &Arc<Device>, scene: &Scene) -> Result<()> {
+        self.mesh.move_to(device, scene)
     }
 
     /// Sets the heights to those of `scene`, which is otherwise the same scene.

@@ -84,6 +84,28 @@ fn a_moved_light_is_sketched() {
     assert!(moved > 5.0 && off < 0.3, "{off} and {moved}");
 }
 
+/// So is that of the lamp in the ceiling, a surface, which takes its shape with it; back in its
+/// place it brings the light of before.
+#[test]
+fn a_moved_emitter_is_sketched() {
+    let room = Room::baked("room");
+    let script = format!(
+        "{QUIET}key 2\nframes 1\nscreenshot before.png\nset lamp lamp position -0.5 0.98 0.4\ndirect
+         frames 1\nscreenshot sketched.png\nrelit\nbake\nframes 1\nscreenshot solved.png
+         set lamp lamp position 0 0.98 0\nrelit\nbake\nframes 1\nscreenshot back.png"
+    );
+    view(room.path(), "room.safetensors", &script);
+    let [before, sketched, solved, back] =
+        ["before.png", "sketched.png", "solved.png", "back.png"].map(|name| room.picture(name));
+    let [off, moved] = [&sketched, &before].map(|other| difference(other, &solved));
+    let same = difference(&back, &before);
+    println!("codes differ by {off:.3} from what is solved, by {moved:.1} before, {same:.3} back");
+    assert!(
+        moved > 5.0 && off < 0.85 && same < 0.05,
+        "{off}, {moved} and {same}"
+    );
+}
+
 /// On the left of the line what was held stays, on its right what is changed shows.
 #[test]
 fn the_view_is_compared_to_itself() {

@@ -181,7 +181,6 @@ impl Viewer {
         (width, height): (u32, u32),
         panel: &Prepared,
     ) -> Result<(Shown, Option<Captured>)> {
-        let rows = self.eye.rows(&self.scene, (width, height));
         let line = self.left.as_ref().map(|_| self.line.column(width));
         let line = line.unwrap_or(0);
         let sides = [(0..line, true), (line..width, false)];
@@ -195,6 +194,7 @@ impl Viewer {
             screen,
             surfaces,
             left,
+            eye,
             panel_pass,
             capture,
             ..
@@ -205,6 +205,7 @@ impl Viewer {
                     Some(Left::Held(held)) if side.held => &held.surfaces,
                     _ => &*surfaces,
                 };
+                let rows = eye.rows(surfaces.frame(), (width, height));
                 side.record(pass, &rows, surfaces, (&*panel_pass, panel), sky, first);
             }
             pass.clip([0, 0, width, height]);

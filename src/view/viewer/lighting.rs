@@ -87,18 +87,36 @@ impl Viewer {
     pub(super) fn light_anew(&mut self) {
         self.lit_lamps = self.lamps.clone();
         self.metering = false;
-        self.scene = Arc::new(lit(&self.scene, &self.lamps));
+        let home = (&self.base, &self.first_lamps[..]);
+        let scene = Arc::new(lit(&self.scene, home, &self.lamps));
+        let before = std::mem::replace(&mut self.scene, scene);
         self.surfaces.set_emission(&self.scene);
+        let moved = before.vertices != self.scene.vertices;
+        if moved {
+            let device = self.screen.device();
+            if let Err(error) = self.surfaces.set_places(device, &self.scene) {
+                self.notes.warn(error.to_string());
+            }
+        }
         self.start_epoch();
         self.edited = Some(Edited {
             epoch: self.epoch,
             since: Instant::now(),
             shown_direct: false,
         });
-        self.baker.order(Order::Relight {
-            scene: Arc::clone(&self.scene),
-            epoch: self.epoch,
-            sketched: self.can_sketch(),
+        let (scene, epoch) = (Arc::clone(&self.scene), self.epoch);
+        self.baker.order(match moved {
+            // Form factors to surfaces that have moved are others.
+            true => Order::Bake {
+                scene,
+                settings: Box::new(self.settings.clone()),
+                epoch,
+            },
+            false => Order::Relight {
+                scene,
+                epoch,
+                sketched: self.can_sketch(),
+            },
         });
         self.sketch();
         // It would take the time of what is to be shown next.

@@ -33,7 +33,8 @@ impl Viewer {
             return;
         };
         let Some(position) = lamp.position else {
-            self.say(format!("{} is a surface, and does not move", lamp.name));
+            let why = "shares corners with other surfaces, and does not move";
+            self.say(format!("{} {why}", lamp.name));
             return;
         };
         if let Some(start) = self.input.pointer {
