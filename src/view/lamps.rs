@@ -1,9 +1,11 @@
 //! The lights of a scene as the user edits them.
 
+use std::collections::HashMap;
+
 use glam::DVec3;
 
 use crate::error::{Error, Result};
-use crate::scene::{Scene, Triangle};
+use crate::scene::Scene;
 
 /// A point light, or a material that emits.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,8 +16,7 @@ pub struct Lamp {
     pub colour: [f32; 3],
     /// Value of the strongest channel: W·sr⁻¹ of a point light, W·m⁻²·sr⁻¹ of a material.
     pub strength: f32,
-    /// Scene units; of emitters, the middle of their surfaces. None of those that share corners with
-    /// other surfaces, which cannot move.
+    /// Scene units; of emitters, the middle of their surfaces. None of those that have none.
     pub position: Option<DVec3>,
 }
 
@@ -51,36 +52,50 @@ pub fn lamps(scene: &Scene) -> Vec<Lamp> {
     points.chain(materials).collect()
 }
 
-/// The middle of an emitter's surfaces; none where it has none, or shares corners with others.
+/// The middle of an emitter's surfaces, if it has any.
 fn middle(scene: &Scene, material: usize) -> Option<DVec3> {
-    let is_own = |t: &&Triangle| t.material as usize == material;
-    let own = own_vertices(scene, material);
-    let others = scene.triangles.iter().filter(|t| !is_own(t));
-    if others.flat_map(|t| t.vertices).any(|v| own[v as usize]) {
-        return None;
-    }
-    let corners = scene
+    let own = scene
         .triangles
         .iter()
-        .filter(is_own)
-        .flat_map(|t| scene.corners(t));
+        .filter(|t| t.material as usize == material);
+    let corners = own.flat_map(|t| scene.corners(t));
     let (low, high) = corners.fold((DVec3::MAX, DVec3::MIN), |(low, high), p| {
         (low.min(p), high.max(p))
     });
     low.cmple(high).all().then(|| (low + high) / 2.0)
 }
 
-/// Whether each vertex is one of a material's triangles.
-fn own_vertices(scene: &Scene, material: usize) -> Vec<bool> {
-    let mut own = vec![false; scene.vertices.len()];
-    for t in scene
-        .triangles
-        .iter()
-        .filter(|t| t.material as usize == material)
-    {
-        t.vertices.iter().for_each(|&v| own[v as usize] = true);
+/// Moves the triangles of a material, away from others that share corners with them.
+fn shift(scene: &mut Scene, material: usize, by: DVec3) {
+    let Scene {
+        vertices,
+        triangles,
+        ..
+    } = scene;
+    let (own, others): (Vec<_>, Vec<_>) = triangles
+        .iter_mut()
+        .partition(|t| t.material as usize == material);
+    let mut shared = vec![false; vertices.len()];
+    for v in others.iter().flat_map(|t| t.vertices) {
+        shared[v as usize] = true;
     }
-    own
+    // Where each corner has gone.
+    let mut gone: HashMap<u32, u32> = HashMap::new();
+    for v in own.into_iter().flat_map(|t| &mut t.vertices) {
+        *v = *gone.entry(*v).or_insert_with_key(|&v| {
+            let to = vertices[v as usize] + by;
+            match shared[v as usize] {
+                true => {
+                    vertices.push(to);
+                    vertices.len() as u32 - 1
+                }
+                false => {
+                    vertices[v as usize] = to;
+                    v
+                }
+            }
+        });
+    }
 }
 
 impl Lamp {
@@ -123,14 +138,13 @@ impl Lamp {
 pub fn lit(scene: &Scene, (base, home): (&Scene, &[Lamp]), lamps: &[Lamp]) -> Scene {
     let mut scene = scene.clone();
     scene.vertices.clone_from(&base.vertices);
+    scene.triangles.clone_from(&base.triangles);
     for (lamp, home) in lamps.iter().zip(home) {
         if let (Place::Material(i), Some(from), Some(to)) =
             (lamp.place, home.position, lamp.position)
             && from != to
         {
-            let own = own_vertices(base, i);
-            let own = scene.vertices.iter_mut().zip(own).filter(|(_, own)| *own);
-            own.for_each(|(vertex, _)| *vertex += to - from);
+            shift(&mut scene, i, to - from);
         }
     }
     for lamp in lamps {
@@ -150,7 +164,7 @@ pub fn lit(scene: &Scene, (base, home): (&Scene, &[Lamp]), lamps: &[Lamp]) -> Sc
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Lights, Material, PointLight};
+    use crate::scene::{Lights, Material, PointLight, Triangle};
 
     #[test]
     fn lamps_are_the_lights_and_light_the_scene() {
@@ -194,8 +208,7 @@ mod tests {
         assert_eq!(other.materials[1].ke, [8.0, 4.0, 0.0]);
     }
 
-    /// A square lamp of its own corners moves with them, and comes back to the bit; one that shares
-    /// a corner with the floor stays.
+    /// A square lamp moves with its corners, and comes back to the bit; what shares one stays.
     #[test]
     fn an_emitter_moves_by_its_surfaces() {
         let triangle = |vertices, material| Triangle {
@@ -243,6 +256,13 @@ mod tests {
         let back = lit(&there, (&scene, &home), &home);
         assert_eq!(back.vertices, scene.vertices);
         scene.triangles[0].vertices[2] = 3;
-        assert_eq!(lamps(&scene)[0].position, None);
+        let there = lit(&scene, (&scene, &home), &moved);
+        let [floor, lamp] = [0, 1].map(|t| there.corners(&there.triangles[t]));
+        assert_eq!(floor, scene.corners(&scene.triangles[0]));
+        for (now, before) in lamp.iter().zip(scene.corners(&scene.triangles[1])) {
+            assert!((*now - before - by).length() < 1e-12, "{now}");
+        }
+        let back = lit(&there, (&scene, &home), &home);
+        assert!((back.vertices, back.triangles) == (scene.vertices, scene.triangles));
     }
 }

@@ -39,9 +39,9 @@ pub fn is_possible(base: &Scene, scene: &Scene) -> bool {
 pub(super) fn moved(base: &Scene, scene: &Scene) -> Vec<usize> {
     let mut moved = Vec::new();
     if base.vertices != scene.vertices {
-        for t in &scene.triangles {
-            let m = t.material as usize;
-            if base.corners(t) != scene.corners(t) && !moved.contains(&m) {
+        for (before, now) in base.triangles.iter().zip(&scene.triangles) {
+            let m = now.material as usize;
+            if base.corners(before) != scene.corners(now) && !moved.contains(&m) {
                 moved.push(m);
             }
         }
@@ -68,7 +68,7 @@ pub(super) fn changes(wanted: &Wanted) -> Vec<Change> {
 }
 
 /// Rays to all spots of an emitter, about: fewer spots where there are more triangles.
-const EMITTER_RAYS: usize = 400_000;
+const EMITTER_RAYS: usize = 150_000;
 const SPOTS: [usize; 2] = [4, 32];
 
 /// Parts of an emitter of one area, spread over its triangles by how large they are.

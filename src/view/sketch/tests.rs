@@ -148,6 +148,13 @@ fn with_emitter(x: f64, emission: f32) -> Arc<Scene> {
 fn an_emitter_lights_what_it_sees_from_where_it_is() {
     let [before, now] = [(0.2, 0.0), (-0.4, 3.0)].map(|(x, ke)| with_emitter(x, ke));
     assert_eq!(moved(&before, &now), [1]);
+    // By corners of its own, where it shared some before.
+    let mut apart = Scene::clone(&now);
+    let corner = apart.triangles[apart.triangles.len() - 1].vertices[0];
+    apart.vertices.push(now.vertices[corner as usize]);
+    let last = apart.triangles.last_mut().expect("the emitter's");
+    last.vertices[0] = now.vertices.len() as u32;
+    assert_eq!(moved(&before, &apart), [1]);
     let wanted = Wanted {
         base: Arc::new(Snapshot::unlit(&before)),
         scene: Arc::clone(&now),

@@ -41,11 +41,21 @@ impl Viewer {
         self.surfaces.set_about(&self.scene);
         self.metering = true;
         self.start_epoch();
+        self.order_bake();
+    }
+
+    fn order_bake(&mut self) {
+        self.ordered = Arc::clone(&self.scene);
         self.baker.order(Order::Bake {
             scene: Arc::clone(&self.scene),
             settings: Box::new(self.settings.clone()),
             epoch: self.epoch,
         });
+    }
+
+    /// Whether a surface has moved since a bake was ordered.
+    pub(super) fn is_moved(&self) -> bool {
+        self.ordered.vertices != self.scene.vertices
     }
 
     /// Relights the scene by the lamps as they are now, which can be undone.
@@ -91,8 +101,7 @@ impl Viewer {
         let scene = Arc::new(lit(&self.scene, home, &self.lamps));
         let before = std::mem::replace(&mut self.scene, scene);
         self.surfaces.set_emission(&self.scene);
-        let moved = before.vertices != self.scene.vertices;
-        if moved {
+        if before.vertices != self.scene.vertices {
             let device = self.screen.device();
             if let Err(error) = self.surfaces.set_places(device, &self.scene) {
                 self.notes.warn(error.to_string());
@@ -104,20 +113,16 @@ impl Viewer {
             since: Instant::now(),
             shown_direct: false,
         });
-        let (scene, epoch) = (Arc::clone(&self.scene), self.epoch);
-        self.baker.order(match moved {
-            // Form factors to surfaces that have moved are others.
-            true => Order::Bake {
-                scene,
-                settings: Box::new(self.settings.clone()),
-                epoch,
-            },
-            false => Order::Relight {
-                scene,
-                epoch,
+        match (self.is_moved(), self.input.grabbed.is_some()) {
+            (false, _) => self.baker.order(Order::Relight {
+                scene: Arc::clone(&self.scene),
+                epoch: self.epoch,
                 sketched: self.can_sketch(),
-            },
-        });
+            }),
+            // Form factors to a surface that has moved are others, which are found where it stays.
+            (true, false) => self.order_bake(),
+            (true, true) => {}
+        }
         self.sketch();
         // It would take the time of what is to be shown next.
         if self.pictures.wanted.take().is_some() {

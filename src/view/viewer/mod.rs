@@ -65,6 +65,8 @@ pub struct Viewer {
     base: Scene,
     /// The scene with the lights and the scale of relief as they are now.
     pub(super) scene: Arc<Scene>,
+    /// The scene of the bake that was ordered last, or that was opened.
+    ordered: Arc<Scene>,
     /// Of the bake as it is, and as it was asked for.
     settings: Settings,
     first_settings: Settings,
@@ -231,6 +233,7 @@ impl Viewer {
             first_lamps: shown_lamps.clone(),
             first_settings: settings.clone(),
             base,
+            ordered: Arc::clone(&scene),
             scene,
             settings,
             progress: snapshot.progress,

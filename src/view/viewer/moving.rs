@@ -33,8 +33,7 @@ impl Viewer {
             return;
         };
         let Some(position) = lamp.position else {
-            let why = "shares corners with other surfaces, and does not move";
-            self.say(format!("{} {why}", lamp.name));
+            self.say(format!("{} has no surface to move", lamp.name));
             return;
         };
         if let Some(start) = self.input.pointer {
@@ -111,7 +110,12 @@ impl Viewer {
         };
         let moved = self.lamps[grab.lamp].position != Some(grab.position);
         match (moved, stays) {
-            (true, true) => self.history.edited(grab.before, std::time::Instant::now()),
+            (true, true) => {
+                self.history.edited(grab.before, std::time::Instant::now());
+                if self.is_moved() {
+                    self.light_anew();
+                }
+            }
             (true, false) => {
                 self.lamps = grab.before;
                 self.light_anew();
