@@ -91,8 +91,8 @@ impl fmt::Display for Shown {
 
 /// Most times that a test asks what is shown.
 const ROUNDS: usize = 2000;
-/// Time for what follows an event.
-const SOON: Duration = Duration::from_secs(100);
+/// Longest time for what follows an event: two cores may have much else to do.
+const SOON: Duration = PATIENCE;
 
 pub struct Driven {
     display: Display,
