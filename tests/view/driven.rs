@@ -200,7 +200,7 @@ impl Driven {
         self.tool(&["key", name, "sleep", "0.05"]);
     }
 
-    /// Waits until the window has closed, as a key told it to.
+    /// Waits until the window has closed after Ctrl Q.
     pub fn closed(mut self) {
         if let Some(child) = self.child.take() {
             finish(child, "closed by a key");

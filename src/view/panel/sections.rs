@@ -18,7 +18,7 @@ fn section(ui: &mut Ui, title: &str, open: bool, content: impl FnOnce(&mut Ui)) 
         .show(ui, content);
 }
 
-/// One of several, or what is on or off, which also tells a screen reader whether it is chosen.
+/// A selectable button whose state screen readers can read, too.
 fn choice(ui: &mut Ui, chosen: bool, name: &str) -> Response {
     let response = ui.selectable_label(chosen, name);
     let enabled = ui.is_enabled();
@@ -27,7 +27,7 @@ fn choice(ui: &mut Ui, chosen: bool, name: &str) -> Response {
     response
 }
 
-/// One of several values.
+/// A selectable button that sets a value.
 fn value<T: PartialEq>(ui: &mut Ui, value: &mut T, this: T, name: &str) -> Response {
     let mut response = choice(ui, *value == this, name);
     if response.clicked() && *value != this {
@@ -76,7 +76,8 @@ pub fn scenes(ui: &mut Ui, status: &Status<'_>, asked: &mut Vec<Asked>) {
     });
 }
 
-/// The controls below stay in their places while a bake goes on: what is not known yet has its line.
+/// Lines for values that are not known yet are shown too, so that the controls below do not move
+/// during a bake.
 pub fn progress(ui: &mut Ui, status: &Status<'_>, switches: &mut Switches) {
     ui.label(format!("{} triangles", status.triangles));
     ui.label(RichText::new(status.device).small().weak());

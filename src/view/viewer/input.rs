@@ -114,8 +114,8 @@ impl Viewer {
                 }
             }
             Event::Key { key, pressed } => {
-                // Where it shows the panel, it does not choose a control, which would take the keys
-                // that follow.
+                // Tab shows the panel. In egui it would also focus a control, which would then take
+                // all keys.
                 if key != Key::Tab || self.panel_takes_keys() {
                     self.input.queue(egui::Event::Key {
                         key,
@@ -127,8 +127,8 @@ impl Viewer {
                 }
                 self.key(key, pressed);
             }
-            // With Ctrl, letters are commands.
-            Event::Text(_) if modifiers.ctrl || modifiers.command => {}
+            // With Ctrl, letters are commands; AltGr may count as Ctrl and Alt.
+            Event::Text(_) if (modifiers.ctrl || modifiers.command) && !modifiers.alt => {}
             Event::Text(text) => self.input.queue(egui::Event::Text(text)),
             Event::Modifiers(modifiers) => self.input.modifiers = modifiers,
             Event::Focus(focused) => {
