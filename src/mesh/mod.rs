@@ -6,6 +6,7 @@ pub mod clusters;
 pub mod contour;
 pub mod corners;
 pub mod elements;
+pub mod merged;
 pub mod meshlets;
 pub mod meso_vertices;
 pub mod near;

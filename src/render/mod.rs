@@ -11,6 +11,7 @@
 mod background;
 mod blocks;
 mod compare;
+mod emitters;
 mod flat_relief;
 mod flip;
 mod gathered;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::background::{BEHIND, draw_sky};
 use super::gathered::Gathered;
-use super::lights::{light_buffers, light_kinds};
+use super::lights::{LightScene, light_buffers, light_kinds};
 use super::mesh::Mesh;
 use super::relief::{Relief, ReliefTarget};
 use super::relief_scene::ReliefScene;
@@ -64,6 +64,7 @@ struct Fixed<'a> {
     shade: Shade,
     textures: Textures,
     relief: Option<ReliefScene>,
+    light_scene: LightScene,
 }
 
 impl Fixed<'_> {
@@ -102,7 +103,7 @@ impl ViewParts {
             samples: fixed.samples,
             cuts: Cuts::default(),
         };
-        let (lights, shafts) = light_buffers(device, &seen)?;
+        let (lights, shafts) = light_buffers(device, &seen, &fixed.light_scene)?;
         let kept = fixed.relief.as_ref();
         let relief = Relief::new(device, &seen, kept, shafts.as_ref())?;
         let rest = relief.as_ref().map(|r| &r.mesh.rest);
@@ -141,6 +142,7 @@ impl<'a> Renderer<'a> {
         let shade = Shade::new(device, glows, light_kinds(scene))?;
         let fixed = Fixed {
             textures: Textures::new(device, scene)?,
+            light_scene: LightScene::new(scene, &lighting),
             relief: ReliefScene::new(device, &shade, scene, &lighting)?,
             device: Arc::clone(device),
             scene,
