@@ -42,7 +42,6 @@ fn corners_take_light_by_their_own_slope() {
     let shading = Shading {
         normals: (0..count).map(|q| field.facet(q).normal).collect(),
         reflectance: vec![Vec3::ZERO; count],
-        from_map: false,
     };
     for k in [16, 64] {
         let directions = Directions::new(k).expect("a number of the paper");

@@ -279,7 +279,7 @@ mod tests {
     fn kinds_and_places_stay() {
         let scene = room();
         for squares in [1, 7, 100] {
-            let kind = |i: usize| (i / 2 / squares) % 2 == 0;
+            let kind = |i: usize| (i / 2 / squares) % 2 == 1;
             let found = merged(&scene, |i| Some(kind(i)));
             assert!(found.len() > 12 && found.len() <= 6 * 7 * 7 * 2);
             assert_eq!(

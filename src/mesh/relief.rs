@@ -79,7 +79,6 @@ impl TileResponses {
         let Shading {
             normals,
             reflectance,
-            ..
         } = &tile.shading;
         let response =
             |shares: Option<&[f32]>| Response::paper(directions, normals, reflectance, shares);

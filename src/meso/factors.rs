@@ -89,7 +89,7 @@ impl Factors {
             });
             (0..CORNERS).flat_map(move |at| {
                 let corner = Corner::new(field, cell, at);
-                let row = corner.transfer(sight, &seen, shading, &facets.scale);
+                let row = corner.transfer(sight, &seen, &facets.scale);
                 let row = whitening.apply(&fit.apply(&row));
                 let share = 1.0 / corner.facets.len() as f32;
                 (0..rank).map(move |r| {
@@ -177,20 +177,8 @@ impl Corner {
     }
 
     /// Its response to the light from each fine cell: what its facets see, of those `seen` by both
-    /// of the cell, with its own normal or the map's.
-    fn transfer(
-        &self,
-        sight: &Sight<'_>,
-        seen: &[[f32; CELLS]; 2],
-        shading: &Shading,
-        scale: &[f32],
-    ) -> Vec<f32> {
-        let normal = if shading.from_map {
-            let sum: DVec3 = self.facets.clone().map(|q| shading.normals[q]).sum();
-            sum.normalize_or(self.normal)
-        } else {
-            self.normal
-        };
+    /// of the cell, with its own normal.
+    fn transfer(&self, sight: &Sight<'_>, seen: &[[f32; CELLS]; 2], scale: &[f32]) -> Vec<f32> {
         let [first, second] = seen;
         let scaled = |seen: &[f32; CELLS]| seen.iter().zip(scale).map(|(s, by)| s * by).collect();
         let mut row: Vec<f32> = match (self.facets.len(), self.facets.start % 2) {
@@ -201,7 +189,7 @@ impl Corner {
                 both.map(|((a, b), by)| 0.5 * (a + b) * by).collect()
             }
         };
-        sight.times_cosine(normal, &mut row);
+        sight.times_cosine(self.normal, &mut row);
         row
     }
 }

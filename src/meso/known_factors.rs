@@ -21,7 +21,6 @@ fn key(directions: &Directions, field: &HeightField, shading: &Shading) -> Key {
     hash.update(directions.columns.to_le_bytes());
     hash.update(directions.rows.to_le_bytes());
     hash.update(Visibility::key(field));
-    hash.update([u8::from(shading.from_map)]);
     for normal in &shading.normals {
         let axes = normal.to_array();
         axes.iter().for_each(|c| hash.update(c.to_le_bytes()));
@@ -81,7 +80,6 @@ mod tests {
         Shading {
             normals: vec![DVec3::Z; 8],
             reflectance: vec![Vec3::splat(reflectance); 8],
-            from_map: false,
         }
     }
 

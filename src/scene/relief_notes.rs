@@ -12,6 +12,9 @@ const MOST_SAMPLES: u32 = 256;
 /// makes them agree.
 const CONTRADICTING: f64 = 0.5;
 const AGREEING: f64 = 0.8;
+/// Part of the normals' slopes that the heights lack, root mean square, worth a note: maps of 8 bit
+/// leave a tenth of gentle slopes to rounding.
+const LACKING: f64 = 0.3;
 
 /// One sentence for each note on a material that a triangle uses.
 pub(super) fn collect(scene: &Scene) -> Vec<String> {
@@ -112,8 +115,18 @@ fn contradiction(
     tile: DVec2,
 ) -> Option<String> {
     let slopes = Slopes::compare(material, heights, normals, tile);
-    if slopes.correlation(1.0, 1.0) >= CONTRADICTING {
-        return None;
+    let correlation = slopes.correlation(1.0, 1.0);
+    if correlation >= CONTRADICTING {
+        let lacking = (1.0 - correlation * correlation).max(0.0).sqrt();
+        return (lacking > LACKING).then(|| {
+            format!(
+                "light is that of height map {}, which lacks {:.0} % of the slopes of normal map \
+                 {}: without the height map, heights are integrated from the normals",
+                heights.path.display(),
+                100.0 * lacking,
+                normals.path.display()
+            )
+        });
     }
     let fixing_signs = [
         ([1.0, -1.0], "; with green (y) turned over they agree"),

@@ -105,6 +105,28 @@ fn maps_that_contradict_each_other_are_told_with_the_cure() {
     assert!(!note.contains("they agree"), "{note}");
 }
 
+/// Normals with another wave as steep as that of the heights: half of the squares are lacking.
+#[test]
+fn slopes_that_heights_lack_are_told() {
+    let (height, _) = waves(1.0, [1.0, 1.0]);
+    for (finer, told) in [(0.0, None), (1.0, Some("lacks 71 %"))] {
+        let normal = rgb_float(64, 64, |x, y| {
+            let [u, v] = [x, 63 - y].map(|c| (f64::from(c) + 0.5) / 64.0);
+            let wave = |c: f64| (TAU * c + 0.3).cos() + finer * (5.0 * TAU * c).cos();
+            let [u, v] = [u, v].map(|c| TAU * 0.25 / 2.0 * wave(c));
+            let length = u.hypot(v).hypot(1.0);
+            [-u, -v, 1.0].map(|c| (0.5 + 0.5 * c / length) as f32)
+        });
+        let dir = folder(&[("h.png", &height), ("n.exr", &normal)]);
+        let scene = square(&dir, "disp h.png\nnorm n.exr").unwrap();
+        let note = scene.notes.iter().find(|n| n.contains("lacks"));
+        assert_eq!(note.is_some(), told.is_some());
+        if let (Some(note), Some(told)) = (note, told) {
+            assert!(note.contains(told) && note.contains("h.png"), "{note}");
+        }
+    }
+}
+
 #[test]
 fn the_mean_angle_is_in_scene_units() {
     // A tile of 2 by 2 units: the slopes are half of those in texture space.
