@@ -15,7 +15,7 @@ use crate::scene::Scene;
 const OFF: f64 = 1e-9;
 /// Vertices with more triangles about them stay until others have gone.
 const MOST_ABOUT: usize = 64;
-/// Passes over all vertices; some 20 join a plane of a million triangles.
+/// Passes over all vertices; fewer are made once no vertex goes.
 const MOST_PASSES: usize = 100;
 
 /// A triangle of those that are left.
@@ -50,7 +50,7 @@ pub fn merged<K: Copy + PartialEq>(
 struct Sheet<'a, K> {
     places: &'a [DVec3],
     triangles: Vec<Merged<K>>,
-    /// `[triangle]`: of those that are gone, the same vertex twice.
+    /// Whether a triangle has not gone, `[triangle]`.
     is_left: Vec<bool>,
     /// Triangles about each vertex, `[vertex]`.
     about: Vec<Vec<u32>>,

@@ -12,8 +12,7 @@ const MOST_SAMPLES: u32 = 256;
 /// makes them agree.
 const CONTRADICTING: f64 = 0.5;
 const AGREEING: f64 = 0.8;
-/// Part of the normals' slopes that the heights lack, root mean square, worth a note: maps of 8 bit
-/// leave a tenth of gentle slopes to rounding.
+/// Part of the normals' slopes that the heights lack, root mean square, from which on a note says so.
 const LACKING: f64 = 0.3;
 
 /// One sentence for each note on a material that a triangle uses.
