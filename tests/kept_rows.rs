@@ -163,6 +163,50 @@ fn light_does_not_depend_on_memory_for_the_coupling() {
 }
 
 /// The count of shots and the order of sources repeat, whatever is kept.
+/// Light of rows in many buffers is one sum of all of them, in the order of the shots.
+#[test]
+fn light_does_not_depend_on_the_size_of_buffers() {
+    for relief in [false, true] {
+        let scene = Build::room_with_ball(relief).0.scene;
+        let solve = |chunk_bytes| {
+            let settings = Settings {
+                chunk_bytes,
+                ..settings()
+            };
+            let solver = bake::solve(&device(), &scene, &settings, None, |_| true);
+            let solver = solver.expect("the scene is solved");
+            let report = solver.report();
+            assert_eq!(report.kept_sources, report.sources, "all find room");
+            let folder = tempfile::tempdir().expect("a folder");
+            let path = folder.path().join("rows.visibility");
+            let kept = solver.visibility(&scene).expect("rows come back");
+            kept.expect("some").save(&path).expect("they are written");
+            let bytes = path.metadata().expect("a file").len();
+            (solver.light().expect("the light comes back"), bytes)
+        };
+        let (whole, bytes) = solve(Settings::default().chunk_bytes);
+        let (parts, _) = solve(CHUNK);
+        println!("relief {relief}: {bytes} bytes of rows");
+        assert!(bytes > 8 * CHUNK, "{bytes}");
+        for (a, b) in [
+            (&whole.irradiance_direct, &parts.irradiance_direct),
+            (&whole.irradiance, &parts.irradiance),
+            (&whole.radiosity, &parts.radiosity),
+        ] {
+            let differ = a.iter().zip(b).filter(|(a, b)| a != b).count();
+            assert_eq!(differ, 0, "of {}", a.len());
+        }
+        assert_eq!(whole.relief.is_some(), relief);
+        if let (Some(a), Some(b)) = (&whole.relief, &parts.relief) {
+            assert!(a.moments == b.moments && a.exitant == b.exitant);
+        }
+    }
+    assert_silent();
+}
+
+/// Bytes of a buffer with some rows.
+const CHUNK: u64 = 32 << 10;
+
 #[test]
 fn a_run_with_kept_rows_repeats_to_the_bit() {
     let runs = [(); 2].map(|()| solve(true, Some(100 << 10)));

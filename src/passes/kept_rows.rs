@@ -26,14 +26,16 @@ pub struct KeptRows {
 /// Batches under way at once, each with a chunk of its own for rows that find no room.
 pub const SCRATCH: u32 = 2;
 
-/// Bytes of a chunk, at most.
-const CHUNK: u64 = 256 << 20;
+/// Bytes of a chunk, at most, unless asked otherwise.
+pub const CHUNK_BYTES: u64 = 256 << 20;
 
 /// What the chunks are made for.
 #[derive(Debug, Clone, Copy)]
 pub struct KeptSize {
     /// Bytes, at most.
     pub memory: u64,
+    /// Bytes of a chunk, at most.
+    pub chunk: u64,
     /// Sources of the scene, and of a batch.
     pub sources: u32,
     pub slots: u32,
@@ -115,7 +117,9 @@ impl KeptRows {
     pub fn chunk_bytes(device: &Device, shape: RowShape, size: KeptSize) -> u64 {
         let most = size.memory.min(row_bytes(shape) * u64::from(size.sources));
         let texels = device.limits().max_texels * TEXEL_BYTES;
-        most.min(CHUNK).min(texels).next_multiple_of(TEXEL_BYTES)
+        most.min(size.chunk)
+            .min(texels)
+            .next_multiple_of(TEXEL_BYTES)
     }
 
     /// How far the chunks are filled by all that was submitted.

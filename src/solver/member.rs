@@ -118,6 +118,7 @@ impl Member {
         let most = VISIBILITY_MEMORY.min(device.limits().heap_bytes / 3);
         let size = KeptSize {
             memory: settings.visibility_memory.unwrap_or(most),
+            chunk: settings.chunk_bytes,
             sources: scene.source_count,
             slots: data.slots,
         };

@@ -12,6 +12,7 @@ use crate::mesh::sources::Grouping;
 use crate::meso;
 use crate::passes::PART_PAIRS;
 use crate::passes::cull::Culling;
+use crate::passes::kept_rows::CHUNK_BYTES;
 
 /// How form factors are taken from the item buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -93,6 +94,8 @@ pub struct Settings {
     /// room are drawn once more. None: [`VISIBILITY_MEMORY`], or a third of the device's memory if
     /// that is less.
     pub visibility_memory: Option<u64>,
+    /// Bytes of each buffer of such rows, at most. The light is the same.
+    pub chunk_bytes: u64,
     /// Bytes in the host's memory for the coupling between sources. What the sources beyond it send
     /// is found by gathering and measuring, again and again.
     pub coupling_memory: u64,
@@ -125,6 +128,7 @@ impl Default for Settings {
             list_room: None,
             part_pairs: PART_PAIRS,
             visibility_memory: None,
+            chunk_bytes: CHUNK_BYTES,
             coupling_memory: COUPLING_MEMORY,
             relief: meso::Options::default(),
             checkpoints: None,
@@ -187,6 +191,7 @@ impl Settings {
             // These do not affect the result.
             list_room: _,
             part_pairs: _,
+            chunk_bytes: _,
             checkpoints: _,
             visibility_memory,
             coupling_memory,
