@@ -1,5 +1,5 @@
 //! A bake keeps its result when stdout or stderr is closed, when the disk is full, and when Ctrl-C or
-//! another signal stops it.
+//! another signal stops it; a series keeps its pictures.
 #![cfg(unix)]
 
 use std::fs::File;
@@ -9,10 +9,15 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 fn bake(folder: &Path, more: &[&str]) -> Command {
+    let mut command = mesolux(folder, &["bake", "cornell", "--no-cache"]);
+    command.args(more);
+    command
+}
+
+fn mesolux(folder: &Path, args: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_mesolux"));
     command
-        .args(["bake", "cornell", "--no-cache"])
-        .args(more)
+        .args(args)
         .current_dir(folder)
         .stdout(Stdio::null())
         .stderr(Stdio::null())
@@ -36,6 +41,12 @@ const QUICK: [&str; 6] = [
 fn code(mut child: Child) -> i32 {
     let status = child.wait().expect("the program ran");
     status.code().expect("an exit code, not a signal")
+}
+
+fn send(signal: &str, child: &Child) {
+    let number = child.id().to_string();
+    let kill = Command::new("kill").args(["-s", signal, &number]).status();
+    assert!(kill.expect("kill runs").success());
 }
 
 #[test]
@@ -126,9 +137,7 @@ fn signals_stop_with_their_exit_codes_and_replace_nothing() {
             let device = lines.find(|line| line.contains("device: "));
             assert!(device.is_some(), "it begins");
             std::thread::sleep(Duration::from_millis(1500));
-            let number = child.id().to_string();
-            let kill = Command::new("kill").args(["-s", signal, &number]).status();
-            assert!(kill.expect("kill runs").success());
+            send(signal, &child);
             let rest: Vec<String> = lines.collect();
             assert_eq!(code(child), expected, "{signal}: {rest:?}");
             if earlier {
@@ -138,6 +147,32 @@ fn signals_stop_with_their_exit_codes_and_replace_nothing() {
             }
             std::fs::remove_file(&output).expect("a bake");
         }
+    }
+}
+
+/// A series that a signal stops keeps the pictures that are drawn, whole, and its exit code says so.
+#[test]
+fn a_stopped_series_keeps_its_pictures() {
+    const COUNT: usize = 400;
+    let folder = tempfile::tempdir().expect("a folder");
+    let baked = bake(folder.path(), &QUICK).status().expect("it runs");
+    assert!(baked.success());
+    let count = COUNT.to_string();
+    let series = ["--frames", &count, "--size", "64x48", "-o", "out.png"];
+    let mut command = mesolux(folder.path(), &["render", "box.safetensors"]);
+    let child = command.args(series).spawn().expect("the program starts");
+    let second = folder.path().join("out-0002.png");
+    while !second.exists() {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    send("INT", &child);
+    assert_eq!(code(child), 130);
+    let drawn = (1..=COUNT).map(|i| folder.path().join(format!("out-{i:04}.png")));
+    let drawn: Vec<_> = drawn.take_while(|path| path.exists()).collect();
+    println!("{} of {COUNT} pictures", drawn.len());
+    assert!((2..COUNT).contains(&drawn.len()));
+    for path in drawn {
+        image::open(&path).expect("a whole picture");
     }
 }
 
