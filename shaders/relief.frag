@@ -38,6 +38,9 @@ layout(scalar, binding = 13) readonly buffer Webs { float webs[]; };
 layout(binding = 14) uniform usamplerBuffer light_polygons;
 // See shared/horizons.glsl.
 layout(binding = 15) uniform usamplerBuffer horizons;
+// Straight borders of the relief, as the prisms count them: shares of their corners b and c at both
+// ends. The relief lies to the left, these shares taken for x and y.
+layout(binding = 16) uniform usamplerBuffer borders;
 
 // What a draw cannot need is left out of its pipeline: a software device works through every
 // branch.
@@ -51,6 +54,8 @@ layout(constant_id = 4) const uint CLUSTERED = 1;
 layout(constant_id = 5) const uint BEAMS = 1;
 // Ways to lights that are followed together.
 layout(constant_id = 6) const uint WAYS = 4;
+// Whether a relief has borders.
+layout(constant_id = 7) const uint BORDERS = 1;
 
 layout(push_constant, scalar) uniform Parameters {
     uint first_prism;    // of those of the material
@@ -176,10 +181,39 @@ struct Route {
     float chords;        // 0: straight
 };
 
+// Shares of a corner, or of a border, by which rounding may put a place beyond it.
+const float BORDER_ROUNDING = 1e-3;
+
+float crossed(vec2 a, vec2 b) {
+    return a.x * b.y - a.y * b.x;
+}
+
+// Where a way comes out of the relief by a border, internal units, for its place and its rates in
+// shares of the corners b and c.
+float border_of(Prism p, vec2 share, vec2 rates) {
+    float first = NEVER;
+    uint i = 0;
+    do {
+        vec4 line = fetch(borders, p.first_border + min(i, max(p.border_count, 1) - 1));
+        vec2 along = line.zw - line.xy;
+        vec2 to = line.xy - share;
+        float outward = crossed(rates, along);
+        float after = crossed(to, along) / outward;
+        float at = crossed(to, rates) / outward;
+        bool meets = i < p.border_count && outward > 0.0
+                     && after * max(abs(rates.x), abs(rates.y)) > -BORDER_ROUNDING
+                     && abs(at - 0.5) < 0.5 + BORDER_ROUNDING;
+        first = meets ? min(first, max(after, 0.0)) : first;
+        i++;
+    } while (any_lane(i < p.border_count));
+    return first;
+}
+
 // Over its own triangle the way is straight above the height map. Past it, the surface turns away
 // from the way as the smooth normals of the triangle say, by triangles like this one, so that the
 // way's height above it is a parabola: bumps beyond a triangle's horizon still rise into the light,
-// and the next triangle's do not shadow what they cannot.
+// and the next triangle's do not shadow what they cannot. At a border of the relief the way is out of
+// it.
 Route route_of(Prism p, ReliefSurface surface, HeightTile tile, Place place, Base base,
                vec3 towards) {
     // Slopes over the triangle, not over the tetrahedron of the place, at whose borders they jump.
@@ -204,7 +238,8 @@ Route route_of(Prism p, ReliefSurface surface, HeightTile tile, Place place, Bas
 
     route.leaves = local.z > 0.0 ? short_of / local.z : NEVER;
     float past = route.leaves - edge;
-    bool straight = past <= 0.0
+    float border = BORDERS == 1 ? border_of(p, place.share.yz, rates.yz) : NEVER;
+    bool straight = past <= 0.0 || border <= edge * (1.0 + BORDER_ROUNDING)
                     || local.z > 0.0
                            && abs(route.bend) * past * (past + chord) < 2.0 * STRAIGHT * rise;
 
@@ -213,25 +248,28 @@ Route route_of(Prism p, ReliefSurface surface, HeightTile tile, Place place, Bas
     float deepest = route.bend > 0.0 && route.slope < 0.0
                         ? at_edge - 0.5 * route.slope * route.slope / route.bend
                         : at_edge;
-    route.hidden = !straight
-                   && (deepest < surface.lowest || route.bend <= 0.0 && route.slope <= 0.0);
     // A surface that turns away lowers what is in the way.
     route.clear = place.on_surface && (straight || route.bend >= 0.0)
                   && rises_above(tile, place.uv, local);
+    bool sinks = route.bend <= 0.0 && route.slope <= 0.0;
     float square = route.slope * route.slope + 2.0 * route.bend * (surface.top - at_edge);
     // In a hollow the way may sink again before it is out: what shadows it then is the scene.
     float root = sqrt(max(square, 0.0));
-    route.run = route.slope > 0.0 && square > 0.0
+    float run = sinks ? NEVER
+              : route.slope > 0.0 && square > 0.0
                     ? 2.0 * (surface.top - at_edge) / (route.slope + root)
                     : (root - route.slope) / route.bend;
+    route.leaves = straight ? route.leaves : edge + run;
+    bool by_border = border < route.leaves;
+    route.leaves = by_border ? border : route.leaves;
+    route.hidden = !straight && !by_border && (deepest < surface.lowest || sinks);
+    route.run = by_border ? max(border - edge, 0.0) : run;
     // A chord of the parabola lies off it by bend / 8 times its length's square.
     float wanted = ceil(route.run * sqrt(abs(route.bend) / (8.0 * CHORD_OFF * rise)));
     route.chords = straight ? 0.0 : clamp(wanted, 1.0, MOST_CHORDS);
-    if (!straight) {
-        route.leaves = edge + route.run;
-    }
-    route.edge = straight ? vec3(route.from.xy + local.xy * route.leaves, surface.top)
-                          : vec3(route.from.xy + local.xy * edge, at_edge);
+    float over = straight ? route.leaves : edge;
+    float height = straight && !by_border ? surface.top : route.from.z + local.z * over;
+    route.edge = vec3(route.from.xy + local.xy * over, height);
     return route;
 }
 

@@ -1,5 +1,5 @@
-//! A bake keeps its result when stdout or stderr is closed, when the disk is full, and when Ctrl-C or
-//! another signal stops it; a series keeps its pictures.
+//! A bake keeps its result when stdout or stderr is closed, when the disk is full, and when Ctrl-C
+//! or another signal stops it; a series keeps its pictures.
 #![cfg(unix)]
 
 use std::fs::File;
@@ -150,7 +150,8 @@ fn signals_stop_with_their_exit_codes_and_replace_nothing() {
     }
 }
 
-/// A series that a signal stops keeps the pictures that are drawn, whole, and its exit code says so.
+/// A series that a signal stops keeps the pictures that are drawn, whole, and its exit code says
+/// so.
 #[test]
 fn a_stopped_series_keeps_its_pictures() {
     const COUNT: usize = 400;

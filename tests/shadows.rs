@@ -223,6 +223,37 @@ fn bumps_beyond_the_horizon_rise_into_the_light() {
     assert_silent();
 }
 
+/// Bumps that would go on past the border of their plate shadow nothing: ways to a lamp that stands
+/// low beside it leave the relief there, also by way of other triangles.
+#[test]
+fn relief_ends_with_its_surface() {
+    for cells in [2, 9] {
+        let mut build = Build::new();
+        let lamp = build.material(0.0, 30.0);
+        let plate = build.material(0.6, 0.0);
+        build.relief(plate, TEXELS, |x, y| 0.2 * REPEAT * bumps(x, y));
+        let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| REPEAT * axis);
+        // Less than a repeat, so that all of it is near the border.
+        let all = build.quad(DVec3::ZERO, 0.9 * z, 0.9 * x, (cells, cells), plate);
+        build.cover(all, plate, (DVec3::Z, DVec3::X));
+        let corner = 2.0 * x + 0.5 * y + 0.3 * z;
+        build.quad(corner, 0.2 * z, 0.2 * y, (1, 1), lamp);
+        build.weld();
+        let scene = build.0.scene;
+        let middle = 0.45 * (x + z);
+        let camera = camera(middle + 0.1 * x + 1.6 * y + 0.3 * z, middle, 45.0);
+        let (name, solution) = (format!("plate {cells}"), baked(&scene));
+        let found = compare(&name, &scene, &solution, Direct::Sharp, &camera);
+        assert!(found.bias.abs() < MOST_BORDER_BIAS && found.rms < MOST_BORDER_RMS);
+    }
+    assert_silent();
+}
+
+/// Measured: +0.01 %; where the relief went on, −3.84 %.
+const MOST_BORDER_BIAS: f64 = 0.001;
+/// Measured: 3.1 %, of which paths are most; where the relief went on, 28.7 %.
+const MOST_BORDER_RMS: f64 = 0.06;
+
 /// A lit pixel by its middle and by the mean of the paths through it, which jitter: what E changes
 /// by over half a pixel.
 const EVEN: f64 = 0.02;

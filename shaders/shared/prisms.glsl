@@ -40,7 +40,9 @@ Prism load_prism(uint prism) {
     p.texel = uintBitsToFloat(words[7].z);
     p.state = words[7].w;
     p.tangent = uintBitsToFloat(words[8].xyz);
+    p.first_border = words[8].w;
     p.bitangent = uintBitsToFloat(words[9].xyz);
+    p.border_count = words[9].w;
     p.normal = uintBitsToFloat(words[10].xyz);
     return p;
 }

@@ -209,13 +209,13 @@ struct Prism {
     float texel;        // internal units
     uint state;         // PART_… of the ways from it to the lights, past other surfaces
     vec3 tangent;       // frame of the triangle
-    uint unused_a;
+    uint first_border;  // of the relief, near it
     vec3 bitangent;
-    uint unused_b;
+    uint border_count;
     vec3 normal;
-    uint unused_c;
+    uint unused_a;
     vec3 slots;         // false colour of its light by direction
-    uint unused_d;
+    uint unused_b;
 };
 
 // A parallel light on a face, in place of the light from near-parallel directions.

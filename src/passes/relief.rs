@@ -35,6 +35,8 @@ pub struct Lights<'a> {
     pub parallel_lights: &'a [ParallelLight],
     /// [`Horizons::bounds`](crate::meso::Horizons::bounds), as the tiles count them.
     pub horizons: &'a [[u8; HORIZON_SECTORS as usize]],
+    /// Of the relief, as the prisms count them: shares of the corners b and c at both ends.
+    pub borders: &'a [Vec4],
 }
 
 /// [`Lights`] on the device.
@@ -44,6 +46,7 @@ pub struct Buffers {
     exits: Buffer,
     parallel_lights: Buffer,
     horizons: Buffer,
+    borders: Buffer,
 }
 
 /// The prisms of one material.
@@ -64,6 +67,8 @@ pub struct Kind {
     pub sharp: bool,
     pub clustered: bool,
     pub lights: LightKinds,
+    /// Whether the relief has borders.
+    pub borders: bool,
 }
 
 pub struct Relief {
@@ -79,7 +84,8 @@ impl Relief {
     /// A device that fails.
     pub fn new(device: &Arc<Device>, shade: &Shade, kind: Kind) -> Result<Self> {
         let lit = [kind.factored, kind.sharp, kind.clustered, kind.lights.beams].map(u32::from);
-        let constants = [&[kind.shading, kind.view], &lit[..], &[kind.lights.ways]].concat();
+        let last = [kind.lights.ways, kind.borders.into()];
+        let constants = [&[kind.shading, kind.view], &lit[..], &last].concat();
         Ok(Self {
             pipeline: GraphicsPipeline::new(
                 device,
@@ -135,6 +141,7 @@ impl Relief {
                 webs: &lights.webs,
                 light_polygons: &lights.polygons,
                 horizons: &buffers.horizons,
+                borders: &buffers.borders,
             },
         )
     }
@@ -160,6 +167,7 @@ impl Buffers {
             exits: upload(device, "relief exits", lights.exits, texels)?,
             parallel_lights: upload(device, "relief clusters", lights.parallel_lights, texels)?,
             horizons: upload(device, "relief horizons", lights.horizons, texels)?,
+            borders: upload(device, "relief borders", lights.borders, texels)?,
         })
     }
 }

@@ -21,6 +21,7 @@ mod mesh;
 mod overdraw;
 mod parts;
 mod relief;
+mod relief_borders;
 mod relief_mesh;
 mod relief_scene;
 mod relief_surfaces;

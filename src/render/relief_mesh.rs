@@ -102,6 +102,7 @@ impl ReliefMesh {
                 difference,
             ),
             lit: LightVertices::default(),
+            borders: Vec::new(),
         };
         let mut list: Vec<Prism> = (0..faces.len())
             .map(|i| {
@@ -115,10 +116,7 @@ impl ReliefMesh {
         }
         let mut states = [0; 3];
         list.iter().for_each(|p| states[p.state as usize] += 1);
-        let mirrored: Vec<bool> = faces
-            .iter()
-            .map(|face| matches!(face.corners, [0, 2, 1] | [1, 0, 2] | [2, 1, 0]))
-            .collect();
+        let mirrored: Vec<bool> = faces.iter().map(is_mirrored).collect();
         let shape = Shape {
             prisms: &list,
             mirrored: &mirrored,
@@ -136,6 +134,7 @@ impl ReliefMesh {
             exits: &prisms.lit.exits,
             parallel_lights: &clusters.as_ref().map_or_else(Vec::new, parallel_lights),
             horizons: &kept.surfaces.horizons,
+            borders: &prisms.borders,
         };
         Ok(Self {
             shape: ShapeBuffers::new(device, &shape)?,
@@ -161,6 +160,10 @@ fn corners_by_vertex(triangle: &Triangle) -> [usize; 3] {
     let mut corners = [0, 1, 2];
     corners.sort_by_key(|&k| triangle.vertices[k]);
     corners
+}
+
+fn is_mirrored(face: &Face) -> bool {
+    matches!(face.corners, [0, 2, 1] | [1, 0, 2] | [2, 1, 0])
 }
 
 /// Runs of equal materials, `[prism]`.
@@ -234,6 +237,8 @@ struct PrismBuilder<'a> {
     /// Moments of the part of the light that is shown, `[meso element][slot][colour]`.
     shown: Vec<[Vec3; 3]>,
     lit: LightVertices,
+    /// Of the relief, near each prism: shares of its corners b and c at both ends.
+    borders: Vec<Vec4>,
 }
 
 impl PrismBuilder<'_> {
@@ -262,6 +267,8 @@ impl PrismBuilder<'_> {
             .corners
             .map(|k| self.light_vertex(self.kept.vertices.corners[m][k], surface));
         let [tangent, bitangent, normal] = self.light.frames[m];
+        let first_border = self.borders.len() as u32;
+        self.add_borders(e, face);
         let k = self.kept.directions.count();
         Prism {
             low_a: low[0],
@@ -278,6 +285,8 @@ impl PrismBuilder<'_> {
             light_c,
             surface,
             tangent,
+            first_border,
+            border_count: self.borders.len() as u32 - first_border,
             texel: (texel.min_element() / projection.unit) as f32,
             bitangent,
             normal,
@@ -285,6 +294,22 @@ impl PrismBuilder<'_> {
             cluster_count: clusters.1,
             slots: slot_colour(&self.kept.directions, &self.shown[m * k..][..k]),
             ..Prism::zeroed()
+        }
+    }
+
+    fn add_borders(&mut self, triangle: usize, face: &Face) {
+        for &border in self.kept.borders.of(triangle) {
+            let [from, to] = border.map(|at| {
+                let shares = [1.0 - at.x - at.y, at.x, at.y];
+                DVec2::new(shares[face.corners[1]], shares[face.corners[2]])
+            });
+            let ends = if is_mirrored(face) {
+                [to, from]
+            } else {
+                [from, to]
+            };
+            let [from, to] = ends.map(|at| at.as_vec2());
+            self.borders.push(Vec4::new(from.x, from.y, to.x, to.y));
         }
     }
 

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::lights::light_kinds;
+use super::relief_borders::{Borders, Relief as OfTriangle};
 use super::relief_surfaces::Surfaces;
 use super::{Light, Lighting, ReliefShading, Show};
 use crate::bake::marcher;
@@ -39,6 +40,8 @@ pub struct ReliefScene {
     pub tiles: Vec<Tile>,
     /// Index into `tiles`, `[triangle]`; `u32::MAX` for triangles without.
     pub surface_of: Vec<u32>,
+    /// None where no lights are drawn sharply.
+    pub borders: Borders,
     /// `[surface]`, in the order of `tiles`.
     pub factors: Vec<Arc<Factors>>,
     pub surfaces: Surfaces,
@@ -60,6 +63,7 @@ fn kind(scene: &Scene, lighting: &Lighting<'_>, shading: u32) -> Kind {
         sharp,
         clustered,
         lights: light_kinds(scene),
+        borders: false,
     }
 }
 
@@ -101,8 +105,18 @@ impl ReliefScene {
             ))
         })?;
         let vertices = MesoVertices::new(scene, &light.elements, &light.frames);
-        let lit = kind(scene, lighting, shading);
+        let mut lit = kind(scene, lighting, shading);
         let skipped = lighting.skip_open && (lit.sharp || lit.clustered);
+        let surfaces = Surfaces::new(scene, &tiles, &factors, skipped);
+        let relief = |i: usize| {
+            let surface = surface_of[i];
+            (lit.sharp && surface != u32::MAX).then(|| OfTriangle {
+                surface,
+                rise: surfaces.ranges[surface as usize].rise(),
+            })
+        };
+        let borders = Borders::new(scene, relief);
+        lit.borders = !borders.is_empty();
         let gather = |moments| vertices.gather(&directions, &light.frames, moments);
         Ok(Some(Self {
             passes: Arc::new(match lighting.show {
@@ -114,10 +128,11 @@ impl ReliefScene {
                     Relief::new(device, shade, lit)?,
                 ),
             }),
-            surfaces: Surfaces::new(scene, &tiles, &factors, skipped),
+            surfaces,
             all: gather(&light.incident_moment),
             direct: gather(&light.incident_moment_direct),
             directions,
+            borders,
             tiles,
             surface_of,
             factors,

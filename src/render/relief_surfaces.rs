@@ -42,6 +42,11 @@ impl HeightRange {
         }
     }
 
+    /// From the lowest to the highest, scene units.
+    pub fn rise(&self) -> f64 {
+        self.scale * (self.highest - self.lowest)
+    }
+
     /// Scene units above the mesh.
     pub fn above(&self, height: f64) -> f64 {
         self.scale * (height - self.mean)
