@@ -78,12 +78,17 @@ struct Line {
 }
 
 fn lines(scene: &Scene, relief: &impl Fn(usize) -> Option<Relief>) -> Vec<Line> {
+    // The first vertex at a place stands for all.
     let mut places: HashMap<[u64; 3], u32> = HashMap::new();
+    let mut known = vec![u32::MAX; scene.vertices.len()];
     let mut place = |v: u32| {
-        // The sum makes -0 and 0 equal.
-        let at = (scene.vertices[v as usize] + DVec3::ZERO).to_array();
-        let next = places.len() as u32;
-        *places.entry(at.map(f64::to_bits)).or_insert(next)
+        let known = &mut known[v as usize];
+        if *known == u32::MAX {
+            // The sum makes -0 and 0 equal.
+            let at = (scene.vertices[v as usize] + DVec3::ZERO).to_array();
+            *known = *places.entry(at.map(f64::to_bits)).or_insert(v);
+        }
+        *known
     };
     let mut edges = Vec::new();
     for (i, triangle) in scene.triangles.iter().enumerate() {
@@ -95,7 +100,7 @@ fn lines(scene: &Scene, relief: &impl Fn(usize) -> Option<Relief>) -> Vec<Line> 
             }
         }
     }
-    edges.sort_unstable();
+    edges.par_sort_unstable();
     let lone: Vec<_> = edges
         .chunk_by(|a, b| a.0 == b.0)
         .filter_map(|same| match same {
