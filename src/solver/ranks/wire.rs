@@ -28,11 +28,11 @@ pub(super) const ASKED: Tag = 1;
 const PIECE: usize = 1 << 28;
 
 /// Between two looks for a message.
-const SHORTEST_WAIT: Duration = Duration::from_micros(20);
-const LONGEST_WAIT: Duration = Duration::from_micros(500);
+const SHORTEST_WAIT: Duration = Duration::from_micros(100);
+const LONGEST_WAIT: Duration = Duration::from_millis(1);
 
 /// Between two calls of MPI while nothing is asked, once nothing was given for so long.
-const PROGRESS: Duration = Duration::from_millis(1);
+const PROGRESS: Duration = Duration::from_millis(10);
 const SOON: Duration = Duration::from_millis(20);
 
 /// Bytes that may be given and not yet taken, of which a gift may take a share: there are
