@@ -161,9 +161,11 @@ fn a_stopped_series_keeps_its_pictures() {
     let count = COUNT.to_string();
     let series = ["--frames", &count, "--size", "64x48", "-o", "out.png"];
     let mut command = mesolux(folder.path(), &["render", "box.safetensors"]);
-    let child = command.args(series).spawn().expect("the program starts");
+    let mut child = command.args(series).spawn().expect("the program starts");
     let second = folder.path().join("out-0002.png");
     while !second.exists() {
+        let ended = child.try_wait().expect("the program runs");
+        assert!(ended.is_none(), "it ends without pictures: {ended:?}");
         std::thread::sleep(Duration::from_millis(5));
     }
     send("INT", &child);

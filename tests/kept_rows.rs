@@ -162,7 +162,6 @@ fn light_does_not_depend_on_memory_for_the_coupling() {
     assert_silent();
 }
 
-/// The count of shots and the order of sources repeat, whatever is kept.
 /// Light of rows in many buffers is one sum of all of them, in the order of the shots.
 #[test]
 fn light_does_not_depend_on_the_size_of_buffers() {
@@ -207,6 +206,7 @@ fn light_does_not_depend_on_the_size_of_buffers() {
 /// Bytes of a buffer with some rows.
 const CHUNK: u64 = 32 << 10;
 
+/// The count of shots and the order of sources repeat, whatever is kept.
 #[test]
 fn a_run_with_kept_rows_repeats_to_the_bit() {
     let runs = [(); 2].map(|()| solve(true, Some(100 << 10)));
