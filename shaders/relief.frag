@@ -56,6 +56,8 @@ layout(constant_id = 5) const uint BEAMS = 1;
 layout(constant_id = 6) const uint WAYS = 4;
 // Whether a relief has borders.
 layout(constant_id = 7) const uint BORDERS = 1;
+// See shared/height_march.glsl.
+layout(constant_id = 8) const uint LEVELS = 1;
 
 layout(push_constant, scalar) uniform Parameters {
     uint first_prism;    // of those of the material

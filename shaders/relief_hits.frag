@@ -25,6 +25,8 @@ layout(push_constant, scalar) uniform Parameters {
     float pixel;         // angle of a sample
 };
 
+// Rays of the eye may be long.
+const uint LEVELS = 1;
 #include "shared/height_march.glsl"
 #include "shared/prisms.glsl"
 #include "shared/relief_hit.glsl"

@@ -8,6 +8,9 @@
 
 layout(local_size_x = GROUP) in;
 
+// See shared/height_march.glsl.
+layout(constant_id = 0) const uint LEVELS = 1;
+
 layout(scalar, binding = 0) readonly buffer Tiles { HeightTile tiles[]; };
 layout(binding = 1) uniform usamplerBuffer pyramid;
 layout(scalar, binding = 2) readonly buffer Rays { HeightRay rays[]; };

@@ -1,7 +1,9 @@
 // Where a straight segment first passes below a bilinear, periodic height map: exact, by the
 // pyramid of maxima of src/meso/height_pyramid.rs. Including files have shared/types.glsl,
-// shared/texels.glsl and a `usamplerBuffer pyramid`, four values a texel; the steps of all marches
-// are added to the variable ALL_STEPS if there is one.
+// shared/texels.glsl, a `usamplerBuffer pyramid`, four values a texel, and LEVELS, 0 where marches
+// go from cell to cell without the pyramid: short ones are done sooner so, as a software device
+// works through what a branch leaves out. The steps of all marches are added to the variable
+// ALL_STEPS if there is one.
 //
 // Lengths are in texels here, x along columns and y along rows (down the image, against v), heights
 // as the map has them. A texel's centre has whole coordinates. f32 keeps no more than 1e-4 of a
@@ -169,60 +171,64 @@ bool march(HeightTile tile, vec3 from, vec3 to, out HeightHit hit) {
         float gone = min(min(leave.x, leave.y), left);
         vec3 along = gone * step;
 
-        // Look closer where it comes below the highest of the block.
+        // Look closer where it comes below the highest of the block. No `continue`: it would have
+        // the whole loop in a branch.
         float highest = value_of_pyramid(first + block.y * blocks.x + block.x);
-        bool near = min(at.z, at.z + along.z) < highest;
-        if (near) {
-            if (level > 0) {
-                level--;
-                blocks = (size + ((1 << level) - 1)) >> level;
-                first -= blocks.x * blocks.y;
-                continue;
-            }
-            Patch patch_here = patch_of(tile, cell);
-            float r = crossing(patch_here, at, along);
-            if (r >= 0.0) {
-                vec2 p = clamp(at.xy + r * along.xy, 0.0, 1.0);
-                hit.t = t.x + (t.y + r * gone);
-                hit.cell = cell.y * tile.width + cell.x;
-                hit.local = p;
-                hit.height = patch_here.corner + (dot(patch_here.slope, p) + patch_here.twist * p.x * p.y);
-                hit.gradient = (patch_here.slope + patch_here.twist * p.yx) * vec2(float(tile.width), -float(tile.height));
-                return true;
-            }
-        }
-        if (gone >= left) {
-            return false;
-        }
-
-        // Move over the border. The line that is crossed is known exactly; the other coordinate
-        // only goes forward, and stays in the block.
-        bvec2 over = bvec2(leave.x <= leave.y, leave.x > leave.y);
-        ivec2 least = mix(low, cell, forward);
-        ivec2 greatest = mix(cell, high - 1, forward);
-        ivec2 next = clamp(cell + ivec2(floor(at.xy + along.xy)), least, greatest);
-        next = mix(next, mix(low - 1, high, forward), over);
-        precise float sum = t.x + (t.y + gone);
-        precise float rest = (t.x - sum) + (t.y + gone);
-        t = vec2(sum, rest);
-        at = place_at(segment, t, period + next);
-        vec2 edge = mix(vec2(1.0), vec2(0.0), forward);
-        float late = over.x ? (edge.x - at.x) / step.x : (edge.y - at.y) / step.y;
-        t.y += late;
-        at += late * step;
-        ivec2 true_next = mix(clamp(next + ivec2(floor(at.xy)), least, greatest), next, over);
-        at.xy = mix(clamp(at.xy - vec2(true_next - next), 0.0, 1.0), edge, over);
-        next = true_next;
-
-        // Go on in the next period; climb where nothing was near, if a larger block was left too.
-        ivec2 wrap = ivec2(greaterThanEqual(next, size)) - ivec2(lessThan(next, ivec2(0)));
-        bool left_larger = wrap != ivec2(0) || (next >> (level + 1)) != (cell >> (level + 1));
-        period += wrap * size;
-        cell = next - wrap * size;
-        if (!near && left_larger && level < tile.top) {
-            first += blocks.x * blocks.y;
-            level++;
+        bool near = LEVELS == 0 || min(at.z, at.z + along.z) < highest;
+        bool closer = LEVELS == 1 && near && level > 0;
+        if (closer) {
+            level--;
             blocks = (size + ((1 << level) - 1)) >> level;
+            first -= blocks.x * blocks.y;
+        }
+        if (!closer) {
+            if (near) {
+                Patch patch_here = patch_of(tile, cell);
+                float r = crossing(patch_here, at, along);
+                if (r >= 0.0) {
+                    vec2 p = clamp(at.xy + r * along.xy, 0.0, 1.0);
+                    hit.t = t.x + (t.y + r * gone);
+                    hit.cell = cell.y * tile.width + cell.x;
+                    hit.local = p;
+                    hit.height = patch_here.corner + (dot(patch_here.slope, p) + patch_here.twist * p.x * p.y);
+                    hit.gradient = (patch_here.slope + patch_here.twist * p.yx) * vec2(float(tile.width), -float(tile.height));
+                    return true;
+                }
+            }
+            if (gone >= left) {
+                return false;
+            }
+
+            // Move over the border. The line that is crossed is known exactly; the other coordinate
+            // only goes forward, and stays in the block.
+            bvec2 over = bvec2(leave.x <= leave.y, leave.x > leave.y);
+            ivec2 least = mix(low, cell, forward);
+            ivec2 greatest = mix(cell, high - 1, forward);
+            ivec2 next = clamp(cell + ivec2(floor(at.xy + along.xy)), least, greatest);
+            next = mix(next, mix(low - 1, high, forward), over);
+            precise float sum = t.x + (t.y + gone);
+            precise float rest = (t.x - sum) + (t.y + gone);
+            t = vec2(sum, rest);
+            at = place_at(segment, t, period + next);
+            vec2 edge = mix(vec2(1.0), vec2(0.0), forward);
+            float late = over.x ? (edge.x - at.x) / step.x : (edge.y - at.y) / step.y;
+            t.y += late;
+            at += late * step;
+            ivec2 true_next = mix(clamp(next + ivec2(floor(at.xy)), least, greatest), next, over);
+            at.xy = mix(clamp(at.xy - vec2(true_next - next), 0.0, 1.0), edge, over);
+            next = true_next;
+
+            // Go on in the next period; climb where nothing was near, if a larger block was left
+            // too.
+            ivec2 wrap = ivec2(greaterThanEqual(next, size)) - ivec2(lessThan(next, ivec2(0)));
+            bool left_larger = wrap != ivec2(0) || (next >> (level + 1)) != (cell >> (level + 1));
+            period += wrap * size;
+            cell = next - wrap * size;
+            if (LEVELS == 1 && !near && left_larger && level < tile.top) {
+                first += blocks.x * blocks.y;
+                level++;
+                blocks = (size + ((1 << level) - 1)) >> level;
+            }
         }
     } while (++count < most);
     return false;

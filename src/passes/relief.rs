@@ -69,6 +69,8 @@ pub struct Kind {
     pub lights: LightKinds,
     /// Whether the relief has borders.
     pub borders: bool,
+    /// Whether marches use the levels of the pyramid.
+    pub levels: bool,
 }
 
 pub struct Relief {
@@ -84,7 +86,7 @@ impl Relief {
     /// A device that fails.
     pub fn new(device: &Arc<Device>, shade: &Shade, kind: Kind) -> Result<Self> {
         let lit = [kind.factored, kind.sharp, kind.clustered, kind.lights.beams].map(u32::from);
-        let last = [kind.lights.ways, kind.borders.into()];
+        let last = [kind.lights.ways, kind.borders.into(), kind.levels.into()];
         let constants = [&[kind.shading, kind.view], &lit[..], &last].concat();
         Ok(Self {
             pipeline: GraphicsPipeline::new(

@@ -18,9 +18,14 @@ pub struct ReliefRays {
 const SUBMISSION: u32 = 1 << 18;
 
 impl ReliefRays {
-    pub fn new(device: &Arc<Device>) -> Result<Self> {
+    /// With the levels of the pyramid, or from cell to cell.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn new(device: &Arc<Device>, levels: bool) -> Result<Self> {
+        let constants = [levels.into()];
         Ok(Self {
-            pipeline: ComputePipeline::new(device, "relief rays", &SHADER)?,
+            pipeline: ComputePipeline::with_constants(device, "relief rays", &SHADER, &constants)?,
             device: Arc::clone(device),
         })
     }

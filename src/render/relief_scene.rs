@@ -64,6 +64,7 @@ fn kind(scene: &Scene, lighting: &Lighting<'_>, shading: u32) -> Kind {
         clustered,
         lights: light_kinds(scene),
         borders: false,
+        levels: true,
     }
 }
 
@@ -117,6 +118,7 @@ impl ReliefScene {
         };
         let borders = Borders::new(scene, relief);
         lit.borders = !borders.is_empty();
+        lit.levels = lit.clustered || surfaces.long_ways;
         let gather = |moments| vertices.gather(&directions, &light.frames, moments);
         Ok(Some(Self {
             passes: Arc::new(match lighting.show {

@@ -16,6 +16,10 @@ use crate::scene::{HeightMap, Material, Scene};
 /// Prisms reach beyond the relief's range by this share of it, so that every ray begins above it.
 const MARGIN: f64 = 1e-3;
 
+/// Ways to lights through a relief that rises by no more texels are followed from cell to cell: of
+/// 2.5 texels that takes a frame of `cornell-relief` 8 % less time, of 10 as much as with levels.
+const SHORT: f64 = 4.0;
+
 /// Heights of a relief's prisms, in the map's values with the sign of their scale.
 pub struct HeightRange {
     pub lowest: f64,
@@ -59,6 +63,8 @@ pub struct Surfaces {
     pub list: Vec<ReliefSurface>,
     pub tiles: Vec<HeightTile>,
     pub ranges: Vec<HeightRange>,
+    /// Whether a relief rises by many texels, so that ways to lights pass many of them.
+    pub long_ways: bool,
     /// Sine of the steepest slope's angle: a ray that rises more steeply meets the relief only from
     /// below.
     pub steepest: Vec<f64>,
@@ -107,6 +113,8 @@ impl Surfaces {
                 slope: (range.scale / tile.size).as_vec2(),
                 ..ReliefSurface::zeroed()
             });
+            let texel = tile.size / DVec2::new(f64::from(map.width), f64::from(map.height));
+            all.long_ways |= range.rise() > SHORT * texel.min_element();
             all.steepest.push(tile.field.steepest());
             all.tiles.push(height_tile);
             all.ranges.push(range);
