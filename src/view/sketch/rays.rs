@@ -10,8 +10,9 @@ use super::lights::{Change, Light, Spot};
 use crate::bake::solution::DirectionalLight;
 use crate::error::Result;
 use crate::mesh::corners::{Corners, Joined};
-use crate::scene::Scene;
+use crate::mesh::merged::merged;
 use crate::scene::geometry::{ABOVE, Geometry};
+use crate::scene::{Material, Scene, Triangle};
 use crate::view::corner_light::{CornerLight, Slant, Slanted, at_corners, slant};
 use crate::view::snapshot::Snapshot;
 
@@ -22,9 +23,12 @@ type Brought = Arc<[Vec3]>;
 /// Bytes of what is remembered of lights where they were.
 const REMEMBERED: usize = 64 << 20;
 
-/// The triangles as rays see them.
+/// What rays lead between.
 pub(super) struct Rays {
+    /// What stands in their way: whole planes, which rays pass sooner than what they were cut into.
     geometry: Geometry,
+    /// Middles, internal units, and areas, square ones, `[triangle]`.
+    places: Vec<(DVec3, f64)>,
     /// Materials whose triangles they do not see: emitters that move.
     pub without: Vec<usize>,
     /// Of the last lights that were asked for.
@@ -33,20 +37,31 @@ pub(super) struct Rays {
 
 impl Rays {
     pub fn new(scene: &Scene, without: Vec<usize>) -> Result<Self> {
-        let geometry = match without.is_empty() {
-            true => Geometry::new(scene)?,
-            false => {
-                let mut scene = scene.clone();
-                // No ray meets a triangle without area.
-                for t in &mut scene.triangles {
-                    if without.contains(&(t.material as usize)) {
-                        t.vertices = [t.vertices[0]; 3];
-                    }
-                }
-                Geometry::new(&scene)?
-            }
+        let stands = |i: usize| !without.contains(&(scene.triangles[i].material as usize));
+        let joined = merged(scene, |i| stands(i).then_some(()));
+        let mut casters = Scene {
+            name: scene.name.clone(),
+            vertices: scene.vertices.clone(),
+            triangles: (joined.iter())
+                .map(|t| Triangle {
+                    vertices: t.vertices,
+                    ..Triangle::default()
+                })
+                .collect(),
+            materials: vec![Material::default()],
+            ..Scene::default()
+        };
+        if casters.triangles.is_empty() {
+            // No ray meets a triangle without area.
+            casters.triangles.push(Triangle::default());
+        }
+        let geometry = Geometry::new(&casters)?;
+        let place = |t: &Triangle| {
+            let [a, b, c] = scene.corners(t).map(|p| geometry.inside(p));
+            ((a + b + c) / 3.0, 0.5 * (b - a).cross(c - a).length())
         };
         Ok(Self {
+            places: scene.triangles.par_iter().map(place).collect(),
             geometry,
             without,
             known: VecDeque::new(),
@@ -100,53 +115,53 @@ impl Rays {
         if let Some((_, brought)) = self.known.iter().find(|(known, _)| same(known)) {
             return Arc::clone(brought);
         }
-        let brought: Brought = brought(&self.geometry, about, light).into();
+        let brought: Brought = self.find(about, light).into();
         let room = (REMEMBERED / size_of_val(&*brought).max(1)).max(2);
         self.known.truncate(room - 1);
         self.known.push_front((light.clone(), Arc::clone(&brought)));
         brought
     }
-}
 
-/// As [`Brought`]. A triangle is taken for a disc, so that a light that touches it brings as much
-/// as it sends to that side.
-fn brought(geometry: &Geometry, about: &Corners, light: &Light) -> Vec<Vec3> {
-    let square = geometry.unit * geometry.unit;
-    // From a place that sends so much in a direction, internal units.
-    let from = |e: usize, normal: DVec3, at: DVec3, own: f64, sent: &dyn Fn(DVec3) -> f64| {
-        let [a, b, c] = geometry.corners(e);
-        let middle = (a + b + c) / 3.0;
-        let way = at - middle;
-        if normal.dot(way) <= 0.0 {
-            return DVec3::ZERO;
-        }
-        let share = sent(-way);
-        if share <= 0.0 || !geometry.sees(middle + ABOVE * normal, at) {
-            return DVec3::ZERO;
-        }
-        let area = 0.5 * (b - a).cross(c - a).length() + own / square;
-        let spread = (way.length_squared() + area / std::f64::consts::TAU) * square;
-        way.normalize() * (share / spread)
-    };
-    let to_triangle = |(e, &normal): (usize, &DVec3)| match light {
-        Light::Point(light) => {
-            let at = geometry.inside(light.position);
-            from(e, normal, at, 0.0, &|way| light.share(way)).as_vec3()
-        }
-        Light::Emitter(spots) => {
-            let of = |spot: &Spot| {
-                let sent = |way: DVec3| spot.area * spot.normal.dot(way.normalize_or_zero());
-                from(e, normal, geometry.inside(spot.at), spot.area, &sent)
-            };
-            spots.iter().map(of).sum::<DVec3>().as_vec3()
-        }
-    };
-    about
-        .normals
-        .par_iter()
-        .enumerate()
-        .map(to_triangle)
-        .collect()
+    /// As [`Brought`]. A triangle is taken for a disc, so that a light that touches it brings as
+    /// much as it sends to that side.
+    fn find(&self, about: &Corners, light: &Light) -> Vec<Vec3> {
+        let geometry = &self.geometry;
+        let square = geometry.unit * geometry.unit;
+        // From a place that sends so much in a direction, internal units.
+        let from = |e: usize, normal: DVec3, at: DVec3, own: f64, sent: &dyn Fn(DVec3) -> f64| {
+            let (middle, area) = self.places[e];
+            let way = at - middle;
+            if normal.dot(way) <= 0.0 {
+                return DVec3::ZERO;
+            }
+            let share = sent(-way);
+            if share <= 0.0 || !geometry.sees(middle + ABOVE * normal, at) {
+                return DVec3::ZERO;
+            }
+            let area = (area + own / square) / std::f64::consts::TAU;
+            let spread = (way.length_squared() + area) * square;
+            way.normalize() * (share / spread)
+        };
+        let to_triangle = |(e, &normal): (usize, &DVec3)| match light {
+            Light::Point(light) => {
+                let at = geometry.inside(light.position);
+                from(e, normal, at, 0.0, &|way| light.share(way)).as_vec3()
+            }
+            Light::Emitter(spots) => {
+                let of = |spot: &Spot| {
+                    let sent = |way: DVec3| spot.area * spot.normal.dot(way.normalize_or_zero());
+                    from(e, normal, geometry.inside(spot.at), spot.area, &sent)
+                };
+                spots.iter().map(of).sum::<DVec3>().as_vec3()
+            }
+        };
+        about
+            .normals
+            .par_iter()
+            .enumerate()
+            .map(to_triangle)
+            .collect()
+    }
 }
 
 /// How light depends on the slopes of `relief` after these lights were added, those before with
