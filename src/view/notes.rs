@@ -49,8 +49,8 @@ impl Notes {
         self.0.iter().map(|note| note.until).min()
     }
 
-    /// Shows them at the lower edge, the newest at the bottom.
-    pub fn show(&mut self, context: &Context) {
+    /// Shows them so many points above the lower edge, the newest at the bottom.
+    pub fn show(&mut self, context: &Context, above: f32) {
         let now = Instant::now();
         self.0.retain(|note| note.until > now);
         if self.0.is_empty() {
@@ -59,7 +59,7 @@ impl Notes {
         let most = context.content_rect().width() - 32.0;
         egui::Area::new(Id::new("notes"))
             .order(Order::Tooltip)
-            .anchor(Align2::CENTER_BOTTOM, vec2(0.0, -12.0))
+            .anchor(Align2::CENTER_BOTTOM, vec2(0.0, -12.0 - above))
             .interactable(false)
             .show(context, |ui| {
                 ui.set_max_width(most);

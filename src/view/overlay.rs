@@ -149,8 +149,9 @@ pub fn bounds(ui: &mut Ui, bounds: &[[f64; 2]]) {
     painter.add(Shape::line(points.collect(), stroke));
 }
 
-/// What the overlays that are shown mean, in the lower left corner of the view.
-pub fn legend(painter: &Painter, corner: Pos2, lines: &[&str]) {
+/// What the overlays that are shown mean, in the lower left corner of the view. Returns how high it
+/// is.
+pub fn legend(painter: &Painter, corner: Pos2, lines: &[&str]) -> f32 {
     let font = egui::FontId::proportional(12.0);
     let mut at = corner;
     for line in lines.iter().rev() {
@@ -161,6 +162,7 @@ pub fn legend(painter: &Painter, corner: Pos2, lines: &[&str]) {
         painter.rect_filled(place, 3.0, Color32::from_black_alpha(190));
         painter.galley(at, text, Color32::WHITE);
     }
+    corner.y - at.y + 4.0
 }
 
 /// A mark where a point light is, with its name where it is chosen.

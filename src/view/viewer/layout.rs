@@ -81,14 +81,14 @@ impl Viewer {
         let context = self.egui.clone();
         let mut asked = Vec::new();
         let output = context.run(raw, |context| {
-            self.marks(context, (width, height));
+            let legend = self.marks(context, (width, height));
             if self.switches.panel {
                 asked = self.controls(context);
             }
             panel::show_keys(context, &mut self.switches.keys);
             self.draw_dialog(context);
             if self.switches.notes {
-                self.notes.show(context);
+                self.notes.show(context, legend);
             }
         });
         for asked in asked {
@@ -177,8 +177,8 @@ impl Viewer {
         panel::show(context, &status, &mut changed)
     }
 
-    /// What is shown over the view means, or what is being done.
-    fn draw_legend(&self, painter: &egui::Painter, (_, height): (u32, u32)) {
+    /// What is shown over the view means, or what is being done. Returns how high it is.
+    fn draw_legend(&self, painter: &egui::Painter, (_, height): (u32, u32)) -> f32 {
         let Switches {
             elements,
             sources,
@@ -213,7 +213,7 @@ impl Viewer {
             false => 14.0,
         };
         let corner = egui::pos2(left, height as f32 / self.scale - 10.0);
-        overlay::legend(painter, corner, &lines);
+        overlay::legend(painter, corner, &lines)
     }
 
     /// One line about an element.
@@ -228,8 +228,9 @@ impl Viewer {
         )
     }
 
-    /// Draws marks of lights, light by direction and an item buffer over the view.
-    fn marks(&mut self, context: &egui::Context, size: (u32, u32)) {
+    /// Draws marks of lights, light by direction, an item buffer and a legend over the view. Returns
+    /// how high the legend is.
+    fn marks(&mut self, context: &egui::Context, size: (u32, u32)) -> f32 {
         let layer = egui::LayerId::new(egui::Order::Background, egui::Id::new("marks"));
         let mut beside = context.content_rect();
         if self.switches.panel {
@@ -244,9 +245,10 @@ impl Viewer {
             }
         }
         self.draw_line(&painter, size);
-        if self.switches.notes {
-            self.draw_legend(&painter, size);
-        }
+        let legend = match self.switches.notes {
+            true => self.draw_legend(&painter, size),
+            false => 0.0,
+        };
         let exposure = self.exposure().exp2();
         let screen = context.content_rect();
         let light = self.lights;
@@ -281,5 +283,6 @@ impl Viewer {
             }
             None => self.overlays.items_picture = KeptTexture::default(),
         }
+        legend
     }
 }

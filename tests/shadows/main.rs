@@ -1,28 +1,24 @@
 //! Direct light on relief and on plain triangles in the shadow of other parts of the scene, against
 //! the path tracer on the displaced mesh.
 
+#[path = "../common/mod.rs"]
 mod common;
+mod skipped;
+mod walk;
 
 use std::path::Path;
 use std::sync::OnceLock;
 
-use bytemuck::Zeroable;
 use common::{Build, assert_silent, device, show};
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use mesolux::bake::bake;
 use mesolux::bake::solution::Solution;
 use mesolux::bench::pictures::Reference;
 use mesolux::bench::relief_room::{REPEAT, TEXELS, bumps, smooth_step};
 use mesolux::math::directions::Directions;
-use mesolux::mesh::shadow_tree::ShadowTree;
 use mesolux::meso::{Options, Transport};
-use mesolux::passes::shadow_rays::ShadowRays;
-use mesolux::passes::types::{ShadowRay, ShadowTriangle};
 use mesolux::path_tracer::{PathTracer, Settings as Paths};
-use mesolux::reference;
-use mesolux::render::{
-    Comparison, Direct, Light, Lighting, ReliefShading, Renderer, SAMPLES, View, render,
-};
+use mesolux::render::{Comparison, Direct, Light, Lighting, View, render};
 use mesolux::scene::{Camera, Material, PointLight, Scene, displace};
 use mesolux::solver::Settings;
 
@@ -325,198 +321,5 @@ fn contacts_leak_no_light_and_surfaces_do_not_shadow_themselves() {
     }
     println!("{dark} dark and {lit} lit pixels");
     assert!(dark > 100 && lit > 1000);
-    assert_silent();
-}
-
-/// The least share of open triangles: of a wall's 4 × 4 cells the inner four touch no other wall,
-/// which would count as hiding the lamp; the block's and the ball's shadows take a few of them.
-const OPEN: f64 = 0.15;
-
-/// Ways that nothing stands on are not followed, and the picture is the same to the bit; what the
-/// block or a card's shadow falls on is not open, however many lamps there are.
-#[test]
-fn open_triangles_follow_no_ways() {
-    let camera = camera(DVec3::new(1.9, 1.2, 1.9), DVec3::new(1.0, 0.2, 0.8), 75.0);
-    let mut plain_ball = ball(6);
-    for material in &mut plain_ball.materials {
-        material.map_height = None;
-    }
-    let mut two_lamps = room(false, 0.3);
-    two_lamps.lights.points.push(PointLight {
-        name: "test".into(),
-        position: DVec3::new(1.7, 1.2, 1.6),
-        intensity: [0.3; 3],
-        beam: None,
-    });
-    for (name, scene) in [
-        ("a lamp", &room(false, 0.3)),
-        ("a point besides", &two_lamps),
-        ("a ball", &plain_ball),
-    ] {
-        let solution = baked(scene);
-        let lighting = Lighting {
-            part: Light::Direct,
-            shading: ReliefShading::None,
-            ..Lighting::from(&solution)
-        };
-        let [with, without] = [true, false].map(|skip_open| {
-            let lighting = Lighting {
-                skip_open,
-                ..lighting
-            };
-            let device = device();
-            let renderer = Renderer::new(&device, scene, lighting, &view(&camera), SAMPLES);
-            let renderer = renderer.expect("a picture");
-            (
-                renderer.picture().expect("a picture"),
-                renderer.open_triangles(),
-            )
-        });
-        let [open, all] = with.1;
-        println!("{name}: {open} of {all} triangles are open");
-        assert!(
-            with.0.radiance == without.0.radiance,
-            "{name}: another picture"
-        );
-        assert!(open as f64 > OPEN * all as f64 && open < all);
-        assert_eq!(without.1, [0, all]);
-    }
-    assert_silent();
-}
-
-/// A floor of 16 × 16 cells with bumps, a lamp above, and a card that hides it from some of them.
-fn bumps_under_a_card() -> Scene {
-    let mut build = Build::new();
-    let floor = build.material(0.6, 0.0);
-    let lamp = build.material(0.0, 20.0);
-    let dark = build.material(0.1, 0.0);
-    build.relief(floor, TEXELS, |x, y| 0.12 * REPEAT * bumps(x, y));
-    let (x, z) = (DVec3::X, DVec3::Z);
-    let cells = build.quad(DVec3::ZERO, 2.0 * z, 2.0 * x, (16, 16), floor);
-    build.cover(cells, floor, (z, x));
-    build.quad(DVec3::new(0.5, 1.5, 0.5), 0.2 * x, 0.2 * z, (1, 1), lamp);
-    build.quad(DVec3::new(0.9, 0.7, 0.4), 0.6 * z, 0.5 * x, (1, 1), dark);
-    build.weld();
-    build.0.scene
-}
-
-/// The same of relief, on a floor, where other triangles of it do not count, and on a ball; nor are
-/// ways marched that rise above the relief's horizon. The least share of prisms that see all of the
-/// lamp, and that see none of it, where there is a card.
-#[test]
-fn prisms_that_see_all_or_nothing_follow_no_ways() {
-    const ALL: f64 = 0.3;
-    const NOTHING: f64 = 0.007;
-    let above = camera(DVec3::new(1.3, 1.3, 1.9), DVec3::new(0.9, 0.0, 0.9), 80.0);
-    let beside = camera(DVec3::new(1.9, 1.2, 1.9), DVec3::new(1.0, 0.2, 0.8), 75.0);
-    for (name, scene, camera) in [
-        ("a card", &bumps_under_a_card(), &above),
-        ("a block", &room(true, 0.3), &beside),
-        ("a ball", &ball(6), &beside),
-    ] {
-        let solution = baked(scene);
-        let drawn = |shading, skip_open| {
-            let lighting = Lighting {
-                part: Light::Direct,
-                shading,
-                skip_open,
-                ..Lighting::from(&solution)
-            };
-            let device = device();
-            let renderer = Renderer::new(&device, scene, lighting, &view(camera), SAMPLES);
-            let renderer = renderer.expect("a picture");
-            let picture = renderer.picture().expect("a picture");
-            (picture.radiance, renderer.prisms())
-        };
-        let [with, without] = [true, false].map(|skip| drawn(ReliefShading::Factored, skip));
-        let [unsure, open, hidden] = with.1;
-        println!("{name}: {open} prisms are open, {hidden} hidden, {unsure} neither");
-        assert!(with.0 == without.0, "{name}: another picture");
-        let all = unsure + open + hidden;
-        assert_eq!(without.1, [all, 0, 0]);
-        let clusters = [true, false].map(|skip| drawn(ReliefShading::Clusters, skip).0);
-        assert!(
-            clusters[0] == clusters[1],
-            "{name}: another picture by clusters"
-        );
-        if name == "a card" {
-            assert!(open as f64 > ALL * all as f64 && hidden as f64 > NOTHING * all as f64);
-        }
-    }
-    assert_silent();
-}
-
-/// Shares by which a crossing in f32 may lie on another side than in f64: coordinates of up to 4
-/// round by 2⁻²², a volume of three such by some 2⁻²⁰ against triangles of 10⁻² and ways of 1: 10⁻⁴
-/// of a share.
-const UNSURE: f64 = 1e-3;
-
-#[test]
-fn the_tree_finds_what_trying_every_triangle_does() {
-    let mut state = 1_u64;
-    let mut unit = || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1);
-        (state >> 40) as f32 / (1_u64 << 24) as f32
-    };
-    let mut place = |size: f32| (Vec3::new(unit(), unit(), unit()) - 0.5) * 2.0 * size;
-    // From large ones to small ones, some square to an axis.
-    let triangles: Vec<ShadowTriangle> = (0..400)
-        .map(|i| {
-            let middle = place(2.0);
-            let size = [1.0, 0.3, 0.1, 0.03][i % 4];
-            let mut corners = [0; 3].map(|_| middle + place(size));
-            if i % 3 == 0 {
-                corners.iter_mut().for_each(|c| c[i / 3 % 3] = middle[0]);
-            }
-            let [a, b, c] = corners;
-            ShadowTriangle {
-                a,
-                b,
-                c,
-                // Whole branches of the tree have a relief, others in part.
-                relief: (middle.x > 0.7 || i % 5 == 0).into(),
-                ..ShadowTriangle::zeroed()
-            }
-        })
-        .collect();
-    let rays: Vec<ShadowRay> = (0..20_000)
-        .map(|i| {
-            let from = place(2.0);
-            // A third along an axis: their ways never meet the sides of boxes that lie along them.
-            let mut to = from + place(1.5);
-            if i % 3 == 0 {
-                to = from.with_x(to.x);
-            }
-            ShadowRay {
-                from,
-                clear: if i % 2 == 0 { 0.0 } else { 0.5 },
-                to,
-            }
-        })
-        .collect();
-    let tree = ShadowTree::new(triangles.clone());
-    assert_eq!(tree.triangles.len(), triangles.len());
-    let pass = ShadowRays::new(&device()).expect("the device walks");
-    let found = pass.run(&tree, &rays).expect("the device walks");
-    let (mut sure, mut blocked) = (0, 0);
-    for (ray, found) in rays.iter().zip(&found) {
-        let depth = reference::shadow_rays::blocked(&triangles, ray);
-        if depth.abs() > UNSURE {
-            sure += 1;
-            blocked += usize::from(depth > 0.0);
-            assert_eq!(*found, depth > 0.0, "{ray:?}: {depth}");
-        }
-    }
-    println!(
-        "{blocked} of {sure} sure ways of {} are blocked",
-        rays.len()
-    );
-    assert!(sure > 15_000 && blocked > 2000 && sure - blocked > 2000);
-    let none = pass
-        .run(&ShadowTree::new(Vec::new()), &rays[..100])
-        .expect("the device walks");
-    assert!(none.iter().all(|hit| !hit));
     assert_silent();
 }
