@@ -25,7 +25,7 @@ layout(push_constant, scalar) uniform Parameters {
     float pixel;         // angle of a sample
 };
 
-// Rays of the eye may be long.
+// See shared/height_march.glsl; rays of the eye may be long.
 const uint LEVELS = 1;
 #include "shared/height_march.glsl"
 #include "shared/prisms.glsl"

@@ -27,7 +27,7 @@ layout(push_constant, scalar) uniform Parameters {
 
 uint march_steps = 0;
 #define ALL_STEPS march_steps
-// Rays of the eye may be long.
+// See shared/height_march.glsl; rays of the eye may be long.
 const uint LEVELS = 1;
 #include "shared/height_march.glsl"
 #include "shared/prisms.glsl"

@@ -190,8 +190,10 @@ bool march(HeightTile tile, vec3 from, vec3 to, out HeightHit hit) {
                     hit.t = t.x + (t.y + r * gone);
                     hit.cell = cell.y * tile.width + cell.x;
                     hit.local = p;
-                    hit.height = patch_here.corner + (dot(patch_here.slope, p) + patch_here.twist * p.x * p.y);
-                    hit.gradient = (patch_here.slope + patch_here.twist * p.yx) * vec2(float(tile.width), -float(tile.height));
+                    hit.height = patch_here.corner
+                                 + (dot(patch_here.slope, p) + patch_here.twist * p.x * p.y);
+                    hit.gradient = (patch_here.slope + patch_here.twist * p.yx)
+                                   * vec2(float(tile.width), -float(tile.height));
                     return true;
                 }
             }

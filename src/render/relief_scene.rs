@@ -51,23 +51,6 @@ pub struct ReliefScene {
     pub direct: Vec<[Vec3; 3]>,
 }
 
-/// What is shaded; `shading` is the code of the lighting's.
-fn kind(scene: &Scene, lighting: &Lighting<'_>, shading: u32) -> Kind {
-    let sharp = lighting.sharp() && lighting.shading == ReliefShading::Factored;
-    let clustered = lighting.shading == ReliefShading::Clusters;
-    Kind {
-        shading,
-        view: lighting.show.code(),
-        // Light inside the relief, which is indirect, and that which arrives by slots.
-        factored: lighting.part != Light::Direct || !(sharp || clustered),
-        sharp,
-        clustered,
-        lights: light_kinds(scene),
-        borders: false,
-        levels: true,
-    }
-}
-
 impl ReliefScene {
     /// None where no relief is drawn by rays or its response.
     ///
@@ -106,19 +89,29 @@ impl ReliefScene {
             ))
         })?;
         let vertices = MesoVertices::new(scene, &light.elements, &light.frames);
-        let mut lit = kind(scene, lighting, shading);
-        let skipped = lighting.skip_open && (lit.sharp || lit.clustered);
+        let sharp = lighting.sharp() && lighting.shading == ReliefShading::Factored;
+        let clustered = lighting.shading == ReliefShading::Clusters;
+        let skipped = lighting.skip_open && (sharp || clustered);
         let surfaces = Surfaces::new(scene, &tiles, &factors, skipped);
         let relief = |i: usize| {
             let surface = surface_of[i];
-            (lit.sharp && surface != u32::MAX).then(|| OfTriangle {
+            (sharp && surface != u32::MAX).then(|| OfTriangle {
                 surface,
                 rise: surfaces.ranges[surface as usize].rise(),
             })
         };
         let borders = Borders::new(scene, relief);
-        lit.borders = !borders.is_empty();
-        lit.levels = lit.clustered || surfaces.long_ways;
+        let kind = Kind {
+            shading,
+            view: lighting.show.code(),
+            // Light inside the relief, which is indirect, and that which arrives by slots.
+            factored: lighting.part != Light::Direct || !(sharp || clustered),
+            sharp,
+            clustered,
+            lights: light_kinds(scene),
+            borders: !borders.is_empty(),
+            levels: clustered || surfaces.long_ways,
+        };
         let gather = |moments| vertices.gather(&directions, &light.frames, moments);
         Ok(Some(Self {
             passes: Arc::new(match lighting.show {
@@ -127,7 +120,7 @@ impl ReliefScene {
                 }
                 _ => ReliefPasses::Shaded(
                     ReliefHits::new(device, shading)?,
-                    Relief::new(device, shade, lit)?,
+                    Relief::new(device, shade, kind)?,
                 ),
             }),
             surfaces,

@@ -17,7 +17,8 @@ use crate::scene::{HeightMap, Material, Scene};
 const MARGIN: f64 = 1e-3;
 
 /// Ways to lights through a relief that rises by no more texels are followed from cell to cell: of
-/// 2.5 texels that takes a frame of `cornell-relief` 8 % less time, of 10 as much as with levels.
+/// 2.5 texels that takes a frame of `cornell-relief` 4 to 8 % less time, of 10 as much as with
+/// levels.
 const SHORT: f64 = 4.0;
 
 /// Heights of a relief's prisms, in the map's values with the sign of their scale.

@@ -108,7 +108,7 @@ impl Geometry {
         if !scene.triangles.iter().all(held) {
             return refuse("a triangle has a corner or a material that is not there");
         }
-        let (origin, unit) = scene.local_frame();
+        let frame @ (origin, unit) = scene.local_frame();
         let corners: Vec<_> = scene
             .triangles
             .par_iter()
@@ -118,14 +118,31 @@ impl Geometry {
         if !corners.iter().flatten().all(|p| p.is_finite()) {
             return refuse("a corner is not finite");
         }
+        Ok(Self::of(frame, corners, params))
+    }
+
+    /// Of other triangles in place of those of a scene that is sound: their corners, scene units.
+    #[cfg(feature = "window")]
+    pub fn standing_for(scene: &Scene, corners: impl Iterator<Item = [DVec3; 3]>) -> Self {
+        let frame @ (origin, unit) = scene.local_frame();
+        let mut corners: Vec<_> = corners.map(|c| c.map(|p| (p - origin) / unit)).collect();
+        if corners.is_empty() {
+            // No ray meets a triangle without area.
+            corners.push([DVec3::ZERO; 3]);
+        }
+        Self::of(frame, corners, BvhBuildParams::medium_build())
+    }
+
+    /// Of corners in this frame.
+    fn of((origin, unit): (DVec3, f64), corners: Vec<[DVec3; 3]>, params: BvhBuildParams) -> Self {
         let bounds: Vec<_> = corners.iter().map(Bounds).collect();
         let bvh = build_cwbvh(&bounds, params, &mut Duration::default());
-        Ok(Self {
+        Self {
             origin,
             unit,
             corners,
             bvh,
-        })
+        }
     }
 
     /// Scene units to internal ones.

@@ -7,6 +7,8 @@ use egui::{Align2, Color32, Context, Frame, Id, Order, vec2};
 /// How long a note stays, and how long an error.
 const SHOWN: Duration = Duration::from_secs(4);
 const ERROR_SHOWN: Duration = Duration::from_secs(15);
+/// Points to what is below.
+const EDGE: f32 = 16.0;
 /// Most notes at a time.
 const MOST: usize = 4;
 
@@ -59,7 +61,7 @@ impl Notes {
         let most = context.content_rect().width() - 32.0;
         egui::Area::new(Id::new("notes"))
             .order(Order::Tooltip)
-            .anchor(Align2::CENTER_BOTTOM, vec2(0.0, -12.0 - above))
+            .anchor(Align2::CENTER_BOTTOM, vec2(0.0, -EDGE - above))
             .interactable(false)
             .show(context, |ui| {
                 ui.set_max_width(most);

@@ -149,8 +149,8 @@ pub fn bounds(ui: &mut Ui, bounds: &[[f64; 2]]) {
     painter.add(Shape::line(points.collect(), stroke));
 }
 
-/// What the overlays that are shown mean, in the lower left corner of the view. Returns how high it
-/// is.
+/// What the overlays that are shown mean, in the lower left corner of the view. Returns how far up
+/// from the corner it reaches.
 pub fn legend(painter: &Painter, corner: Pos2, lines: &[&str]) -> f32 {
     let font = egui::FontId::proportional(12.0);
     let mut at = corner;
@@ -162,7 +162,7 @@ pub fn legend(painter: &Painter, corner: Pos2, lines: &[&str]) -> f32 {
         painter.rect_filled(place, 3.0, Color32::from_black_alpha(190));
         painter.galley(at, text, Color32::WHITE);
     }
-    corner.y - at.y + 4.0
+    corner.y - at.y
 }
 
 /// A mark where a point light is, with its name where it is chosen.

@@ -7,6 +7,7 @@ use mesolux::passes::shadow_rays::ShadowRays;
 use mesolux::passes::types::{ShadowRay, ShadowTriangle};
 use mesolux::reference;
 
+use crate::common::random::Random;
 use crate::common::{assert_silent, device};
 
 /// Shares by which a crossing in f32 may lie on another side than in f64: coordinates of up to 4
@@ -16,14 +17,11 @@ const UNSURE: f64 = 1e-3;
 
 #[test]
 fn the_tree_finds_what_trying_every_triangle_does() {
-    let mut state = 1_u64;
-    let mut unit = || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1);
-        (state >> 40) as f32 / (1_u64 << 24) as f32
+    let mut random = Random(1);
+    let mut place = |size: f64| {
+        let mut side = || random.range(-size, size) as f32;
+        Vec3::new(side(), side(), side())
     };
-    let mut place = |size: f32| (Vec3::new(unit(), unit(), unit()) - 0.5) * 2.0 * size;
     // From large ones to small ones, some square to an axis.
     let triangles: Vec<ShadowTriangle> = (0..400)
         .map(|i| {

@@ -97,6 +97,6 @@ fn start(
             .build()
             .map_err(|error| Error::Usage(format!("threads for the window: {error}")))?,
     };
-    let rays = pool.install(|| Rays::new(scene, without))?;
+    let rays = pool.install(|| Rays::new(scene, without));
     Ok((pool, rays))
 }

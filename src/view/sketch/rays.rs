@@ -8,11 +8,10 @@ use rayon::prelude::*;
 
 use super::lights::{Change, Light, Spot};
 use crate::bake::solution::DirectionalLight;
-use crate::error::Result;
 use crate::mesh::corners::{Corners, Joined};
 use crate::mesh::merged::merged;
 use crate::scene::geometry::{ABOVE, Geometry};
-use crate::scene::{Material, Scene, Triangle};
+use crate::scene::{Scene, Triangle};
 use crate::view::corner_light::{CornerLight, Slant, Slanted, at_corners, slant};
 use crate::view::snapshot::Snapshot;
 
@@ -36,36 +35,23 @@ pub(super) struct Rays {
 }
 
 impl Rays {
-    pub fn new(scene: &Scene, without: Vec<usize>) -> Result<Self> {
+    pub fn new(scene: &Scene, without: Vec<usize>) -> Self {
         let stands = |i: usize| !without.contains(&(scene.triangles[i].material as usize));
         let joined = merged(scene, |i| stands(i).then_some(()));
-        let mut casters = Scene {
-            name: scene.name.clone(),
-            vertices: scene.vertices.clone(),
-            triangles: (joined.iter())
-                .map(|t| Triangle {
-                    vertices: t.vertices,
-                    ..Triangle::default()
-                })
-                .collect(),
-            materials: vec![Material::default()],
-            ..Scene::default()
-        };
-        if casters.triangles.is_empty() {
-            // No ray meets a triangle without area.
-            casters.triangles.push(Triangle::default());
-        }
-        let geometry = Geometry::new(&casters)?;
+        let corners = joined
+            .iter()
+            .map(|t| t.vertices.map(|v| scene.vertices[v as usize]));
+        let geometry = Geometry::standing_for(scene, corners);
         let place = |t: &Triangle| {
             let [a, b, c] = scene.corners(t).map(|p| geometry.inside(p));
             ((a + b + c) / 3.0, 0.5 * (b - a).cross(c - a).length())
         };
-        Ok(Self {
+        Self {
             places: scene.triangles.par_iter().map(place).collect(),
             geometry,
             without,
             known: VecDeque::new(),
-        })
+        }
     }
 
     /// Finds what the next sketch will take away.

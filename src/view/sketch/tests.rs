@@ -68,7 +68,7 @@ fn a_lamp_lights_what_it_sees_from_where_it_is() {
         since: Instant::now(),
     };
     assert!(is_possible(&before, &now));
-    let mut rays = Rays::new(&now, Vec::new()).expect("a good scene");
+    let mut rays = Rays::new(&now, Vec::new());
     let light = rays.sketch(&wanted.base, &changes(&wanted));
     let place = now.lights.points[0].position;
     let (mut lit, mut dark, mut worst) = (0, 0, 0.0_f64);
@@ -162,7 +162,7 @@ fn an_emitter_lights_what_it_sees_from_where_it_is() {
         since: Instant::now(),
     };
     assert!(is_possible(&before, &now));
-    let mut rays = Rays::new(&now, vec![1]).expect("a good scene");
+    let mut rays = Rays::new(&now, vec![1]);
     let light = rays.sketch(&wanted.base, &changes(&wanted));
     let emitter: Vec<[DVec3; 3]> = (now.triangles.iter())
         .filter(|t| t.material == 1)

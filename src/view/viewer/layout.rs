@@ -228,8 +228,8 @@ impl Viewer {
         )
     }
 
-    /// Draws marks of lights, light by direction, an item buffer and a legend over the view. Returns
-    /// how high the legend is.
+    /// Draws marks of lights, light by direction, an item buffer and a legend over the view; how
+    /// high the legend is.
     fn marks(&mut self, context: &egui::Context, size: (u32, u32)) -> f32 {
         let layer = egui::LayerId::new(egui::Order::Background, egui::Id::new("marks"));
         let mut beside = context.content_rect();
