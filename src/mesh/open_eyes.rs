@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::elements::Elements;
 use super::near::{PartTree, first_met};
@@ -25,23 +26,32 @@ const EVERY: usize = 4;
 /// Golden angle.
 const TURN: f64 = 2.399_963_23;
 
-/// Gives each surface source its [`Source::places`], as many as `wanted`, `[source]`, each of which
-/// divides [`SOURCE_EYES`] or is 0, and moves an eye that is covered, both to places that are as
-/// open as others of the source. Sources that have as many are left as they are. How many eyes were
-/// moved.
-pub fn open_eyes(
+/// What a source is to be looked at from.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub struct Wanted {
+    /// Its index among all sources, so that places lie otherwise on each.
+    pub turn: u32,
+    /// How many places; 0, or a divisor of [`SOURCE_EYES`].
+    pub places: u32,
+}
+
+/// Gives each surface source its [`Source::places`], as many as are `wanted`, `[source]`, and moves
+/// an eye that is covered, both to places that are as open as others of the source. Sources that
+/// have as many are left as they are. How many eyes were moved.
+pub fn open_eyes<'a>(
     elements: &Elements,
-    sources: &mut [Source],
+    sources: impl IntoParallelIterator<Item = &'a mut Source, Iter: IndexedParallelIterator>,
     occluders: &ShadowTree<ShadowOccluder>,
-    wanted: &[usize],
+    wanted: &[Wanted],
 ) -> usize {
-    let each = sources.par_iter_mut().zip(wanted).enumerate();
-    let moved = each.map(|(turn, (source, &wanted))| {
-        if !source.is_surface() || source.places.len() >= wanted.max(1) {
+    let each = sources.into_par_iter().zip(wanted);
+    let moved = each.map(|(source, wanted)| {
+        let places = wanted.places as usize;
+        if !source.is_surface() || source.places.len() >= places.max(1) {
             return 0;
         }
-        let moved = open_eye(elements, source, occluders, turn);
-        source.places = spread(&source.places, wanted);
+        let moved = open_eye(elements, source, occluders, wanted.turn as usize);
+        source.places = spread(&source.places, places);
         usize::from(moved)
     });
     moved.sum()

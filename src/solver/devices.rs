@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::exchange::{Exchange, Meeting};
 use super::messages::{MemberData, MemberShare};
 #[cfg(feature = "mpi")]
-use super::near_search::{NearSearch, joined, own};
+use super::near_search::{NearSearch, joined, looked, own};
 #[cfg(feature = "mpi")]
 use super::ranks::{OnRanks, Ranks};
 use super::team::Others;
@@ -14,6 +14,7 @@ use super::{Estimator, Settings, choose_device, open_device};
 use crate::error::{Error, Result};
 use crate::mesh::elements::Elements;
 use crate::mesh::near::{NearPairs, Nearness, pairs_of};
+use crate::mesh::open_eyes::{Wanted, open_eyes};
 use crate::mesh::shadow_tree::ShadowTree;
 use crate::mesh::sources::Source;
 use crate::passes::types::ShadowOccluder;
@@ -160,28 +161,31 @@ impl Crew {
         Ok(weights)
     }
 
-    /// Finds the near sources of all elements, each process those of some sources.
+    /// Opens the eyes of sources and finds the near sources of all elements, each process those of
+    /// some sources.
     ///
     /// # Errors
     /// Processes that are gone.
-    pub(super) fn near_pairs(
+    pub(super) fn look(
         &self,
         elements: &Elements,
-        sources: &[Source],
+        sources: &mut [Source],
         tree: &ShadowTree<ShadowOccluder>,
+        wanted: &[Wanted],
         nearness: &Nearness,
     ) -> Result<NearPairs> {
         #[cfg(feature = "mpi")]
         if let Some(ranks) = &self.ranks {
-            let search = NearSearch::new(elements, sources, tree, nearness);
-            let (own, others) = ranks.search(search, || {
-                let own: Vec<&Source> = own(sources, [0, ranks.count()]).collect();
-                pairs_of(elements, own, tree, nearness)
+            let search = NearSearch::new(elements, sources, tree, wanted, nearness);
+            let (found, others) = ranks.search(search, || {
+                let (mut own, wanted) = own(sources, wanted, [0, ranks.count()]);
+                looked(elements, &mut own, tree, &wanted, nearness)
             })?;
-            let found = joined(sources, own, &others);
+            let found = joined(sources, found, &others);
             return Ok(NearPairs::new(elements, sources, found));
         }
-        let found = pairs_of(elements, sources, tree, nearness);
+        open_eyes(elements, &mut *sources, tree, wanted);
+        let found = pairs_of(elements, &*sources, tree, nearness);
         Ok(NearPairs::new(elements, sources, found))
     }
 

@@ -1,12 +1,14 @@
-//! Near pairs that the processes of a crew find together, each those of some sources.
+//! Eyes and near pairs that the processes of a crew find together, each those of some sources.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::mesh::elements::Elements;
 use crate::mesh::near::{Nearness, OfSource, PartTree, pairs_of};
+use crate::mesh::open_eyes::{Wanted, open_eyes};
 use crate::mesh::shadow_tree::ShadowTree;
-use crate::mesh::sources::Source;
+use crate::mesh::sources::{Source, SourcePlace};
 use crate::meso::Relief;
 use crate::passes::types::ShadowOccluder;
 use crate::passes::words::Words;
@@ -23,6 +25,7 @@ pub(super) struct NearSearch {
     relief: Option<[Words; 3]>,
     /// Surfaces; of each no places.
     sources: Vec<Source>,
+    wanted: Vec<Wanted>,
     nodes: Words,
     occluders: Words,
     nearness: Nearness,
@@ -33,6 +36,7 @@ impl NearSearch {
         elements: &Elements,
         sources: &[Source],
         tree: &ShadowTree<ShadowOccluder>,
+        wanted: &[Wanted],
         nearness: &Nearness,
     ) -> Self {
         let relief = |of: &Relief| {
@@ -42,8 +46,8 @@ impl NearSearch {
                 Words::of(&of.bitangent),
             ]
         };
-        let surfaces = sources.iter().filter(|source| source.is_surface());
-        let bare = |source: &Source| Source {
+        let surfaces = || sources.iter().zip(wanted).filter(|(s, _)| s.is_surface());
+        let bare = |(source, _): (&Source, &Wanted)| Source {
             places: Vec::new(),
             parts: Vec::new(),
             ..source.clone()
@@ -55,15 +59,16 @@ impl NearSearch {
             normal: Words::of(&elements.normal),
             area: Words::of(&elements.area),
             relief: elements.relief.as_ref().map(relief),
-            sources: surfaces.map(bare).collect(),
+            sources: surfaces().map(bare).collect(),
+            wanted: surfaces().map(|(_, wanted)| *wanted).collect(),
             nodes: Words::of(tree.nodes()),
             occluders: Words::of(&tree.triangles),
             nearness: *nearness,
         }
     }
 
-    /// The pairs of one in so many surfaces, by their order.
-    pub fn find(self, [turn, of]: [usize; 2]) -> Found {
+    /// The eyes and pairs of one in so many surfaces, by their order.
+    pub fn find(mut self, turn: [usize; 2]) -> Found {
         let relief = self.relief.map(|[class, tangent, bitangent]| {
             let axes = [&tangent, &bitangent].map(|axis| axis.values::<Vec3>().to_vec());
             Relief::of_frames(class.into_words(), axes)
@@ -78,20 +83,42 @@ impl NearSearch {
             ..Elements::default()
         };
         let tree = ShadowTree::of_lists(self.nodes.collected(), self.occluders.collected());
-        let own: Vec<&Source> = own(&self.sources, [turn, of]).collect();
-        Found::new(&pairs_of(&elements, own, &tree, &self.nearness))
+        let (mut own, wanted) = own(&mut self.sources, &self.wanted, turn);
+        let pairs = looked(&elements, &mut own, &tree, &wanted, &self.nearness);
+        Found::new(&own, &pairs)
     }
 }
 
-/// The surfaces among some sources whose turn it is.
-pub(super) fn own(sources: &[Source], [turn, of]: [usize; 2]) -> impl Iterator<Item = &Source> {
-    let surfaces = sources.iter().filter(|source| source.is_surface());
-    surfaces.skip(turn).step_by(of)
+/// The surfaces among some sources, `turn` of so many, and what is wanted of each.
+pub(super) fn own<'a>(
+    sources: &'a mut [Source],
+    wanted: &[Wanted],
+    [turn, of]: [usize; 2],
+) -> (Vec<&'a mut Source>, Vec<Wanted>) {
+    let both = sources.iter_mut().zip(wanted);
+    let surfaces = both.filter(|(source, _)| source.is_surface());
+    surfaces.skip(turn).step_by(of).unzip()
+}
+
+/// Opens the eyes of sources, and finds the pairs of each.
+pub(super) fn looked(
+    elements: &Elements,
+    sources: &mut [&mut Source],
+    tree: &ShadowTree<ShadowOccluder>,
+    wanted: &[Wanted],
+    nearness: &Nearness,
+) -> Vec<OfSource> {
+    let each = sources.par_iter_mut().map(|source| &mut **source);
+    open_eyes(elements, each, tree, wanted);
+    let each = sources.par_iter().map(|source| &**source);
+    pairs_of(elements, each, tree, nearness)
 }
 
 /// What was found of some sources.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Found {
+    /// Eye and places of each source.
+    eyes: Vec<(DVec3, Vec<SourcePlace>)>,
     /// Members, pairs and entries of each source.
     counts: Vec<[u32; 3]>,
     rays: Vec<u64>,
@@ -101,14 +128,16 @@ pub(super) struct Found {
 }
 
 impl Found {
-    fn new(found: &[OfSource]) -> Self {
+    fn new(sources: &[&mut Source], found: &[OfSource]) -> Self {
         fn joined<T: bytemuck::Pod>(found: &[OfSource], list: impl Fn(&OfSource) -> &[T]) -> Words {
             Words::of(&found.iter().flat_map(list).copied().collect::<Vec<T>>())
         }
         let counts = |of: &OfSource| {
             [of.tree.members.len(), of.pairs.len(), of.entries.len()].map(|count| count as u32)
         };
+        let eyes = sources.iter().map(|of| (of.eye, of.places.clone()));
         Self {
+            eyes: eyes.collect(),
             counts: found.iter().map(counts).collect(),
             rays: found.iter().map(|of| of.rays).collect(),
             members: joined(found, |of| &of.tree.members),
@@ -139,38 +168,49 @@ impl Found {
     }
 }
 
-/// The pairs of all sources, of what each process has found of its own.
-pub(super) fn joined(sources: &[Source], own: Vec<OfSource>, others: &[Found]) -> Vec<OfSource> {
+/// The pairs of all sources, of what each process has found of its own, and their eyes.
+pub(super) fn joined(
+    sources: &mut [Source],
+    own: Vec<OfSource>,
+    others: &[Found],
+) -> Vec<OfSource> {
     let mut of_first = own.into_iter();
-    let mut of_others: Vec<_> = others.iter().map(Found::each).collect();
+    let mut of_others: Vec<_> = others
+        .iter()
+        .map(|of| of.eyes.iter().zip(of.each()))
+        .collect();
     let members = others.len() + 1;
     let mut surfaces = 0;
-    let next = |source: &Source| {
+    let next = |source: &mut Source| {
         if !source.is_surface() {
             return OfSource::default();
         }
         let turn = surfaces % members;
         surfaces += 1;
-        match turn.checked_sub(1) {
+        let found = match turn.checked_sub(1) {
             None => of_first.next(),
-            Some(other) => of_others[other].next(),
-        }
-        .unwrap_or_default()
+            Some(other) => of_others[other].next().map(|((eye, places), found)| {
+                (source.eye, source.places) = (*eye, places.clone());
+                found
+            }),
+        };
+        found.unwrap_or_default()
     };
-    sources.iter().map(next).collect()
+    sources.iter_mut().map(next).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::constants::NONE;
+    use crate::constants::{NONE, SOURCE_EYES};
     use crate::mesh::occluders::Occluders;
     use crate::mesh::sources;
     use crate::scene::{LoadOptions, load};
 
-    /// Of a scene with frames of relief and a light without a surface, by one and by three.
+    /// Of a scene with frames of relief and a light without a surface, by one and by three; eyes
+    /// under the blocks are moved.
     #[test]
-    fn pairs_do_not_depend_on_who_finds_them() {
+    fn eyes_and_pairs_do_not_depend_on_who_finds_them() {
         let options = LoadOptions {
             patches: Some(3000),
             ..LoadOptions::default()
@@ -189,18 +229,32 @@ mod tests {
         let mut light = built.list[0].clone();
         (light.kind, light.element_count) = (crate::constants::KIND_POINT, 0);
         built.list.insert(3, light);
-        let (list, nearness) = (&built.list, Nearness::default());
-        let alone = pairs_of(&elements, list, &tree, &nearness);
-        let entries: usize = alone.iter().map(|of| of.entries.len()).sum();
-        assert!(entries > 1000, "{entries}");
+        let (list, nearness) = (built.list, Nearness::default());
+        let places = |turn| if turn % 5 == 0 { SOURCE_EYES } else { 4 };
+        let wanted: Vec<Wanted> = (0..list.len() as u32)
+            .map(|turn| Wanted {
+                turn,
+                places: places(turn),
+            })
+            .collect();
+        let mut alone = list.clone();
+        let moved = open_eyes(&elements, &mut alone, &tree, &wanted);
+        let of_alone = pairs_of(&elements, &alone, &tree, &nearness);
+        let entries: usize = of_alone.iter().map(|of| of.entries.len()).sum();
+        assert!(entries > 1000 && moved > 3, "{entries}, {moved}");
         let search = |turn| {
-            let search = NearSearch::new(&elements, list, &tree, &nearness);
+            let search = NearSearch::new(&elements, &list, &tree, &wanted, &nearness);
             let message = postcard::to_stdvec(&search).expect("it is written");
             let read: NearSearch = postcard::from_bytes(&message).expect("it is read");
-            read.find([turn, 3])
+            let found = postcard::to_stdvec(&read.find([turn, 3])).expect("it is written");
+            postcard::from_bytes(&found).expect("it is read")
         };
-        let first: Vec<&Source> = own(list, [0, 3]).collect();
-        let first = pairs_of(&elements, first, &tree, &nearness);
-        assert!(joined(list, first, &[search(1), search(2)]) == alone);
+        let others = [search(1), search(2)];
+        let mut shared = list;
+        let (mut first, of_first) = own(&mut shared, &wanted, [0, 3]);
+        let first = looked(&elements, &mut first, &tree, &of_first, &nearness);
+        assert!(joined(&mut shared, first, &others) == of_alone);
+        let bytes = |list: &Vec<Source>| postcard::to_stdvec(list).expect("it is written");
+        assert!(bytes(&shared) == bytes(&alone));
     }
 }

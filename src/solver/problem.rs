@@ -11,7 +11,7 @@ use crate::mesh::charts::Connections;
 use crate::mesh::elements::Elements;
 use crate::mesh::near::NearPairs;
 use crate::mesh::occluders::Occluders;
-use crate::mesh::open_eyes::open_eyes;
+use crate::mesh::open_eyes::{Wanted, open_eyes};
 use crate::mesh::shadow_tree::ShadowTree;
 use crate::mesh::sources::{self, LitBy, Source, Sources, far_power};
 use crate::meso::{Relief, Transport};
@@ -93,13 +93,15 @@ impl Problem {
         let (occluder_tree, near) = match settings.estimator {
             Estimator::Receiver => {
                 let tree = ShadowTree::new(occluders.casters(&elements, &connections));
-                let places = wanted_places(&sources.list, settings);
-                open_eyes(&elements, &mut sources.list, &tree, &places);
-                far_power(&elements, &mut sources.list, &tree);
-                let list = &sources.list;
+                let wanted = wanted_places(&sources.list, settings);
+                let list = &mut sources.list;
+                far_power(&elements, list, &tree);
                 let near = match kept {
-                    Some(kept) => kept.near(&elements, list)?,
-                    None => crew.near_pairs(&elements, list, &tree, &settings.nearness)?,
+                    Some(kept) => {
+                        open_eyes(&elements, &mut *list, &tree, &wanted);
+                        kept.near(&elements, list)?
+                    }
+                    None => crew.look(&elements, list, &tree, &wanted, &settings.nearness)?,
                 };
                 (tree, near)
             }
@@ -186,15 +188,15 @@ impl Problem {
         let moved = places.map(|(now, before)| now.eye != before.eye || now.is_far());
         let moved = moved.collect();
         let wanted = wanted_places(&sources.list, &self.settings);
-        let lacks = |(source, &wanted): (&Source, &usize)| {
-            source.is_surface() && source.places.len() < wanted
+        let lacks = |(source, wanted): (&Source, &Wanted)| {
+            source.is_surface() && source.places.len() < wanted.places as usize
         };
         let is_receiver = self.settings.estimator == Estimator::Receiver;
         let more_eyes = is_receiver && sources.list.iter().zip(&wanted).any(lacks);
         if more_eyes {
             open_eyes(
                 &self.elements,
-                &mut sources.list,
+                &mut sources.list[..],
                 &self.occluder_tree,
                 &wanted,
             );
@@ -226,12 +228,15 @@ fn strong(list: &[Source], settings: &Settings) -> Vec<bool> {
 }
 
 /// Places from which each source is looked at where a silhouette may cut it, `[source]`.
-fn wanted_places(list: &[Source], settings: &Settings) -> Vec<usize> {
-    let places = |is_strong| match is_strong {
-        true => SOURCE_EYES as usize,
-        false => settings.places as usize,
+fn wanted_places(list: &[Source], settings: &Settings) -> Vec<Wanted> {
+    let wanted = |(turn, is_strong)| Wanted {
+        turn,
+        places: match is_strong {
+            true => SOURCE_EYES,
+            false => settings.places,
+        },
     };
-    strong(list, settings).into_iter().map(places).collect()
+    (0..).zip(strong(list, settings)).map(wanted).collect()
 }
 
 /// What settings ask of relief and cannot be.
