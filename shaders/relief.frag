@@ -5,6 +5,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_KHR_shader_subgroup_ballot : require
+#extension GL_EXT_control_flow_attributes : require
 #include "shared/types.glsl"
 #include "shared/texels.glsl"
 #include "shared/directions.glsl"
@@ -20,11 +21,11 @@ layout(binding = 3) uniform usamplerBuffer surfaces;
 // [surface]
 layout(binding = 4) uniform usamplerBuffer tiles;
 layout(binding = 5) uniform usamplerBuffer pyramid;
-// Irradiance for a unit of β, [surface][cell][corner][rank]: rgb by light from elsewhere in the
-// relief, w from outside.
+// Irradiance for a unit of β, [surface][cell][corner][rank / 2]: rgb by light from elsewhere in the
+// relief, w from outside; packed as src/render/factor_texels.rs says.
 layout(binding = 6) uniform usamplerBuffer factors;
-// β of the light, [light vertex][MOST_RANK][2]: of that which goes on inside the relief, and of
-// that which arrives.
+// β of the light, [light vertex][MOST_RANK]: of that which goes on inside the relief, and of that
+// which arrives; packed too.
 layout(binding = 7) uniform usamplerBuffer coefficients;
 // Sent light by direction of the vertex's frame, as radiosity πL, [light vertex][direction].
 layout(binding = 8) uniform usamplerBuffer exits;
@@ -365,6 +366,25 @@ vec3 sharp(Prism p, ReliefSurface surface, HeightTile tile, Place place) {
 
 #include "shared/clusters.glsl"
 
+// Four whole numbers of 16 bits, each times 2^16.
+vec4 halves(uvec2 words) {
+    return vec4(ivec4(words.x << 16, words.x & 0xffff0000, words.y << 16, words.y & 0xffff0000));
+}
+
+// Light of three vertices by the factor of a rank; their coefficients are six floats of 21 bits.
+vec3 lit(vec4 factor, uvec3 at, vec3 share) {
+    vec3 inside = vec3(0.0);
+    vec3 arriving = vec3(0.0);
+    [[unroll]] for (uint i = 0; i < 3; i++) {
+        uvec4 words = fetch_words(coefficients, at[i]);
+        vec4 four = uintBitsToFloat(words & 0xfffff800);
+        vec2 rest = uintBitsToFloat(words.xz << 21 | (words.yw & 0x7fe) << 10);
+        inside += share[i] * four.xyz;
+        arriving += share[i] * vec3(four.w, rest);
+    }
+    return factor.rgb * inside + factor.w * arriving;
+}
+
 // E by the factors of the cell at a place, for the light of the three vertices.
 vec3 factored(Prism p, ReliefSurface surface, Place place) {
     vec2 size = vec2(surface.columns, surface.rows);
@@ -372,27 +392,31 @@ vec3 factored(Prism p, ReliefSurface surface, Place place) {
     vec2 low = floor(at);
     vec2 f = at - low;
     uvec2 cell = min(uvec2(low - size * floor(low / size)), uvec2(size) - 1);
-    uint row = surface.first_factor + (cell.y * surface.columns + cell.x) * 4 * surface.rank;
+    uint pairs = surface.rank / 2;
+    uint row = surface.first_factor + (cell.y * surface.columns + cell.x) * 4 * pairs;
     vec4 weight = vec4((1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y);
     vec3 sum = vec3(0.0);
-    uint of_a = p.light_a * MOST_RANK * 2;
-    uint of_b = p.light_b * MOST_RANK * 2;
-    uint of_c = p.light_c * MOST_RANK * 2;
+    uvec3 lights = uvec3(p.light_a, p.light_b, p.light_c) * MOST_RANK;
     uint r = 0;
     do {
-        vec3 inside = place.share.x * fetch(coefficients, of_a + 2 * r).rgb
-                    + place.share.y * fetch(coefficients, of_b + 2 * r).rgb
-                    + place.share.z * fetch(coefficients, of_c + 2 * r).rgb;
-        vec3 arriving = place.share.x * fetch(coefficients, of_a + 2 * r + 1).rgb
-                      + place.share.y * fetch(coefficients, of_b + 2 * r + 1).rgb
-                      + place.share.z * fetch(coefficients, of_c + 2 * r + 1).rgb;
-        uint own = row + min(r, surface.rank - 1);
-        vec4 factor = weight.x * fetch(factors, own)
-                    + weight.y * fetch(factors, own + surface.rank)
-                    + weight.z * fetch(factors, own + 2 * surface.rank)
-                    + weight.w * fetch(factors, own + 3 * surface.rank);
-        sum += r < surface.rank ? factor.rgb * inside + factor.w * arriving : vec3(0.0);
-        r++;
+        // Lanes with fewer ranks have coefficients that are 0.
+        [[unroll]] for (uint pair = 0; pair < 2; pair++) {
+            uint own = row + r / 2;
+            uvec4 corner = fetch_words(factors, own);
+            vec4 first = weight.x * halves(corner.xy);
+            vec4 second = weight.x * halves(corner.zw);
+            corner = fetch_words(factors, own + pairs);
+            first += weight.y * halves(corner.xy);
+            second += weight.y * halves(corner.zw);
+            corner = fetch_words(factors, own + 2 * pairs);
+            first += weight.z * halves(corner.xy);
+            second += weight.z * halves(corner.zw);
+            corner = fetch_words(factors, own + 3 * pairs);
+            first += weight.w * halves(corner.xy);
+            second += weight.w * halves(corner.zw);
+            sum += lit(first, lights + r, place.share) + lit(second, lights + r + 1, place.share);
+            r += 2;
+        }
     } while (any_lane(r < surface.rank));
     return max(sum, vec3(0.0));
 }

@@ -24,11 +24,11 @@ pub use super::shaders::relief::Parameters;
 
 /// The light on a picture's relief.
 pub struct Lights<'a> {
-    /// `[surface][cell][corner][rank]`
-    pub factors: &'a [Vec4],
-    /// rgb of the β of the light that goes on inside the relief and of that which arrives by slots,
-    /// `[light vertex][MOST_RANK]`.
-    pub coefficients: &'a [[Vec4; 2]],
+    /// `[surface][cell][corner][rank / 2]`, packed as `render/factor_texels.rs` says.
+    pub factors: &'a [[u32; 4]],
+    /// β of the light that goes on inside the relief and of that which arrives by slots,
+    /// `[light vertex][MOST_RANK]`, packed too.
+    pub coefficients: &'a [[u32; 4]],
     /// rgb, `[light vertex][direction]`
     pub exits: &'a [Vec4],
     /// As the prisms count them.

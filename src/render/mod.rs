@@ -12,6 +12,7 @@ mod background;
 mod blocks;
 mod compare;
 mod emitters;
+mod factor_texels;
 mod flat_relief;
 mod flip;
 mod gathered;

@@ -17,7 +17,6 @@ use super::shafts::{Shafts, Starts};
 use super::slots::slot_colour;
 use super::{Cuts, Light, Lighting, ReliefShading};
 use crate::bake::solution::DirectionalLight;
-use crate::constants::MOST_RANK;
 use crate::error::Result;
 use crate::math::directions::Directions;
 use crate::mesh::clusters::{Cluster, Face, FaceClusters};
@@ -327,7 +326,9 @@ impl PrismBuilder<'_> {
             };
             let inside = coefficients(self.incident.inside);
             let arriving = coefficients(self.incident.arriving.as_deref());
-            self.lit.push(&inside, &arriving);
+            let packed = &self.kept.surfaces.packed[surface as usize];
+            let texels = packed.coefficients(&inside, &arriving);
+            self.lit.coefficients.extend(texels);
             let exits = &self.exits[slots];
             self.lit.exits.extend(exits.iter().map(|e| e.extend(0.0)));
         }
@@ -338,21 +339,12 @@ impl PrismBuilder<'_> {
 /// Meso vertices with light, each as one surface sees it.
 #[derive(Default)]
 struct LightVertices {
-    /// Of the light inside and of the light that arrives, `[light vertex][rank]`.
-    coefficients: Vec<[Vec4; 2]>,
+    /// Packed, of the light inside and of the light that arrives, `[light vertex][rank]`.
+    coefficients: Vec<[u32; 4]>,
     /// Radiosity sent, `[light vertex][slot]`.
     exits: Vec<Vec4>,
     /// Index by meso vertex and surface.
     known: HashMap<(u32, u32), u32>,
-}
-
-impl LightVertices {
-    /// Coefficients `[rank]`; an empty list where there is no light.
-    fn push(&mut self, inside: &[Vec3], arriving: &[Vec3]) {
-        let of = |values: &[Vec3], r: usize| values.get(r).map_or(Vec4::ZERO, |c| c.extend(0.0));
-        let both = (0..MOST_RANK as usize).map(|r| [of(inside, r), of(arriving, r)]);
-        self.coefficients.extend(both);
-    }
 }
 
 /// The clusters in the form that the device reads.

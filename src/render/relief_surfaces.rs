@@ -4,9 +4,10 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use bytemuck::Zeroable;
-use glam::{DVec2, Vec4};
+use glam::DVec2;
 use rayon::prelude::*;
 
+use super::factor_texels::PackedFactors;
 use crate::constants::HORIZON_SECTORS;
 use crate::mesh::tiles::Tile;
 use crate::meso::{Factors, HeightPyramid, Horizons};
@@ -73,8 +74,9 @@ pub struct Surfaces {
     pub pyramids: Vec<f32>,
     /// Bounds of the tiles' horizons, those of one material after the other's.
     pub horizons: Vec<[u8; HORIZON_SECTORS as usize]>,
-    /// Corners' factors of the surfaces, one surface after the other.
-    pub factors: Vec<Vec4>,
+    /// Texels of the factors of the surfaces, one surface after the other.
+    pub factors: Vec<[u32; 4]>,
+    pub packed: Vec<PackedFactors>,
 }
 
 impl Surfaces {
@@ -103,13 +105,14 @@ impl Surfaces {
                 tile
             });
             let range = HeightRange::new(&map, f64::from(material.height_scale.abs()));
+            let mut packed = PackedFactors::new(factors);
             all.list.push(ReliefSurface {
                 lowest: range.lowest as f32,
                 top: range.highest as f32,
                 mean: range.mean as f32,
                 columns: tile.field.columns,
                 rows: tile.field.rows,
-                rank: factors.rank as u32,
+                rank: packed.rank,
                 first_factor: all.factors.len() as u32,
                 slope: (range.scale / tile.size).as_vec2(),
                 ..ReliefSurface::zeroed()
@@ -119,7 +122,8 @@ impl Surfaces {
             all.steepest.push(tile.field.steepest());
             all.tiles.push(height_tile);
             all.ranges.push(range);
-            all.factors.extend(&factors.corners);
+            all.factors.append(&mut packed.texels);
+            all.packed.push(packed);
         }
         all
     }
