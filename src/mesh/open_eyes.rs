@@ -29,7 +29,7 @@ const TURN: f64 = 2.399_963_23;
 /// What a source is to be looked at from.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct Wanted {
-    /// Its index among all sources, so that places lie otherwise on each.
+    /// Its index among all sources: each has its own pattern of places.
     pub turn: u32,
     /// How many places; 0, or a divisor of [`SOURCE_EYES`].
     pub places: u32,

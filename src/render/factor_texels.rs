@@ -1,5 +1,5 @@
-//! Factors of reliefs and coefficients of their light in the form that the relief pass reads, half
-//! the size of floats: a software device takes most of its time for them to read them.
+//! Factors of reliefs and coefficients of their light, packed for the relief pass into about half
+//! the size of floats: a software device spends most of this light's time on reading them.
 
 use glam::Vec3;
 
@@ -8,9 +8,9 @@ use crate::meso::{CORNERS, Factors};
 
 /// Ranks of one texel of the factors.
 const OF_TEXEL: usize = 2;
-/// The loop over ranks takes so many at once; factors of ranks that are missing are 0.
+/// The shader's loop takes this many ranks at once; the list is padded with ranks of 0.
 const AT_ONCE: usize = 4;
-/// The largest factor of a rank is this many steps; 16 bits with a sign.
+/// The largest factor of a rank as a signed number of 16 bits.
 const STEPS: f32 = 32767.0;
 /// The shader reads a factor as the upper half of a whole number.
 const UPPER: f32 = 65536.0;
@@ -20,7 +20,7 @@ pub struct PackedFactors {
     /// `[cell][corner][rank / 2]`: of a rank RGB and w in 16 bits each, the first in the lower half
     /// of its word.
     pub texels: Vec<[u32; 4]>,
-    /// Ranks with those that are 0.
+    /// Number of ranks, with the padding.
     pub rank: u32,
     /// What the coefficients of each rank are to be multiplied by: those of the light inside and of
     /// the light that arrives.

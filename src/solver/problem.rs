@@ -196,7 +196,7 @@ impl Problem {
         if more_eyes {
             open_eyes(
                 &self.elements,
-                &mut sources.list[..],
+                &mut sources.list,
                 &self.occluder_tree,
                 &wanted,
             );
