@@ -42,6 +42,18 @@ pub enum Sight {
 pub struct Hemicubes {
     /// Pixels a side of a face.
     pub face_size: u32,
+    /// Columns of N × 3 N texels side by side, one a slot.
+    pub items: Image,
+    pub sampler: Sampler,
+    /// What decides where the item buffer leaves open what is seen.
+    pub occluders: Option<OccluderTree>,
+}
+
+/// What item buffers are drawn with.
+pub struct DrawLists {
+    pub slot_count: u32,
+    /// Pixels a side of a face.
+    pub face_size: u32,
     pub views: Buffer,
     pub draws: Buffer,
     pub counts: Buffer,
@@ -49,15 +61,13 @@ pub struct Hemicubes {
     pub resume: Buffer,
     /// Triangles that a list of a face holds: all, or what fits the device's largest buffer.
     pub room: u32,
+    /// In how many parts the batch is drawn. Each but the last leaves less than a meshlet of its
+    /// room.
+    pub parts: u32,
     /// `[slot][face][triangle]`.
     pub drawn_corners: Buffer,
     pub drawn_items: Buffer,
-    /// Columns of N × 3 N texels side by side, one a slot.
-    pub items: Image,
     pub framebuffer: Framebuffer,
-    pub sampler: Sampler,
-    /// What decides where the item buffer leaves open what is seen.
-    pub occluders: Option<OccluderTree>,
 }
 
 /// Bytes of the lists of drawn triangles, for one occluder in one face of one slot.
@@ -75,14 +85,9 @@ impl Batch {
         })
     }
 
-    /// A batch that draws hemicubes.
-    pub fn drawing(
-        device: &Arc<Device>,
-        pass: &RenderPass,
-        scene: &SceneBuffers,
-        size: &BatchSize,
-    ) -> Result<Self> {
-        let hemicubes = Hemicubes::new(device, pass, scene, size)?;
+    /// A batch that sees by item buffers.
+    pub fn of_hemicubes(device: &Arc<Device>, size: &BatchSize) -> Result<Self> {
+        let hemicubes = Hemicubes::new(device, size)?;
         Self::new(device, size.slots, Sight::Hemicubes(hemicubes))
     }
 
@@ -94,11 +99,11 @@ impl Batch {
         self
     }
 
-    /// Of a batch that draws.
+    /// Of a batch that sees by them.
     pub fn hemicubes(&self) -> &Hemicubes {
         match &self.sight {
             Sight::Hemicubes(hemicubes) => hemicubes,
-            Sight::Rays(_) => unreachable!("asked of batches that draw"),
+            Sight::Rays(_) => unreachable!("asked of batches of hemicubes"),
         }
     }
 }
@@ -110,15 +115,6 @@ impl Hemicubes {
         wanted.min(most_slots(device.limits(), counts, face_size))
     }
 
-    /// In how many parts it is drawn. Each but the last leaves less than a meshlet of its room.
-    pub fn parts(&self, scene: &SceneBuffers) -> u32 {
-        let filled = self.room.saturating_sub(MESHLET_TRIANGLES - 1).max(1);
-        match scene.occluder_count > self.room {
-            true => scene.occluder_count.div_ceil(filled),
-            false => 1,
-        }
-    }
-
     /// The item buffers as shaders read them.
     pub(super) fn sampled_items(&self) -> Sampled<'_> {
         Sampled {
@@ -127,10 +123,26 @@ impl Hemicubes {
         }
     }
 
-    fn new(
+    fn new(device: &Arc<Device>, size: &BatchSize) -> Result<Self> {
+        let BatchSize { slots, face, .. } = *size;
+        let size = (slots * face, 3 * face);
+        let usage = ImageUse::ColourTarget;
+        Ok(Self {
+            face_size: face,
+            items: Image::new(device, "item buffer", size, Format::R32_UINT, usage)?,
+            sampler: Sampler::new(device, "item buffer", false)?,
+            occluders: None,
+        })
+    }
+}
+
+impl DrawLists {
+    /// To draw a batch, by this pass.
+    pub fn new(
         device: &Arc<Device>,
         pass: &RenderPass,
         scene: &SceneBuffers,
+        batch: &Batch,
         size: &BatchSize,
     ) -> Result<Self> {
         let &BatchSize {
@@ -142,28 +154,32 @@ impl Hemicubes {
         let most = device.limits().max_storage_buffer_range / (CORNER_BYTES * regions);
         let wanted = list_room.map_or(u64::MAX, u64::from);
         let most = most.min(wanted).max(MESHLET_TRIANGLES.into());
-        let room = most.min(scene.occluder_count.into()) as u32;
+        let occluders = scene.occluder_count;
+        let room = most.min(occluders.into()) as u32;
+        let filled = room.saturating_sub(MESHLET_TRIANGLES - 1).max(1);
         let drawn = regions * u64::from(room);
         let buffer = |name, bytes, usage| Buffer::new(device, name, bytes, usage);
         let size = (slot_count * face_size, 3 * face_size);
-        let image = |name, format, usage| Image::new(device, name, size, format, usage);
-        let items = image("item buffer", Format::R32_UINT, ImageUse::ColourTarget)?;
-        let depth = image("item depth", Format::D32_SFLOAT, ImageUse::DepthTarget)?;
+        let (format, usage) = (Format::D32_SFLOAT, ImageUse::DepthTarget);
+        let depth = Image::new(device, "item depth", size, format, usage)?;
+        let items = &batch.hemicubes().items;
         let views = regions * size_of::<View>() as u64;
         let draws = regions * size_of::<Draw>() as u64;
         Ok(Self {
+            slot_count,
             face_size,
             room,
+            parts: match occluders > room {
+                true => occluders.div_ceil(filled),
+                false => 1,
+            },
             views: buffer("views", views, BufferUse::Storage)?,
             draws: buffer("draws", draws, BufferUse::Geometry)?,
             counts: buffer("cull counts", regions * 12, BufferUse::Storage)?,
             resume: buffer("cull resume", regions * 4, BufferUse::Storage)?,
             drawn_corners: buffer("drawn corners", CORNER_BYTES * drawn, BufferUse::Storage)?,
             drawn_items: buffer("drawn items", 4 * drawn, BufferUse::Storage)?,
-            framebuffer: Framebuffer::new(device, "item buffer", pass, &items, &depth)?,
-            sampler: Sampler::new(device, "item buffer", false)?,
-            items,
-            occluders: None,
+            framebuffer: Framebuffer::new(device, "item buffer", pass, items, &depth)?,
         })
     }
 }

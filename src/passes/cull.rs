@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::batch::Batch;
+use super::batch::{Batch, DrawLists};
 use super::buffers::SceneBuffers;
 use super::shaders::cull::{Bindings, Parameters, SHADER};
 use crate::constants::FACES;
@@ -36,6 +36,7 @@ impl Cull {
         culling: Culling,
         scene: &SceneBuffers,
         batch: &Batch,
+        lists: &DrawLists,
     ) -> Result<Self> {
         let constants = [
             device.limits().subgroup_size,
@@ -43,7 +44,6 @@ impl Cull {
             (culling == Culling::Triangles).into(),
             device.limits().subpixel_bits,
         ];
-        let hemicubes = batch.hemicubes();
         let pipeline = ComputePipeline::in_subgroups(device, "cull", &SHADER, &constants)?;
         let bindings = Bindings {
             slots: &batch.slots,
@@ -53,20 +53,20 @@ impl Cull {
             corners: &scene.occluder_corners,
             vertices: &scene.vertices,
             planes: &scene.planes,
-            drawn_corners: &hemicubes.drawn_corners,
-            drawn_items: &hemicubes.drawn_items,
-            draws: &hemicubes.draws,
-            views: &hemicubes.views,
-            counts: &hemicubes.counts,
+            drawn_corners: &lists.drawn_corners,
+            drawn_items: &lists.drawn_items,
+            draws: &lists.draws,
+            views: &lists.views,
+            counts: &lists.counts,
             items: &scene.occluder_items,
-            resume: &hemicubes.resume,
+            resume: &lists.resume,
         };
         Ok(Self {
             bound: pipeline.bind(&bindings)?,
             parameters: Parameters {
                 meshlet_count: scene.meshlet_count,
-                room: hemicubes.room,
-                face_size: hemicubes.face_size,
+                room: lists.room,
+                face_size: lists.face_size,
                 part: 0,
             },
             slot_count: batch.slot_count,

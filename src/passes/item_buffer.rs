@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use glam::Vec2;
 
-use super::batch::Batch;
+use super::batch::DrawLists;
 use super::buffers::SceneBuffers;
 use super::cull::Cull;
 use super::shaders::item_buffer::{Bindings, Parameters, SHADER};
@@ -56,14 +56,13 @@ impl ItemBuffer {
         })
     }
 
-    pub fn bind(&self, scene: &SceneBuffers, batch: &Batch) -> Result<DescriptorSet> {
-        let hemicubes = batch.hemicubes();
+    pub fn bind(&self, scene: &SceneBuffers, lists: &DrawLists) -> Result<DescriptorSet> {
         self.pipeline.bind(
             "item buffer",
             &Bindings {
-                views: &hemicubes.views,
-                drawn_items: &hemicubes.drawn_items,
-                drawn_corners: &hemicubes.drawn_corners,
+                views: &lists.views,
+                drawn_items: &lists.drawn_items,
+                drawn_corners: &lists.drawn_corners,
                 vertices: &scene.vertices,
             },
         )
@@ -76,55 +75,60 @@ impl ItemBuffer {
         cmd: &Commands,
         set: &DescriptorSet,
         cull: &Cull,
-        scene: &SceneBuffers,
-        batch: &Batch,
+        lists: &DrawLists,
         listed: impl FnOnce(),
     ) {
         cull.record(cmd, 0);
         cmd.barrier(&[Stage::Compute], &[Stage::Draw]);
         listed();
-        self.draw(cmd, set, batch, &self.pass);
-        for part in 1..batch.hemicubes().parts(scene) {
+        self.draw(cmd, set, lists, &self.pass);
+        for part in 1..lists.parts {
             cmd.barrier(&[Stage::Draw], &[Stage::Compute]);
             cull.record(cmd, part);
             cmd.barrier(&[Stage::Compute], &[Stage::Draw]);
-            self.draw(cmd, set, batch, &self.further);
+            self.draw(cmd, set, lists, &self.further);
         }
     }
 
     /// Draws all slots, some of them in each part of the submission.
-    fn draw(&self, cmd: &Commands, set: &DescriptorSet, batch: &Batch, pass: &RenderPass) {
-        let hemicubes = batch.hemicubes();
-        let work = pixel_count(hemicubes.face_size) as u32 + hemicubes.room;
+    fn draw(&self, cmd: &Commands, set: &DescriptorSet, lists: &DrawLists, pass: &RenderPass) {
+        let (slot_count, face_size) = (lists.slot_count, lists.face_size);
+        let work = pixel_count(face_size) as u32 + lists.room;
         let at_once = (PART / work).max(1);
-        for first in (0..batch.slot_count).step_by(at_once as usize) {
-            let slots = first..(first + at_once).min(batch.slot_count);
+        for first in (0..slot_count).step_by(at_once as usize) {
+            let slots = first..(first + at_once).min(slot_count);
             cmd.part();
             if first > 0 {
                 cmd.barrier(&[Stage::Draw], &[Stage::Draw]);
             }
             // The first pass clears all slots.
             let (pass, columns) = match first {
-                0 => (pass, 0..batch.slot_count * hemicubes.face_size),
+                0 => (pass, 0..slot_count * face_size),
                 _ => (
                     &self.further,
-                    slots.start * hemicubes.face_size..slots.end * hemicubes.face_size,
+                    slots.start * face_size..slots.end * face_size,
                 ),
             };
-            cmd.begin_render_pass_in(pass, &hemicubes.framebuffer, columns, [NONE; 4]);
-            self.draw_slots(cmd, set, batch, slots);
+            cmd.begin_render_pass_in(pass, &lists.framebuffer, columns, [NONE; 4]);
+            self.draw_slots(cmd, set, lists, slots);
             cmd.end_render_pass();
         }
     }
 
-    fn draw_slots(&self, cmd: &Commands, set: &DescriptorSet, batch: &Batch, slots: Range<u32>) {
-        let hemicubes = batch.hemicubes();
+    fn draw_slots(
+        &self,
+        cmd: &Commands,
+        set: &DescriptorSet,
+        lists: &DrawLists,
+        slots: Range<u32>,
+    ) {
+        let face_size = lists.face_size;
         cmd.bind_graphics(&self.pipeline, set, None);
         for slot in slots {
             for face in 0..FACES {
-                let [x, y, width, height] = face_rectangle(face, hemicubes.face_size);
+                let [x, y, width, height] = face_rectangle(face, face_size);
                 let region = slot * FACES + face;
-                cmd.viewport(slot * hemicubes.face_size + x, y, width, height);
+                cmd.viewport(slot * face_size + x, y, width, height);
                 cmd.push_graphics(
                     &self.pipeline,
                     &Parameters {
@@ -133,10 +137,7 @@ impl ItemBuffer {
                         half_size: Vec2::new(width as f32, height as f32) / 2.0,
                     },
                 );
-                cmd.draw_indirect(
-                    &hemicubes.draws,
-                    u64::from(region) * size_of::<Draw>() as u64,
-                );
+                cmd.draw_indirect(&lists.draws, u64::from(region) * size_of::<Draw>() as u64);
             }
         }
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::Settings;
 use crate::error::Result;
-use crate::passes::batch::{Batch, BatchSize, Hemicubes};
+use crate::passes::batch::{Batch, BatchSize, DrawLists, Hemicubes};
 use crate::passes::buffers::SceneBuffers;
 use crate::passes::cull::{Cull, Culling};
 use crate::passes::item_buffer::ItemBuffer;
@@ -13,6 +13,7 @@ use crate::vk::{Buffer, BufferUse, Commands, DescriptorSet, Device, Stage};
 
 /// The passes that draw, bound to a batch.
 pub(super) struct Drawing {
+    pub lists: DrawLists,
     cull: Cull,
     item_buffer: ItemBuffer,
     item_set: DescriptorSet,
@@ -27,11 +28,13 @@ impl Drawing {
         size: &BatchSize,
     ) -> Result<(Self, Batch)> {
         let item_buffer = ItemBuffer::new(device)?;
-        let batch = Batch::drawing(device, &item_buffer.pass, scene, size)?;
+        let batch = Batch::of_hemicubes(device, size)?;
+        let lists = DrawLists::new(device, &item_buffer.pass, scene, &batch, size)?;
         let drawing = Self {
-            cull: Cull::new(device, culling, scene, &batch)?,
-            item_set: item_buffer.bind(scene, &batch)?,
+            cull: Cull::new(device, culling, scene, &batch, &lists)?,
+            item_set: item_buffer.bind(scene, &lists)?,
             item_buffer,
+            lists,
         };
         Ok((drawing, batch))
     }
@@ -55,29 +58,17 @@ impl Drawing {
     }
 
     /// `listed` is recorded between culling and drawing.
-    pub fn record(
-        &self,
-        cmd: &Commands,
-        scene: &SceneBuffers,
-        batch: &Batch,
-        listed: impl FnOnce(),
-    ) {
-        (self.item_buffer).record(cmd, &self.item_set, &self.cull, scene, batch, listed);
+    pub fn record(&self, cmd: &Commands, listed: impl FnOnce()) {
+        (self.item_buffer).record(cmd, &self.item_set, &self.cull, &self.lists, listed);
     }
 }
 
 impl Drawing {
     /// The item buffer of one source, in the first slot of the batch.
-    pub fn draw(
-        &self,
-        device: &Arc<Device>,
-        scene: &SceneBuffers,
-        batch: &Batch,
-        source: u32,
-    ) -> Result<Vec<u32>> {
+    pub fn draw(&self, device: &Arc<Device>, batch: &Batch, source: u32) -> Result<Vec<u32>> {
         batch.slots.set(&[Slot::of(source)])?;
         Commands::run(device, "item buffer", |cmd| {
-            self.record(cmd, scene, batch, || {});
+            self.record(cmd, || {});
             Ok(())
         })?;
         read_items(device, batch)

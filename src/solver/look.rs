@@ -55,7 +55,7 @@ impl Solver {
             list_room: None,
         };
         let (drawing, batch) = Drawing::new(device, scene, settings.culling, &size)?;
-        let drawn = drawing.draw(device, scene, &batch, source)?;
+        let drawn = drawing.draw(device, &batch, source)?;
         let input = &self.problem.elements.input_index;
         let of_input = |item: u32| input.get(item as usize).copied().unwrap_or(NONE);
         Ok(ItemPicture {

@@ -277,7 +277,10 @@ impl Member {
             occluders: made.occluders.as_ref(),
             kept: &self.kept,
             parcels: &self.share.parcels,
-            shares: self.exchange.is_some(),
+            members: self
+                .exchange
+                .as_ref()
+                .map_or(1, |exchange| exchange.place()[1]),
         };
         let makers = match self.makers.take() {
             Some(makers) if kinds.iter().all(|kind| is_made(&makers, *kind)) => makers,

@@ -15,7 +15,7 @@ use super::shared_items::{Asked, SharedItems, slots_of};
 use super::{EmitterShadows, Settings};
 use crate::constants::{FACES, RECEIVE_LISTS};
 use crate::error::Result;
-use crate::passes::batch::{Batch, Sight};
+use crate::passes::batch::{Batch, BatchSize, Sight};
 use crate::passes::buffers::SceneBuffers;
 use crate::passes::couple::Couple;
 use crate::passes::fresh_rows::FreshRows;
@@ -42,8 +42,8 @@ pub(super) struct RowParts<'a> {
     pub kept: &'a KeptRows,
     /// See [`super::shares::Share::parcels`].
     pub parcels: &'a [[u32; 2]],
-    /// Whether there are other members.
-    pub shares: bool,
+    /// How many members there are.
+    pub members: usize,
 }
 
 /// How a row maker finds what its sources see.
@@ -82,21 +82,33 @@ impl RowMaker {
             kept,
             ..
         } = *parts;
-        let (drawing, batch) = match looks {
+        let (drawing, shared, batch) = match looks {
             Looks::Hemicubes(face) => {
                 let slots = fresh.slot_count;
                 let size = Drawing::fitting(device, scene, settings, slots, face);
-                let (drawing, batch) = Drawing::new(device, scene, settings.culling, &size)?;
+                let drawn = BatchSize {
+                    slots: size.slots.div_ceil(parts.members as u32),
+                    ..size
+                };
+                let (drawing, drawn) = Drawing::new(device, scene, settings.culling, &drawn)?;
+                let (shared, batch) = match parts.members {
+                    1 => (None, drawn),
+                    _ => {
+                        let batch = Batch::of_hemicubes(device, &size)?;
+                        let shared = SharedItems::new(device, &drawing, &drawn, &batch)?;
+                        (Some(shared), batch)
+                    }
+                };
                 let batch = match parts.occluders {
                     Some(tree) => batch.with_rays(tree),
                     None => batch,
                 };
-                (Some(drawing), batch)
+                (Some(drawing), shared, batch)
             }
             Looks::Rays | Looks::Lights { .. } => {
                 let tree = parts.occluders.expect("rays have occluders").clone();
                 let sight = Sight::Rays(tree);
-                (None, Batch::new(device, fresh.slot_count, sight)?)
+                (None, None, Batch::new(device, fresh.slot_count, sight)?)
             }
         };
         let evaluate = match looks {
@@ -108,15 +120,9 @@ impl RowMaker {
         };
         let couple = Couple::new(device, scene, &batch, fresh, parts.targets)?;
         let keep = Keep::new(device, &batch.slots, batch.slot_count, fresh, kept)?;
-        let shared = match (&drawing, parts.shares) {
-            (Some(drawing), true) => Some(SharedItems::new(device, scene, drawing, &batch)?),
-            _ => None,
-        };
         let words = |count: u32| 4 * u64::from(count);
-        let counts = match &batch.sight {
-            Sight::Hemicubes(hemicubes) if shared.is_none() => Some(&hemicubes.counts),
-            _ => None,
-        };
+        let alone = drawing.as_ref().filter(|_| shared.is_none());
+        let counts = alone.map(|drawing| &drawing.lists.counts);
         let list_bytes = u64::from(RECEIVE_LISTS) * size_of::<ReceiverList>() as u64;
         let parts_of_rows = [
             (Some(&batch.slots), size_of::<Slot>() as u64),
@@ -158,7 +164,7 @@ impl RowMaker {
                         cmd.timestamp(stamps, 1);
                     }
                     (Some(drawing), None) => {
-                        drawing.record(cmd, scene, &batch, || cmd.timestamp(stamps, 1));
+                        drawing.record(cmd, || cmd.timestamp(stamps, 1));
                     }
                     (None, None) => cmd.timestamp(stamps, 1),
                 }

@@ -97,7 +97,7 @@ pub fn ids_come_back_right(device: &Arc<Device>) -> Result<bool> {
     let (index, emitter) = (sources.list.iter().enumerate())
         .find(|(_, s)| s.emitted.max_element() > 0.0)
         .expect("the test scene has a light");
-    let drawn = drawing.draw(device, &scene, &batch, index as u32)?;
+    let drawn = drawing.draw(device, &batch, index as u32)?;
     Ok(crate::reference::item_buffer::disagreements(
         &elements,
         &connections,

@@ -12,7 +12,6 @@ use crate::constants::NONE;
 use crate::error::{Error, Result};
 use crate::math::hemicube::pixel_count;
 use crate::passes::batch::Batch;
-use crate::passes::buffers::SceneBuffers;
 use crate::passes::types::Slot;
 use crate::vk::{Buffer, BufferUse, Commands, Device, Stage, Timestamps};
 
@@ -42,6 +41,8 @@ pub(super) struct SharedItems {
     /// Pixels a side of a face.
     face: usize,
     slots: usize,
+    /// Of what this member draws.
+    drawn_slots: usize,
 }
 
 /// Slots of sources, and empty ones behind.
@@ -51,38 +52,39 @@ pub(super) fn slots_of(sources: impl Iterator<Item = u32>, count: usize) -> Vec<
 }
 
 impl SharedItems {
+    /// For the item buffers of `batch`, of which this member's share is drawn in `share`.
     pub fn new(
         device: &Arc<Device>,
-        scene: &SceneBuffers,
         drawing: &Drawing,
+        share: &Batch,
         batch: &Batch,
     ) -> Result<Self> {
-        let hemicubes = batch.hemicubes();
-        let slots = batch.slot_count as usize;
-        let items = 4 * (pixel_count(hemicubes.face_size) * slots) as u64;
-        let slot_bytes = (slots * size_of::<Slot>()) as u64;
-        let counts = hemicubes.counts.bytes();
+        let face_size = batch.hemicubes().face_size;
+        let [slots, drawn_slots] = [batch, share].map(|of| of.slot_count as usize);
+        let bytes = |slots: usize| 4 * (pixel_count(face_size) * slots) as u64;
+        let slot_bytes = (drawn_slots * size_of::<Slot>()) as u64;
+        let counts = drawing.lists.counts.bytes();
         let buffer = |name, bytes, usage| Buffer::new(device, name, bytes, usage);
         let wanted = buffer("sources to draw", slot_bytes, BufferUse::Upload)?;
-        let drawn = buffer("drawn items", items, BufferUse::Readback)?;
+        let drawn = buffer("drawn items", bytes(drawn_slots), BufferUse::Readback)?;
         let counted = buffer("drawn counts", counts, BufferUse::Readback)?;
         let stamps = Timestamps::new(device, "drawing timestamps", 3)?;
         let draw = Commands::record(device, "draw items", |cmd| {
             let used = [Stage::Compute, Stage::Draw, Stage::Transfer];
             cmd.reset_timestamps(&stamps);
             cmd.barrier(&used, &[Stage::Transfer]);
-            cmd.copy(&wanted, 0, &batch.slots, 0, slot_bytes);
+            cmd.copy(&wanted, 0, &share.slots, 0, slot_bytes);
             cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
             cmd.timestamp(&stamps, 0);
-            drawing.record(cmd, scene, batch, || cmd.timestamp(&stamps, 1));
+            drawing.record(cmd, || cmd.timestamp(&stamps, 1));
             cmd.timestamp(&stamps, 2);
-            cmd.copy_shader_image_to_buffer(&hemicubes.items, &drawn);
+            cmd.copy_shader_image_to_buffer(&share.hemicubes().items, &drawn);
             cmd.barrier(&[Stage::Compute], &[Stage::Transfer]);
-            cmd.copy(&hemicubes.counts, 0, &counted, 0, counts);
+            cmd.copy(&drawing.lists.counts, 0, &counted, 0, counts);
             cmd.read_back_timestamps(&stamps);
             Ok(())
         })?;
-        let all = || buffer("items of all", items, BufferUse::Upload);
+        let all = || buffer("items of all", bytes(slots), BufferUse::Upload);
         Ok(Self {
             items: [all()?, all()?],
             draw,
@@ -90,8 +92,9 @@ impl SharedItems {
             stamps,
             drawn,
             counts: counted,
-            face: hemicubes.face_size as usize,
+            face: face_size as usize,
             slots,
+            drawn_slots,
         })
     }
 
@@ -104,7 +107,7 @@ impl SharedItems {
         if own.len() == 0 {
             return Ok(());
         }
-        self.wanted.write(0, &slots_of(own, self.slots));
+        self.wanted.write(0, &slots_of(own, self.drawn_slots));
         self.draw.submit()
     }
 
@@ -172,9 +175,9 @@ impl SharedItems {
         })
     }
 
-    /// Where the rows of a slot lie in an image.
+    /// Where the rows of a slot lie in what this member draws.
     fn rows(&self, slot: usize) -> impl Iterator<Item = Range<usize>> + use<> {
-        let (face, wide) = (self.face, self.face * self.slots);
+        let (face, wide) = (self.face, self.face * self.drawn_slots);
         (0..3 * face).map(move |row| row * wide + slot * face..row * wide + (slot + 1) * face)
     }
 

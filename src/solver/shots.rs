@@ -199,7 +199,7 @@ impl ShotBatch {
         let (drawing, batch) = Drawing::new(device, scene, on.settings.culling, &size)?;
         let shoot = Shoot::new(device, scene, light, &batch.slots, batch.slot_count)?;
         let bin = BinShots::new(device, scene, light, &batch)?;
-        let counts = &batch.hemicubes().counts;
+        let counts = &drawing.lists.counts;
         let bytes = u64::from(batch.slot_count) * size_of::<Slot>() as u64;
         let wanted = Buffer::new(device, "wanted shots", bytes, BufferUse::Upload)?;
         let readback = Buffer::new(device, "counts", counts.bytes(), BufferUse::Readback)?;
@@ -212,7 +212,7 @@ impl ShotBatch {
             cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
             shoot.record(cmd);
             cmd.timestamp(&timestamps, 0);
-            drawing.record(cmd, scene, &batch, || cmd.timestamp(&timestamps, 1));
+            drawing.record(cmd, || cmd.timestamp(&timestamps, 1));
             cmd.timestamp(&timestamps, 2);
             cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
             bin.record(cmd);
