@@ -81,38 +81,28 @@ impl Timing {
             lines.push(format!("first picture with light after {seconds:.2} s"));
         }
         for (what, frames) in [("while baking", &self.baking), ("without", &self.idle)] {
-            if let Some((median, most)) = spread(frames) {
-                lines.push(format!(
-                    "frame {what}: {median:.1} ms in the middle, {most:.1} ms at the 95th percentile of {}",
-                    frames.len()
-                ));
+            if let Some(spread) = Spread::of(frames) {
+                lines.push(format!("frame {what}: {}", spread.milliseconds()));
             }
         }
-        if let (Some((baking, _)), Some((idle, _))) = (spread(&self.baking), spread(&self.idle)) {
+        if let [Some(baking), Some(idle)] = [&self.baking, &self.idle].map(|of| Spread::of(of)) {
             lines.push(format!(
                 "frame while baking over frame without: {:.2}",
-                baking / idle
+                baking.middle / idle.middle
             ));
         }
-        if let Some((median, most)) = spread(&self.answers) {
-            let worst = 1e3 * self.answers.iter().copied().fold(0.0, f64::max);
-            lines.push(format!(
-                "input answered in {median:.1} ms in the middle, {most:.1} ms at the 95th percentile, {worst:.1} ms at most, of {}",
-                self.answers.len()
-            ));
+        if let Some(spread) = Spread::of(&self.answers) {
+            lines.push(format!("input answered: {}", spread.milliseconds()));
         }
         for (what, times) in [
             ("direct light of changed lights", &self.relit_direct),
             ("all light of changed lights", &self.relit),
         ] {
-            match spread(times) {
+            match Spread::of(times) {
                 // Of a light that is dragged.
-                Some((median, most)) if times.len() > FEW => lines.push(format!(
-                    "{what} on the screen after {:.2} s in the middle, {:.2} s at the 95th \
-                     percentile of {}",
-                    1e-3 * median,
-                    1e-3 * most,
-                    times.len()
+                Some(spread) if times.len() > FEW => lines.push(format!(
+                    "{what} on the screen: after {}",
+                    spread.milliseconds()
                 )),
                 _ => {
                     let line = |seconds: &f64| format!("{what} on the screen after {seconds:.2} s");
@@ -124,12 +114,40 @@ impl Timing {
     }
 }
 
-/// The median and the 95th percentile in milliseconds; None without values.
-fn spread(seconds: &[f64]) -> Option<(f64, f64)> {
-    let mut sorted = seconds.to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let at = |share: f64| sorted.get(((sorted.len().max(1) - 1) as f64 * share).round() as usize);
-    Some((1e3 * at(0.5)?, 1e3 * at(0.95)?))
+/// How times spread, seconds.
+struct Spread {
+    middle: f64,
+    p95: f64,
+    p99: f64,
+    longest: f64,
+    count: usize,
+}
+
+impl Spread {
+    /// None without times.
+    fn of(seconds: &[f64]) -> Option<Self> {
+        let mut sorted = seconds.to_vec();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let last = sorted.len().checked_sub(1)?;
+        let at = |share: f64| sorted[(last as f64 * share).round() as usize];
+        Some(Self {
+            middle: at(0.5),
+            p95: at(0.95),
+            p99: at(0.99),
+            longest: sorted[last],
+            count: sorted.len(),
+        })
+    }
+
+    fn milliseconds(&self) -> String {
+        let [middle, p95, p99, longest] =
+            [self.middle, self.p95, self.p99, self.longest].map(|seconds| 1e3 * seconds);
+        format!(
+            "{middle:.1} ms in the middle, {p95:.1} at the 95th percentile, {p99:.1} at the 99th, \
+             {longest:.1} at most, of {}",
+            self.count
+        )
+    }
 }
 
 #[cfg(test)]
@@ -146,6 +164,9 @@ mod tests {
         }
         let lines = timing.lines();
         assert_eq!(lines.len(), 3, "{lines:?}");
+        let spread = "10.0 ms in the middle, 19.0 at the 95th percentile, 20.0 at the 99th, 20.0 at \
+                      most, of 20";
+        assert_eq!(lines[1], format!("frame without: {spread}"));
         assert!(lines[2].ends_with("2.00"), "{lines:?}");
     }
 }

@@ -75,9 +75,9 @@ impl<A: Send + 'static, F: Send + 'static> Worker<A, F> {
         self.shared.changed.notify_all();
     }
 
-    /// Whether there is something to take.
-    pub fn has_found(&self) -> bool {
-        self.shared.state().found.is_some()
+    /// Whether there is something to take that is `wanted`.
+    pub fn has_found(&self, wanted: impl FnOnce(&F) -> bool) -> bool {
+        self.shared.state().found.as_ref().is_some_and(wanted)
     }
 
     /// What was found last, since the last call.

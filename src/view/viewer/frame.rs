@@ -91,6 +91,7 @@ impl Viewer {
         let update = begin.elapsed();
         let seconds = begin.duration_since(self.last_frame).as_secs_f64();
         self.last_frame = begin;
+        self.framed = self.epoch;
         self.fly(seconds.min(0.1));
         let Some(size) = self.screen.fit(self.size, self.stale)? else {
             return Ok(false);

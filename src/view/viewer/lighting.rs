@@ -147,10 +147,12 @@ impl Viewer {
         }
     }
 
-    /// Until when a frame waits for a sketch that is under way.
+    /// Until when a frame waits for a sketch that is under way: one of lights before the last frame
+    /// would show them a frame late.
     pub(super) fn sketch_due(&self) -> Option<Instant> {
         let edited = self.edited.as_ref().filter(|edited| !edited.shown_direct)?;
-        let under_way = self.can_sketch() && !self.sketcher.has_found();
+        let newer = |found: &Sketch| found.epoch > self.framed;
+        let under_way = self.can_sketch() && !self.sketcher.has_found(newer);
         // Of several changes since the last frame, from the first.
         under_way.then(|| self.unanswered.unwrap_or(edited.since) + SKETCHING)
     }

@@ -131,6 +131,8 @@ pub struct Viewer {
     /// Time of the first input that no frame has answered yet.
     pub(super) unanswered: Option<Instant>,
     last_frame: Instant,
+    /// The epoch when it began.
+    framed: u64,
     start: Instant,
     pub(super) timing: Timing,
     pub(super) capture: Option<PathBuf>,
@@ -265,6 +267,7 @@ impl Viewer {
             edited: None,
             unanswered: None,
             last_frame: Instant::now(),
+            framed: 0,
             start,
             timing: Timing::default(),
             capture: None,
