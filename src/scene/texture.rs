@@ -21,6 +21,8 @@ pub struct Texture {
 /// Samples along an edge of a triangle, at most: 64² keeps the mean of one element under a
 /// millisecond.
 const MOST_STRATA: u32 = 64;
+#[cfg(feature = "window")]
+const FEW_STRATA: u32 = 8;
 
 impl Texture {
     /// Reads PNG (8 and 16 bit) and JPEG as sRGB, OpenEXR as linear light. Grey is expanded to RGB;
@@ -111,11 +113,21 @@ impl Texture {
     /// limited, so that a regular texture does not alias with the samples. The same input gives the
     /// same bits.
     pub fn mean_over_triangle(&self, uv: &[[f32; 2]; 3]) -> [f32; 3] {
+        self.mean_by(uv, MOST_STRATA)
+    }
+
+    /// The same by a few samples.
+    #[cfg(feature = "window")]
+    pub(crate) fn about_over_triangle(&self, uv: &[[f32; 2]; 3]) -> [f32; 3] {
+        self.mean_by(uv, FEW_STRATA)
+    }
+
+    fn mean_by(&self, uv: &[[f32; 2]; 3], most: u32) -> [f32; 3] {
         let [a, b, c] = uv.map(|[u, v]| [f64::from(u), f64::from(v)]);
         let wanted = 2.0 * self.longest_edge([a, b, c]);
         // A float cast saturates, so an enormous triangle also gets the limit.
-        let n = (wanted.ceil() as u32).clamp(1, MOST_STRATA);
-        let jitter = wanted > f64::from(MOST_STRATA);
+        let n = (wanted.ceil() as u32).clamp(1, most);
+        let jitter = wanted > f64::from(most);
         let mut sum = [0.0_f64; 3];
         let mut stratum = 0_u64;
         for i in 0..n {
@@ -193,10 +205,27 @@ pub(super) fn decode_bytes(bytes: &[u8]) -> std::result::Result<DynamicImage, St
 
 /// The two texels about a coordinate in repeats, and the weight of the second.
 pub(super) fn neighbours(coordinate: f64, size: u32) -> ([usize; 2], f64) {
-    let at = coordinate.rem_euclid(1.0) * f64::from(size) - 0.5;
-    let low = at.floor();
-    let first = (low as i64).rem_euclid(i64::from(size)) as usize;
-    ([first, (first + 1) % size as usize], at - low)
+    // Remainders and floors are calls, and this is asked millions of times.
+    let at = repeated(coordinate) * f64::from(size) - 0.5;
+    let last = size as usize - 1;
+    let low = at as usize;
+    let (first, before) = match at < 0.0 {
+        true => (last, -1.0),
+        false => (low.min(last), low as f64),
+    };
+    let second = if first == last { 0 } else { first + 1 };
+    ([first, second], at - before)
+}
+
+/// The remainder to 1, which is in 0..=1, of a finite number: as `rem_euclid`, to the bit.
+fn repeated(coordinate: f64) -> f64 {
+    let inside = coordinate - coordinate as i64 as f64;
+    let inside = match inside < 0.0 {
+        true => inside + 1.0,
+        false => inside,
+    };
+    // Larger ones are whole numbers.
+    if coordinate.abs() < 1e16 { inside } else { 0.0 }
 }
 
 /// A uniform place in the triangle (0,0), (1,0), (0,1), the same for the same number.
@@ -224,4 +253,42 @@ pub(super) fn srgb_table() -> Vec<f32> {
             linear as f32
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// To the bit, at steps and between, of both signs and all sizes.
+    #[test]
+    fn neighbours_are_found_without_remainders() {
+        let plain = |coordinate: f64, size: u32| {
+            let at = coordinate.rem_euclid(1.0) * f64::from(size) - 0.5;
+            let low = at.floor();
+            let first = (low as i64).rem_euclid(i64::from(size)) as usize;
+            ([first, (first + 1) % size as usize], at - low)
+        };
+        let mut state = 5;
+        let some = (0..20_000).map(|i| {
+            let z = random::next(&mut state);
+            let size = 2.0_f64.powi((i % 80) - 60);
+            (z as i64 as f64 / i64::MAX as f64) * size
+        });
+        let steps = (-40..40).flat_map(|i| {
+            let at = f64::from(i) / 8.0;
+            [at, at.next_up(), at.next_down()]
+        });
+        let extreme = [0.0, -0.0, 1e-300, -1e-300, 4e15 + 0.5, -9e15, 1e18, -1e300];
+        for coordinate in some.chain(steps).chain(extreme) {
+            for size in [1, 2, 7, 512] {
+                let (expected, found) = (plain(coordinate, size), neighbours(coordinate, size));
+                assert_eq!(found.0, expected.0, "{coordinate} of {size}");
+                assert_eq!(
+                    found.1.to_bits(),
+                    expected.1.to_bits(),
+                    "{coordinate} of {size}"
+                );
+            }
+        }
+    }
 }

@@ -1,7 +1,6 @@
 //! The sky behind the surfaces of a view.
 
 use egui::Color32;
-use rayon::prelude::*;
 
 use super::camera::Eye;
 use super::overlay::code;
@@ -31,7 +30,8 @@ impl Subject {
             let way = eye.ray((at(i % size.0), at(i / size.0)), size);
             code(sky.radiance(way).as_vec3().to_array().map(|c| c * exposure))
         };
-        let codes = (0..size.0 * size.1).into_par_iter().map(pixel);
+        // The threads that all share may have seconds of a bake's work before them.
+        let codes = (0..size.0 * size.1).map(pixel);
         (size, codes.collect())
     }
 }

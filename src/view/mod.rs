@@ -26,6 +26,7 @@ mod event;
 mod history;
 mod lamps;
 mod listing;
+mod meter;
 mod notes;
 mod orders;
 mod overlay;

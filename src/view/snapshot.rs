@@ -6,11 +6,11 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::corner_light::CornerLight;
+use super::meter::Meter;
 use crate::bake::solution::{Bake, DirectionalLight, Solution};
 use crate::error::Result;
 use crate::mesh::corners::Corners;
-use crate::picture::exposure_by_area;
-use crate::render::{Lighting, tone};
+use crate::render::Lighting;
 use crate::scene::{Scene, Triangle};
 use crate::solver::{Ambient, Solver, StopReason, Update};
 
@@ -20,6 +20,21 @@ pub struct Progress {
     /// Of the whole bake, not of the slice of it that was solved last.
     pub update: Update,
     pub done: bool,
+}
+
+/// What all light of a scene is shown by, whatever the light.
+pub struct About {
+    pub corners: Corners,
+    meter: Meter,
+}
+
+impl About {
+    pub fn new(scene: &Scene) -> Self {
+        Self {
+            corners: Corners::new(scene),
+            meter: Meter::new(scene),
+        }
+    }
 }
 
 /// Light of a scene; values `[triangle]` in the order of the input, W·m⁻².
@@ -32,8 +47,7 @@ pub struct Snapshot {
     pub direct: Vec<Vec3>,
     pub relief: Option<DirectionalLight>,
     pub at_corners: CornerLight,
-    /// Of the scene.
-    pub about: Arc<Corners>,
+    pub about: Arc<About>,
     /// What has not been shot, spread evenly.
     pub ambient: Ambient,
     /// What surfaces reflect is still of the light before.
@@ -47,7 +61,7 @@ impl Snapshot {
     fn new(
         epoch: u64,
         scene: &Arc<Scene>,
-        about: &Arc<Corners>,
+        about: &Arc<About>,
         (irradiance, direct): (Vec<Vec3>, Vec<Vec3>),
         relief: Option<DirectionalLight>,
         ambient: Ambient,
@@ -55,9 +69,9 @@ impl Snapshot {
     ) -> Self {
         Self {
             epoch,
-            at_corners: CornerLight::new(about, [&irradiance, &direct], relief.as_ref()),
+            at_corners: CornerLight::new(&about.corners, [&irradiance, &direct], relief.as_ref()),
             about: Arc::clone(about),
-            exposure: exposure(scene, &irradiance, ambient.irradiance),
+            exposure: about.meter.exposure(scene, &irradiance, ambient.irradiance),
             scene: Arc::clone(scene),
             irradiance,
             direct,
@@ -68,14 +82,14 @@ impl Snapshot {
         }
     }
 
-    /// What a solver has found. `about` are the corners of the scene.
+    /// What a solver has found. `about` is of the scene.
     ///
     /// # Errors
     /// A device that fails.
     pub fn of_solver(
         epoch: u64,
         scene: &Arc<Scene>,
-        about: &Arc<Corners>,
+        about: &Arc<About>,
         solver: &Solver,
         progress: Progress,
     ) -> Result<Self> {
@@ -100,7 +114,7 @@ impl Snapshot {
     /// A device that fails.
     pub fn of_emitted(
         (epoch, scene, progress): (u64, &Arc<Scene>, Progress),
-        about: &Arc<Corners>,
+        about: &Arc<About>,
         solver: &Solver,
         before: &Self,
     ) -> Result<Option<Self>> {
@@ -151,7 +165,7 @@ impl Snapshot {
             ..Progress::default()
         };
         let light = (bake.irradiance, bake.irradiance_direct);
-        let about = Arc::new(Corners::new(scene));
+        let about = Arc::new(About::new(scene));
         let ambient = Ambient::default();
         Self::new(0, scene, &about, light, bake.relief, ambient, progress)
     }
@@ -168,7 +182,7 @@ impl Snapshot {
         let even: Vec<_> = scene.triangles.iter().map(shade).collect();
         let progress = Progress::default();
         let light = (even.clone(), even);
-        let about = Arc::new(Corners::new(scene));
+        let about = Arc::new(About::new(scene));
         Self::new(0, scene, &about, light, None, Ambient::default(), progress)
     }
 
@@ -197,60 +211,4 @@ pub fn is_done(stop: StopReason) -> bool {
         stop,
         StopReason::Residual | StopReason::Shots | StopReason::Budget | StopReason::Unsolved
     )
-}
-
-/// The exposure for what does not emit. It does not depend on the view: a window that orbits does
-/// not flicker.
-fn exposure(scene: &Scene, irradiance: &[Vec3], ambient: Vec3) -> f32 {
-    let lit: Vec<(f32, f64)> = (scene.triangles.par_iter())
-        .zip(irradiance)
-        .filter(|(t, _)| !scene.materials[t.material as usize].emits())
-        .map(|(triangle, irradiance)| {
-            let material = &scene.materials[triangle.material as usize];
-            let map = material
-                .map_kd
-                .as_ref()
-                .map_or([1.0; 3], |map| map.mean_over_triangle(&triangle.uv));
-            let rho = Vec3::from(material.kd) * Vec3::from(map);
-            let radiance = rho * (*irradiance + ambient) / std::f32::consts::PI;
-            let [a, b, c] = scene.corners(triangle);
-            let area = DVec3::length((b - a).cross(c - a)) / 2.0;
-            (tone::luminance(radiance.to_array()), area)
-        })
-        .collect();
-    exposure_by_area(lit.into_iter())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::{Material, Triangle};
-
-    /// Ten triangles of one area: the exposure is for the ninth of them by brightness.
-    #[test]
-    fn exposure_is_for_the_brightest_tenth_by_area() {
-        let scene = Scene {
-            vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
-            triangles: vec![
-                Triangle {
-                    vertices: [0, 1, 2],
-                    uv: [[0.0; 2]; 3],
-                    emission_uv: None,
-                    light_uv: None,
-                    material: 0,
-                };
-                10
-            ],
-            materials: vec![Material {
-                kd: [1.0; 3],
-                ..Material::default()
-            }],
-            ..Scene::default()
-        };
-        let light: Vec<_> = (1..=10)
-            .map(|i| Vec3::splat(i as f32 * std::f32::consts::PI))
-            .collect();
-        let stops = exposure(&scene, &light, Vec3::ZERO);
-        assert!((stops.exp2() * 9.0 - 0.6).abs() < 1e-5, "{stops}");
-    }
 }

@@ -150,6 +150,10 @@ pub fn pairs_of<'a>(
     occluders: &ShadowTree<ShadowOccluder>,
     nearness: &Nearness,
 ) -> Vec<OfSource> {
+    let sources = sources.into_par_iter();
+    if *nearness == Nearness::NONE {
+        return sources.map(|_| OfSource::default()).collect();
+    }
     let receivers = Receiver::all(elements);
     let search = Search {
         elements,
@@ -157,7 +161,7 @@ pub fn pairs_of<'a>(
         nearness: *nearness,
         scattered: false,
     };
-    (sources.into_par_iter())
+    sources
         .map(|source| match source.is_surface() {
             true => search.source(source, &receivers),
             false => OfSource::default(),

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use glam::{DVec2, DVec3};
 use image::{DynamicImage, ImageBuffer, Rgb};
+use rayon::prelude::*;
 
 use super::noise::{of_cell, rough, smooth};
 use super::relief_maps::stretched;
@@ -194,22 +195,24 @@ fn smoothstep(t: f64) -> f64 {
 }
 
 /// The maps of a function of the place on the tile, u and v in 0..1.
-fn make(name: &str, [width, height]: [u32; 2], texel: impl Fn([f64; 2]) -> Texel) -> Result<Maps> {
+fn make(
+    name: &str,
+    [width, height]: [u32; 2],
+    texel: impl Fn([f64; 2]) -> Texel + Sync,
+) -> Result<Maps> {
     let place = |i: u32, of: u32| (f64::from(i) + 0.5) / f64::from(of);
-    let texels: Vec<Texel> = (0..height)
-        .flat_map(|row| {
-            (0..width).map(move |column| [place(column, width), 1.0 - place(row, height)])
+    let (heights, codes): (Vec<f64>, Vec<[u8; 3]>) = (0..width * height)
+        .into_par_iter()
+        .map(|i| {
+            let at = [place(i % width, width), 1.0 - place(i / width, height)];
+            let Texel { height, colour } = texel(at);
+            (height, colour.to_array().map(srgb_code))
         })
-        .map(texel)
-        .collect();
-    let heights: Vec<f64> = texels.iter().map(|t| t.height).collect();
+        .unzip();
     let (heights, height_scale) = stretched(&format!("{name}-height"), width, height, &heights);
-    let codes = texels
-        .iter()
-        .flat_map(|t| t.colour.to_array().map(srgb_code));
+    let codes = codes.into_flattened();
     // The file that the colours would be read from: a scene that is written reads back the same.
-    let Some(image) = ImageBuffer::<Rgb<u8>, Vec<u8>>::from_raw(width, height, codes.collect())
-    else {
+    let Some(image) = ImageBuffer::<Rgb<u8>, Vec<u8>>::from_raw(width, height, codes) else {
         unreachable!("three codes a texel");
     };
     let path = format!("{name}-colour.png");

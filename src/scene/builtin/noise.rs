@@ -15,16 +15,22 @@ pub(super) fn of_cell(x: i64, y: i64, seed: u64) -> f64 {
 pub(super) fn smooth([u, v]: [f64; 2], cells: [i64; 2], seed: u64) -> f64 {
     let (x, y) = (u * cells[0] as f64, v * cells[1] as f64);
     let ease = |t: f64| t * t * t * (t * (6.0 * t - 15.0) + 10.0);
-    let (low_x, low_y) = (x.floor(), y.floor());
-    let (s, t) = (ease(x - low_x), ease(y - low_y));
+    let (low_x, low_y) = (floor(x), floor(y));
+    let (s, t) = (ease(x - low_x as f64), ease(y - low_y as f64));
     let at = |i: i64, j: i64| {
-        let column = (low_x as i64 + i).rem_euclid(cells[0]);
-        let row = (low_y as i64 + j).rem_euclid(cells[1]);
+        let column = (low_x + i).rem_euclid(cells[0]);
+        let row = (low_y + j).rem_euclid(cells[1]);
         2.0 * of_cell(column, row, seed) - 1.0
     };
     let below = at(0, 0) + s * (at(1, 0) - at(0, 0));
     let above = at(0, 1) + s * (at(1, 1) - at(0, 1));
     below + t * (above - below)
+}
+
+/// Of coordinates of a tile; `f64::floor` is a call.
+fn floor(x: f64) -> i64 {
+    let toward_zero = x as i64;
+    toward_zero - i64::from(x < toward_zero as f64)
 }
 
 /// A sum of smooth noise, each of `octaves` half as strong and twice as fine as the one before;

@@ -10,6 +10,10 @@ use crate::view::orders::Stage;
 /// Triangles of a scene from which on a coarse bake comes first.
 const MANY: usize = 1 << 13;
 
+/// Under a sky a first light is of so many sources, a sun before all; rays to each part of the sky
+/// take long, and what was not shot is shown spread evenly.
+const FIRST_OF_SKY: u32 = 4;
+
 /// Whether a scene has relief that takes part.
 pub(super) fn raises(scene: &Scene, settings: &Settings) -> bool {
     let raised = settings.relief.transport != Transport::Lambert;
@@ -30,17 +34,25 @@ pub(super) fn first_light(scene: &Scene, settings: &Settings) -> Option<Settings
         && settings.estimator == Estimator::Receiver
         && scene.triangles.len() >= MANY;
     if coarser {
+        let sky = scene.lights.sky.is_some();
+        let first = sky.then_some(FIRST_OF_SKY);
         return Some(Settings {
             residual: preview.residual.max(settings.residual),
             budget: settings.budget,
-            shots: settings.shots,
+            shots: [settings.shots, first].into_iter().flatten().min(),
             seed: settings.seed,
-            // Near sources take a third of the time before the first picture.
-            nearness: Nearness::NONE,
-            ..flat(&preview)
+            ..quick(&preview)
         });
     }
-    raises(scene, settings).then(|| flat(settings))
+    raises(scene, settings).then(|| quick(settings))
+}
+
+/// Without relief and near sources: to find these takes most of the time before the first picture.
+fn quick(settings: &Settings) -> Settings {
+    Settings {
+        nearness: Nearness::NONE,
+        ..flat(settings)
+    }
 }
 
 /// The same without relief.

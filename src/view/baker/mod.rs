@@ -16,11 +16,10 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::orders::{Given, Latest, Order, Stage};
-use super::snapshot::{Progress, Snapshot, is_done};
+use super::snapshot::{About, Progress, Snapshot, is_done};
 use super::{DeviceChoice, Wake};
 use crate::bake;
 use crate::error::Result;
-use crate::mesh::corners::Corners;
 use crate::mesh::elements::Elements;
 use crate::scene::Scene;
 use crate::solver::{Settings, Solver, StopReason, Update, Visibility};
@@ -163,8 +162,7 @@ struct Work {
 /// A bake under way or done.
 struct Solving {
     scene: Arc<Scene>,
-    /// Of the scene.
-    corners: Arc<Corners>,
+    about: Arc<About>,
     solver: Solver,
     epoch: u64,
     start: Instant,
@@ -330,7 +328,7 @@ impl Work {
         let unshot = first.solver.report().unshot_share;
         let Solving {
             scene,
-            corners,
+            about,
             epoch,
             ..
         } = first;
@@ -346,21 +344,15 @@ impl Work {
         let elements = bake::elements(&device, &scene, &settings)?;
         let lights = &scene.lights;
         let solver = Solver::new(&device, elements, lights, &settings)?;
-        self.start(scene, solver, epoch, Some(corners));
+        self.start(scene, solver, epoch, Some(about));
         if let Some(solving) = &mut self.solving {
             solving.shown_from = unshot;
         }
         Ok(())
     }
 
-    /// `corners` are those of the scene, where they are known.
-    fn start(
-        &mut self,
-        scene: Arc<Scene>,
-        solver: Solver,
-        epoch: u64,
-        corners: Option<Arc<Corners>>,
-    ) {
+    /// `about` is of the scene, where it is known.
+    fn start(&mut self, scene: Arc<Scene>, solver: Solver, epoch: u64, about: Option<Arc<About>>) {
         self.shared.latest().sources = Some(solver.source_of_triangles());
         self.tell(epoch, None);
         self.looked_at = None;
@@ -369,7 +361,7 @@ impl Work {
             first: false,
             relit: None,
             sketched: false,
-            corners: corners.unwrap_or_else(|| Arc::new(Corners::new(&scene))),
+            about: about.unwrap_or_else(|| Arc::new(About::new(&scene))),
             shown_from: f64::INFINITY,
             scene,
             solver,
@@ -442,7 +434,7 @@ impl Work {
         let solved = Instant::now();
         solving.solver.gather()?;
         let (scene, solver) = (&solving.scene, &solving.solver);
-        let snapshot = Snapshot::of_solver(epoch, scene, &solving.corners, solver, progress)?;
+        let snapshot = Snapshot::of_solver(epoch, scene, &solving.about, solver, progress)?;
         let cost = solved.elapsed();
         // The first snapshot is there after one batch; later ones come less and less often.
         let [shortest, longest] = SLICES;

@@ -31,7 +31,7 @@ impl Work {
             match before.solver.relight(&scene) {
                 Ok(()) => {
                     let stage = first_stage(&scene, &self.given.settings);
-                    self.start(scene, before.solver, epoch, Some(before.corners));
+                    self.start(scene, before.solver, epoch, Some(before.about));
                     if let Some(solving) = &mut self.solving {
                         (solving.first, solving.sketched) = (before.first, sketched);
                         solving.relit = Some(Relit::Emitted);
@@ -85,17 +85,17 @@ impl Work {
             return Ok(true);
         }
         let progress = solving.progress(Update::default(), false);
-        let (scene, corners) = (&solving.scene, &solving.corners);
+        let (scene, about) = (&solving.scene, &solving.about);
         let (epoch, solver) = (solving.epoch, &solving.solver);
         let snapshot = match (step, &self.shown) {
             (Relit::Emitted, Some(before)) => {
                 let of = (epoch, scene, progress);
-                Snapshot::of_emitted(of, corners, solver, before)?
+                Snapshot::of_emitted(of, about, solver, before)?
             }
             (Relit::Emitted, None) => None,
-            (Relit::Coupled, _) => Some(Snapshot::of_solver(
-                epoch, scene, corners, solver, progress,
-            )?),
+            (Relit::Coupled, _) => {
+                Some(Snapshot::of_solver(epoch, scene, about, solver, progress)?)
+            }
         };
         solving.relit = match step {
             Relit::Emitted => Some(Relit::Coupled),

@@ -57,12 +57,12 @@ impl Rays {
     /// Finds what the next sketch will take away.
     pub fn prepare(&mut self, base: &Snapshot) {
         for light in &base.scene.lights.points {
-            self.brought(&base.about, &Light::Point(light.clone()));
+            self.brought(&base.about.corners, &Light::Point(light.clone()));
         }
     }
 
     pub fn sketch(&mut self, base: &Snapshot, changes: &[Change]) -> CornerLight {
-        let about = &base.about;
+        let about = &base.about.corners;
         let terms: Vec<(Brought, Vec3)> = (changes.iter())
             .flat_map(|[before, now]| [(before, -1.0), (now, 1.0)])
             .map(|((light, sent), sign)| (self.brought(about, light), *sent * sign))
