@@ -36,7 +36,7 @@ fn opens_orbits_and_flies() {
     );
     let text = view(room.path(), "room.safetensors", &script);
     assert!(text.contains("first picture with light after"), "{text}");
-    assert!(text.contains("input answered in"), "{text}");
+    assert!(text.contains("input answered: "), "{text}");
     let front = room.picture("front.png");
     assert_eq!(front.dimensions(), (320, 240));
     // The left wall is red and the right one green; the window is neither dark nor burnt.
