@@ -4,17 +4,21 @@ use glam::{DQuat, DVec3, EulerRot};
 
 use super::parts::Part;
 use super::seen::{Before, ROUGH, Seen};
+use super::{NearPairs, Nearness, pairs_of};
 use crate::math::form_factor::to_triangle;
+use crate::mesh::charts::Connections;
 use crate::mesh::elements::Elements;
-use crate::mesh::sources::{self, Grouping};
+use crate::mesh::occluders::Occluders;
+use crate::mesh::shadow_tree::ShadowTree;
+use crate::mesh::sources::{self, Grouping, Sources};
 use crate::scene::Lights;
 use crate::scene::shapes::Shapes;
 
 /// Irrational steps, for places and normals that spread evenly.
 const STEPS: [f64; 5] = [0.8567, 0.7339, 0.6287, 0.5386, 0.4614];
 
-/// An oblique grid and a sphere, and places about both with any normal, in internal units.
-fn scene() -> (Elements, Vec<Seen>, Vec<[DVec3; 2]>) {
+/// An oblique grid and a sphere.
+fn shapes() -> (Elements, Sources, Connections) {
     let mut shapes = Shapes::new();
     let turn = DQuat::from_euler(EulerRot::XYZ, 0.3, 0.5, 0.7);
     let (x, y) = (turn * DVec3::X, turn * DVec3::Y);
@@ -22,7 +26,14 @@ fn scene() -> (Elements, Vec<Seen>, Vec<[DVec3; 2]>) {
     shapes.sphere(DVec3::new(0.6, 0.5, 0.9), 0.3, 4, true, 0);
     shapes.weld();
     let mut elements = Elements::new(&shapes.scene);
-    let (sources, _) = sources::build(&mut elements, &Lights::NONE, &Grouping::default(), 0);
+    let (sources, connections) =
+        sources::build(&mut elements, &Lights::NONE, &Grouping::default(), 0);
+    (elements, sources, connections)
+}
+
+/// With places about both with any normal, in internal units.
+fn scene() -> (Elements, Vec<Seen>, Vec<[DVec3; 2]>) {
+    let (elements, sources, _) = shapes();
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for c in &elements.centroid {
         (low, high) = (low.min(*c), high.max(*c));
@@ -54,6 +65,25 @@ fn by_members(elements: &Elements, seen: &Seen, part: Part, p: DVec3, n: DVec3) 
         }
     };
     members.map(factor).sum()
+}
+
+/// Nor is any looked for.
+#[test]
+fn none_is_near_where_none_is_asked_for() {
+    let (elements, sources, connections) = shapes();
+    let tree = ShadowTree::new(Occluders::elements(&elements).casters(&elements, &connections));
+    let near = |nearness: &Nearness| {
+        let found = pairs_of(&elements, &sources.list, &tree, nearness);
+        NearPairs::new(&elements, &sources.list, found)
+    };
+    let some = Nearness {
+        source: 1e-4,
+        part: 1e-4,
+    };
+    assert!(near(&some).pair_count() > 100);
+    let none = near(&Nearness::NONE);
+    assert_eq!((none.pair_count(), none.rays), (0, 0));
+    assert_eq!(none.weights, elements.area);
 }
 
 #[test]
