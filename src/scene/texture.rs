@@ -21,6 +21,7 @@ pub struct Texture {
 /// Samples along an edge of a triangle, at most: 64² keeps the mean of one element under a
 /// millisecond.
 const MOST_STRATA: u32 = 64;
+/// Of a mean that only the exposure depends on.
 #[cfg(feature = "window")]
 const FEW_STRATA: u32 = 8;
 

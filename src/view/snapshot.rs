@@ -22,7 +22,7 @@ pub struct Progress {
     pub done: bool,
 }
 
-/// What all light of a scene is shown by, whatever the light.
+/// What the light of a scene is shown with and does not depend on the light.
 pub struct About {
     pub corners: Corners,
     meter: Meter,

@@ -101,7 +101,7 @@ impl Timing {
             match Spread::of(times) {
                 // Of a light that is dragged.
                 Some(spread) if times.len() > FEW => lines.push(format!(
-                    "{what} on the screen: after {}",
+                    "{what} on the screen after {}",
                     spread.milliseconds()
                 )),
                 _ => {
@@ -164,8 +164,8 @@ mod tests {
         }
         let lines = timing.lines();
         assert_eq!(lines.len(), 3, "{lines:?}");
-        let spread = "11.0 ms in the middle, 19.0 at the 95th percentile, 20.0 at the 99th, 20.0 at \
-                      most, of 20";
+        let spread = "11.0 ms in the middle, 19.0 at the 95th percentile, 20.0 at the 99th, \
+                      20.0 at most, of 20";
         assert_eq!(lines[1], format!("frame without: {spread}"));
         assert!(lines[2].ends_with("2.00"), "{lines:?}");
     }
