@@ -8,11 +8,12 @@
 
 use std::ops::Range;
 
-use glam::{DMat3, DVec2, DVec3, Vec3, Vec4};
+use glam::{DVec2, DVec3, Vec3, Vec4};
 use nalgebra::{DMatrix, SymmetricEigen};
 use rayon::prelude::*;
 
-use super::transfer::{CELLS, Facets, Fit, Sight};
+use super::coordinates::Coordinates;
+use super::transfer::{CELLS, Facets, Sight};
 use super::visibility::RAYS;
 use super::{HeightField, Shading, Visibility};
 use crate::constants::{MOST_RANK, NONE};
@@ -51,16 +52,14 @@ impl Factors {
         error: f64,
     ) -> Self {
         let facets = Facets::new(field, &shading.normals, visibility);
-        let fit = Fit::new(directions);
-        let whitening = Whitening::new(directions);
-        let width = 3 * directions.count();
-        let rows: Vec<f64> = facets
-            .transfer
-            .par_chunks(CELLS)
-            .flat_map_iter(|row| whitening.apply(&fit.apply(row)))
-            .collect();
-        let rows = DMatrix::from_row_slice(facets.area.len(), width, &rows);
-        let eigen = SymmetricEigen::new(rows.transpose() * &rows);
+        let coordinates = Coordinates::new(directions);
+        let width = coordinates.count();
+        // One column a facet.
+        let mut columns = DMatrix::zeros(width, facets.area.len());
+        let of_facets = columns.as_mut_slice().par_chunks_mut(width);
+        (of_facets.zip(facets.transfer.par_chunks(CELLS)))
+            .for_each(|(column, row)| coordinates.find(row, column));
+        let eigen = SymmetricEigen::new(products(&columns));
         let mut order: Vec<usize> = (0..width).collect();
         order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
         let power =
@@ -72,42 +71,45 @@ impl Factors {
             .step_by(RANK_STEP)
             .find(|&rank| left_out(rank) <= error)
             .unwrap_or(most);
-        let axes = DMatrix::from_fn(width, rank, |i, r| eigen.eigenvectors[(i, order[r])]);
-        let basis = (0..rank)
-            .flat_map(|r| whitening.undo(axes.column(r).as_slice()))
-            .collect();
-        let direct = &rows * &axes;
+        let axes = DMatrix::from_fn(rank, width, |r, i| eigen.eigenvectors[(i, order[r])]);
+        let basis = (0..rank).flat_map(|r| {
+            let axis: Vec<f64> = axes.row(r).iter().copied().collect();
+            coordinates.vectors(&axis).collect::<Vec<_>>()
+        });
+        let direct = &axes * &columns;
         let inside = inside(visibility, &facets.sky, &shading.reflectance, &direct);
         let sight = Sight::new(visibility);
-        let (axes, inside, facets) = (&axes, &inside, &facets);
-        let (sight, whitening, fit) = (&sight, &whitening, &fit);
-        let of_cell = move |cell: usize| {
+        let of_cell = |cell: usize, corners: &mut [Vec4]| {
             let seen = [2 * cell, 2 * cell + 1].map(|q| {
                 let mut seen = [0.0; CELLS];
                 sight.seen(q, &mut seen);
                 seen
             });
-            (0..CORNERS).flat_map(move |at| {
+            let mut column = vec![0.0; width];
+            for (at, factors) in corners.chunks_exact_mut(rank).enumerate() {
                 let corner = Corner::new(field, cell, at);
-                let row = corner.transfer(sight, &seen, &facets.scale);
-                let row = whitening.apply(&fit.apply(&row));
+                let row = corner.transfer(&sight, &seen, &facets.scale);
+                coordinates.find(&row, &mut column);
+                let mut own = [0.0; MOST_RANK as usize];
+                for (axes, of_axis) in axes.as_slice().chunks_exact(rank).zip(&column) {
+                    own.iter_mut()
+                        .zip(axes)
+                        .for_each(|(own, axis)| *own += axis * of_axis);
+                }
                 let share = 1.0 / corner.facets.len() as f32;
-                (0..rank).map(move |r| {
-                    let own: f64 = row
-                        .iter()
-                        .zip(axes.column(r).iter())
-                        .map(|(a, b)| a * b)
-                        .sum();
-                    let bounced: Vec3 = corner.facets.clone().map(|q| inside[q * rank + r]).sum();
-                    (bounced * share).extend(own as f32)
-                })
-            })
+                for (r, (factor, own)) in factors.iter_mut().zip(own).enumerate() {
+                    let inside = |q: usize| Vec3::from_slice(&inside[3 * (q * rank + r)..]);
+                    let bounced: Vec3 = corner.facets.clone().map(inside).sum();
+                    *factor = (bounced * share).extend(own as f32);
+                }
+            }
         };
-        let cells = (0..field.facet_count() / 2).into_par_iter();
-        let corners = cells.flat_map_iter(of_cell).collect();
+        let mut corners = vec![Vec4::ZERO; field.facet_count() / 2 * CORNERS * rank];
+        let cells = corners.par_chunks_mut(CORNERS * rank).enumerate();
+        cells.for_each(|(cell, corners)| of_cell(cell, corners));
         Self {
             rank,
-            basis,
+            basis: basis.collect(),
             corners,
             error: left_out(rank),
         }
@@ -149,6 +151,22 @@ impl Factors {
             })
             .sum()
     }
+}
+
+/// Facets whose products are summed as one, so that sums do not depend on the number of threads.
+const SUMMED: usize = 1024;
+
+/// C Cᵀ of the columns C.
+fn products(columns: &DMatrix<f64>) -> DMatrix<f64> {
+    let starts = (0..columns.ncols()).into_par_iter().step_by(SUMMED);
+    let sums: Vec<DMatrix<f64>> = starts
+        .map(|start| {
+            let count = SUMMED.min(columns.ncols() - start);
+            let part = columns.columns(start, count);
+            part * part.transpose()
+        })
+        .collect();
+    sums.into_iter().sum()
 }
 
 /// A corner of a cell, seen from inside the cell.
@@ -194,108 +212,62 @@ impl Corner {
     }
 }
 
-/// Coordinates in which the length of a slot's vector v is the root of Σ (v · ω)² over the slot.
-struct Whitening {
-    /// `[slot]`, Lᵀ and its inverse, with L Lᵀ = Σ ω ωᵀ.
-    turns: Vec<(DMat3, DMat3)>,
-}
-
-impl Whitening {
-    fn new(directions: &Directions) -> Self {
-        let mut moments = vec![DMat3::ZERO; directions.count()];
-        for (cell, slot) in directions.fine() {
-            let w = cell.direction;
-            moments[slot] += DMat3::from_cols(w * w.x, w * w.y, w * w.z);
-        }
-        let turns = moments
-            .into_iter()
-            .map(|m| {
-                // Cholesky, column by column.
-                let a = m.x_axis.x.sqrt();
-                let (b, c) = (m.x_axis.y / a, m.x_axis.z / a);
-                let d = (m.y_axis.y - b * b).sqrt();
-                let e = (m.y_axis.z - b * c) / d;
-                let f = (m.z_axis.z - c * c - e * e).sqrt();
-                let lower = DMat3::from_cols(
-                    DVec3::new(a, b, c),
-                    DVec3::new(0.0, d, e),
-                    DVec3::new(0.0, 0.0, f),
-                );
-                let upper = lower.transpose();
-                (upper, upper.inverse())
-            })
-            .collect();
-        Self { turns }
-    }
-
-    /// From vectors `[slot]` to coordinates `[slot][axis]`.
-    fn apply(&self, vectors: &[Vec3]) -> Vec<f64> {
-        let turned = self.turns.iter().zip(vectors);
-        turned
-            .flat_map(|((upper, _), v)| (*upper * v.as_dvec3()).to_array())
-            .collect()
-    }
-
-    fn undo(&self, coordinates: &[f64]) -> Vec<Vec3> {
-        let turned = self.turns.iter().zip(coordinates.chunks_exact(3));
-        turned
-            .map(|((_, inverse), c)| (*inverse * DVec3::from_slice(c)).as_vec3())
-            .collect()
-    }
-}
-
-/// Irradiance of the facets by light from other facets, `[facet][rank]`, RGB: x = G ρ (a + x).
+/// Light of all ranks, `[rank][colour]`, that the facets receive from other facets: x = G ρ (a + x).
+/// `direct` is a, `[facet][rank]`.
 fn inside(
     visibility: &Visibility,
     sky: &[f64],
     reflectance: &[Vec3],
     direct: &DMatrix<f64>,
-) -> Vec<Vec3> {
-    let rank = direct.ncols();
-    let own = |q: usize, r: usize| Vec3::splat(direct[(q, r)] as f32);
-    let mut light = vec![Vec3::ZERO; sky.len() * rank];
+) -> Vec<f32> {
+    let width = 3 * direct.nrows();
+    let mut light = vec![0.0_f32; sky.len() * width];
+    let mut sent = light.clone();
     for _ in 0..MOST_BOUNCES {
-        let sent: Vec<Vec3> = light
-            .par_chunks(rank)
-            .enumerate()
-            .flat_map_iter(|(q, x)| {
-                let sent = move |(r, x): (usize, &Vec3)| reflectance[q] * (own(q, r) + *x);
-                x.iter().enumerate().map(sent)
-            })
-            .collect();
-        let next: Vec<Vec3> = (0..sky.len())
-            .into_par_iter()
-            .flat_map_iter(|q| {
-                let hits = &visibility.hits[q * RAYS..][..RAYS];
-                let landed: Vec<usize> = match hits.iter().filter(|&&h| h != NONE).count() {
-                    0 => vec![q],
-                    _ => hits
-                        .iter()
-                        .filter(|&&h| h != NONE)
-                        .map(|&h| h as usize)
-                        .collect(),
-                };
-                let weight = (1.0 - sky[q]) as f32 / landed.len() as f32;
-                let mut sums = vec![Vec3::ZERO; rank];
-                for h in landed {
-                    for (sum, sent) in sums.iter_mut().zip(&sent[h * rank..]) {
-                        *sum += *sent * weight;
-                    }
-                }
-                sums
-            })
-            .collect();
-        let size = |values: &[Vec3]| {
-            values
-                .iter()
-                .fold(0.0_f32, |m, v| m.max(v.abs().max_element()))
+        let facets = sent.par_chunks_mut(width).zip(light.par_chunks(width));
+        facets.enumerate().for_each(|(q, (sent, light))| {
+            let reflectance = reflectance[q].to_array();
+            let own = direct.column(q);
+            let ranks = sent
+                .as_chunks_mut::<3>()
+                .0
+                .iter_mut()
+                .zip(light.as_chunks().0);
+            for ((sent, light), own) in ranks.zip(own.iter()) {
+                let sum = <[f32; 3]>::map(*light, |x| *own as f32 + x);
+                *sent = std::array::from_fn(|c| reflectance[c] * sum[c]);
+            }
+        });
+        let received = |(q, light): (usize, &mut [f32])| {
+            let hits = &visibility.hits[q * RAYS..][..RAYS];
+            let landed = hits.iter().filter(|&&hit| hit != NONE);
+            let mut sums = [0.0_f32; 3 * MOST_RANK as usize];
+            let sums = &mut sums[..width];
+            let add = |sums: &mut [f32], from: usize| {
+                let sent = &sent[from * width..][..width];
+                sums.iter_mut()
+                    .zip(sent)
+                    .for_each(|(sum, sent)| *sum += sent);
+            };
+            landed.clone().for_each(|&hit| add(sums, hit as usize));
+            let count = landed.count();
+            if count == 0 {
+                add(sums, q);
+            }
+            let weight = (1.0 - sky[q]) as f32 / count.max(1) as f32;
+            let (mut change, mut most) = (0.0_f32, 0.0_f32);
+            for (light, sum) in light.iter_mut().zip(sums) {
+                let next = *sum * weight;
+                change = change.max((next - *light).abs());
+                most = most.max(next.abs());
+                *light = next;
+            }
+            (change, most)
         };
-        let change = next
-            .iter()
-            .zip(&light)
-            .fold(0.0_f32, |m, (a, b)| m.max((*a - *b).abs().max_element()));
-        light = next;
-        if change <= CONVERGED * size(&light) {
+        let greatest = |a: (f32, f32), b: (f32, f32)| (a.0.max(b.0), a.1.max(b.1));
+        let facets = light.par_chunks_mut(width).enumerate();
+        let (change, most) = facets.map(received).reduce(|| (0.0, 0.0), greatest);
+        if change <= CONVERGED * most {
             break;
         }
     }

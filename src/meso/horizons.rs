@@ -217,7 +217,10 @@ impl Blocks {
         let others = &values[wrap(at, y, self.rows) * self.columns..][..self.columns];
         let (first, rest) = others.split_at(wrap(0, x, self.columns));
         let (before, after) = row.split_at_mut(rest.len());
-        let raise = |(value, other): (&mut f32, &f32)| *value = value.max(*other);
+        // One instruction, where `max` minds numbers that are none.
+        let raise = |(value, other): (&mut f32, &f32)| {
+            *value = if *other > *value { *other } else { *value };
+        };
         before.iter_mut().zip(rest).for_each(raise);
         after.iter_mut().zip(first).for_each(raise);
     }
@@ -260,6 +263,8 @@ struct Sector {
     steep: bool,
     from: f32,
     to: f32,
+    /// Lengths of the two directions.
+    lengths: [f32; 2],
 }
 
 impl Sector {
@@ -273,6 +278,7 @@ impl Sector {
             steep: bit(2),
             from,
             to,
+            lengths: [from, to].map(|t| t.hypot(1.0)),
         }
     }
 
@@ -283,10 +289,11 @@ impl Sector {
             let [x, y] = [x * self.signs[0] as f32, y * self.signs[1] as f32];
             let (main, other) = if self.steep { (y, x) } else { (x, y) };
             if main > 0.0 && (self.from * main..=self.to * main).contains(&other) {
-                return main.hypot(other);
+                let squares = [main, other].map(|s| f64::from(s) * f64::from(s));
+                return (squares[0] + squares[1]).sqrt() as f32;
             }
-            let along = |t: f32| (main + t * other) / t.hypot(1.0);
-            along(self.from).max(along(self.to))
+            let [first, last] = self.lengths;
+            ((main + self.from * other) / first).max((main + self.to * other) / last)
         };
         slopes
             .into_iter()
@@ -296,7 +303,7 @@ impl Sector {
 
     /// The least distance from a block to those k to the side of it.
     fn distance(&self, k: usize) -> f32 {
-        k.saturating_sub(1) as f32 * self.from.hypot(1.0)
+        k.saturating_sub(1) as f32 * self.lengths[0]
     }
 
     /// Rows of blocks, along the other axis, that ways reach over columns k to k + side - 1.

@@ -6,6 +6,7 @@
 //! ```
 
 mod basis;
+mod coordinates;
 mod exchange;
 mod factors;
 mod footprints;

@@ -1,11 +1,11 @@
-//! The facets' response to light from the sky, and its fit over the slots.
+//! The facets' response to light from the sky.
 
-use glam::{DMat3, DVec3, Vec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::visibility::Azimuth;
 use super::{HeightField, Visibility};
-use crate::math::directions::{Directions, FINE, FineCell};
+use crate::math::directions::{FINE, FineCell};
 
 /// The facets of a tile with the visibility of the sky, `[facet]`; rows are over the fine cells.
 pub(super) struct Facets {
@@ -77,6 +77,20 @@ pub(super) const CELLS: usize = (FINE * FINE) as usize;
 /// need a larger one.
 const MOST_SCALE: f64 = 4.0;
 
+/// Facets whose rows are summed as one, so that sums do not depend on the number of threads.
+const SUMMED: usize = 512;
+
+/// Rows of facets times their areas, summed.
+fn sum(rows: &[f32], areas: &[f64]) -> [f64; CELLS] {
+    let mut sums = [0.0; CELLS];
+    for (row, area) in rows.chunks(CELLS).zip(areas) {
+        for (sum, &t) in sums.iter_mut().zip(row) {
+            *sum += area * f64::from(t);
+        }
+    }
+    sums
+}
+
 impl Facets {
     pub(super) fn new(field: &HeightField, normals: &[DVec3], visibility: &Visibility) -> Self {
         let sight = Sight::new(visibility);
@@ -95,11 +109,16 @@ impl Facets {
             });
         // The light that falls on the tile from each direction must arrive at its facets.
         let tile = 0.5 * field.aspect * count as f64;
-        let mut arriving = vec![0.0; CELLS];
-        for (row, area) in transfer.chunks(CELLS).zip(&area) {
-            for (sum, &t) in arriving.iter_mut().zip(row) {
-                *sum += area * f64::from(t);
-            }
+        let sums = transfer
+            .par_chunks(SUMMED * CELLS)
+            .zip(area.par_chunks(SUMMED));
+        let sums: Vec<[f64; CELLS]> = sums.map(|(rows, areas)| sum(rows, areas)).collect();
+        let mut arriving = [0.0; CELLS];
+        for part in &sums {
+            arriving
+                .iter_mut()
+                .zip(part)
+                .for_each(|(sum, part)| *sum += part);
         }
         let scale: Vec<f32> = arriving
             .iter()
@@ -120,54 +139,5 @@ impl Facets {
             sky,
             scale,
         }
-    }
-}
-
-/// For each slot, the linear map from values at its fine cells to the vector whose dot product with
-/// the direction fits them best, among the vectors that preserve their sum.
-pub(super) struct Fit {
-    /// `[slot][member]`: fine cell and its column of the map.
-    columns: Vec<Vec<(usize, DVec3)>>,
-}
-
-impl Fit {
-    pub(super) fn new(directions: &Directions) -> Self {
-        let mut members: Vec<Vec<(usize, DVec3)>> = vec![Vec::new(); directions.count()];
-        for (i, (cell, slot)) in directions.fine().enumerate() {
-            members[slot].push((i, cell.direction));
-        }
-        let columns = members
-            .into_iter()
-            .map(|members| {
-                let mut moment = DMat3::ZERO;
-                for (_, w) in &members {
-                    moment += DMat3::from_cols(*w * w.x, *w * w.y, *w * w.z);
-                }
-                let inverse = moment.inverse();
-                let sum: DVec3 = members.iter().map(|m| m.1).sum();
-                let along = inverse * sum;
-                members
-                    .iter()
-                    .map(|&(i, w)| {
-                        let free = inverse * w;
-                        (i, free + along * ((1.0 - sum.dot(free)) / sum.dot(along)))
-                    })
-                    .collect()
-            })
-            .collect();
-        Self { columns }
-    }
-
-    /// The vectors of one facet, `[slot]`.
-    pub(super) fn apply(&self, row: &[f32]) -> Vec<Vec3> {
-        self.columns
-            .iter()
-            .map(|slot| {
-                slot.iter()
-                    .map(|&(i, column)| column * f64::from(row[i]))
-                    .sum::<DVec3>()
-                    .as_vec3()
-            })
-            .collect()
     }
 }

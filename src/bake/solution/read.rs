@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use glam::Vec3;
+use rayon::prelude::*;
 use safetensors::{Dtype, SafeTensors};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -44,6 +45,12 @@ impl Bake {
     pub fn load(path: &Path) -> Result<Self> {
         let bytes = read(path)?;
         let file = File::new(path, &bytes)?;
+        let (sound, bake) = rayon::join(|| file.check(), || Self::of(&file));
+        sound.and(bake)
+    }
+
+    fn of(file: &File<'_>) -> Result<Self> {
+        let path = file.path;
         let irradiance = file.vectors("irradiance", &[])?;
         let bake = Self {
             origin: file.origin()?,
@@ -91,6 +98,7 @@ impl About {
     pub fn load(path: &Path) -> Result<Self> {
         let bytes = read(path)?;
         let file = File::new(path, &bytes)?;
+        file.check()?;
         let material = file.words("material")?;
         let triangle = file.words("input_triangle")?;
         if material.len() != triangle.len() {
@@ -117,7 +125,7 @@ impl About {
     }
 }
 
-/// A bake file whose version and tensors are right.
+/// A bake file whose version is right.
 struct File<'a> {
     tensors: SafeTensors<'a>,
     metadata: HashMap<String, String>,
@@ -141,20 +149,27 @@ impl<'a> File<'a> {
             None => return Err(bad("not a bake: it has no version".into())),
         }
         let tensors = SafeTensors::deserialize(bytes).map_err(|e| bad(e.to_string()))?;
-        // Bakes of earlier programs have none.
-        if let Some(expected) = metadata.get("sha256") {
-            let tensors = tensors.iter().map(|(name, tensor)| (name, tensor.data()));
-            if checksum(tensors) != *expected {
-                return Err(bad(
-                    "damaged: its tensors are not those that were written".into()
-                ));
-            }
-        }
         Ok(Self {
             tensors,
             metadata: metadata.into_iter().collect(),
             path,
         })
+    }
+
+    /// Whether the tensors are those that were written.
+    fn check(&self) -> Result<()> {
+        // Bakes of earlier programs have none.
+        let Some(expected) = self.metadata.get("sha256") else {
+            return Ok(());
+        };
+        let tensors = (self.tensors.iter()).map(|(name, tensor)| (name, tensor.data()));
+        match checksum(tensors) == *expected {
+            true => Ok(()),
+            false => Err(Error::file(
+                self.path,
+                "damaged: its tensors are not those that were written",
+            )),
+        }
     }
 
     fn origin(&self) -> Result<Origin> {
@@ -173,7 +188,7 @@ impl<'a> File<'a> {
 
     fn words(&self, name: &str) -> Result<Vec<u32>> {
         let words = self.tensor(name, Dtype::U32, &[])?;
-        Ok(words.into_iter().map(u32::from_le_bytes).collect())
+        Ok(words.iter().copied().map(u32::from_le_bytes).collect())
     }
 
     fn bad(&self, name: &str, what: &str) -> Error {
@@ -181,7 +196,7 @@ impl<'a> File<'a> {
     }
 
     /// Words of a tensor of the shape `[N, inner…]`.
-    fn tensor(&self, name: &str, dtype: Dtype, inner: &[usize]) -> Result<Vec<[u8; 4]>> {
+    fn tensor(&self, name: &str, dtype: Dtype, inner: &[usize]) -> Result<&'a [[u8; 4]]> {
         let tensor = self
             .tensors
             .tensor(name)
@@ -190,18 +205,27 @@ impl<'a> File<'a> {
         if tensor.dtype() != dtype || shape.len() != 1 + inner.len() || shape[1..] != *inner {
             return Err(self.bad(name, &format!("not {dtype:?} [N, {inner:?}]")));
         }
-        let words = tensor.data().chunks_exact(4);
-        Ok(words.map(|b| [b[0], b[1], b[2], b[3]]).collect())
+        Ok(tensor.data().as_chunks().0)
     }
 
     /// Vectors, `[N][inner]`.
     fn vectors(&self, name: &str, inner: &[usize]) -> Result<Vec<Vec3>> {
+        let blocks = self.blocks::<1>(name, inner)?;
+        Ok(blocks.into_iter().map(|[vector]| vector).collect())
+    }
+
+    /// The same, in blocks of so many.
+    fn blocks<const N: usize>(&self, name: &str, inner: &[usize]) -> Result<Vec<[Vec3; N]>> {
         let words = self.tensor(name, Dtype::F32, &[inner, &[3]].concat())?;
-        let values: Vec<f32> = words.into_iter().map(f32::from_le_bytes).collect();
-        if values.iter().any(|v| !v.is_finite()) {
-            return Err(self.bad(name, "not all numbers are finite"));
+        let vectors = words.as_chunks().0;
+        let blocks = vectors.as_chunks().0.par_iter();
+        let blocks: Vec<[Vec3; N]> = blocks
+            .map(|block| block.map(|vector| Vec3::from_array(vector.map(f32::from_le_bytes))))
+            .collect();
+        match blocks.par_iter().flatten_iter().all(|v| v.is_finite()) {
+            true => Ok(blocks),
+            false => Err(self.bad(name, "not all numbers are finite")),
         }
-        Ok(values.chunks_exact(3).map(Vec3::from_slice).collect())
     }
 
     /// Light at the corners of so many triangles, where the file has it.
@@ -209,9 +233,9 @@ impl<'a> File<'a> {
         if !self.tensors.names().contains(&name) {
             return Ok(None);
         }
-        let values = self.vectors(name, &[3])?;
-        match values.len() == 3 * triangles {
-            true => Ok(Some(values.as_chunks().0.to_vec())),
+        let corners = self.blocks(name, &[3])?;
+        match corners.len() == triangles {
+            true => Ok(Some(corners)),
             false => Err(self.bad(name, "not of as many triangles as irradiance")),
         }
     }
@@ -220,8 +244,8 @@ impl<'a> File<'a> {
     fn on_input(&self, triangles: usize) -> Result<Vec<OnInput>> {
         let words = self.words("input_triangle")?;
         let corners = self.tensor("input_corners", Dtype::F32, &[3, 2])?;
-        let corners: Vec<f64> = (corners.into_iter())
-            .map(|word| f64::from(f32::from_le_bytes(word)))
+        let corners: Vec<f64> = (corners.iter())
+            .map(|&word| f64::from(f32::from_le_bytes(word)))
             .collect();
         if words.len() != triangles || corners.len() != 6 * triangles {
             return Err(self.bad("input_corners", "not of as many triangles as irradiance"));
@@ -251,14 +275,11 @@ impl<'a> File<'a> {
         }
         let directions = self.vectors("directions", &[])?;
         let k = directions.len();
-        let blocks = |values: Vec<Vec3>| -> Vec<[Vec3; 3]> {
-            values.chunks_exact(3).map(|b| [b[0], b[1], b[2]]).collect()
-        };
         let light = DirectionalLight {
             directions: directions.iter().map(|d| d.as_dvec3()).collect(),
-            frames: blocks(self.vectors("meso_frames", &[3])?),
-            incident_moment: blocks(self.vectors("incident_moment", &[k, 3])?),
-            incident_moment_direct: blocks(self.vectors("incident_moment_direct", &[k, 3])?),
+            frames: self.blocks("meso_frames", &[3])?,
+            incident_moment: self.blocks("incident_moment", &[k, 3])?,
+            incident_moment_direct: self.blocks("incident_moment_direct", &[k, 3])?,
             exitant: self.vectors("exitant", &[k])?,
             elements,
         };

@@ -15,7 +15,7 @@ const NEAR_ENOUGH: f64 = 0.93;
 /// The surface `distance` = 0 within a box in exactly `count` triangles, which is even: closed,
 /// every edge shared by two, fronts outward.
 pub(super) fn sculpt(
-    distance: impl Fn(DVec3) -> f64,
+    distance: impl Fn(DVec3) -> f64 + Sync,
     low: DVec3,
     high: DVec3,
     count: usize,

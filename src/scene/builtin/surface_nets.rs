@@ -3,6 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use glam::{DVec3, IVec3};
+use rayon::prelude::*;
 
 /// Vertices and triangles, counter-clockwise seen from where `distance` is positive.
 pub(super) struct Surface {
@@ -17,25 +18,23 @@ pub(super) struct Surface {
 /// quad between the four cubes around it. The mesh is closed, but not always manifold: see
 /// [`Surface::is_manifold`].
 pub(super) fn polygonise(
-    distance: impl Fn(DVec3) -> f64,
+    distance: impl Fn(DVec3) -> f64 + Sync,
     low: DVec3,
     high: DVec3,
     cell: f64,
 ) -> Surface {
     let grid = Grid::sample(&distance, low, high, cell);
+    let vertex = |cube| {
+        let inside = grid.vertex(cube)?;
+        Some((cube, towards_surface(&distance, inside, cell)))
+    };
+    let vertices: Vec<(IVec3, DVec3)> = grid.points_of(vertex);
+    let cubes = vertices.iter().map(|(cube, _)| *cube);
+    let vertex_of: HashMap<IVec3, u32> = cubes.zip(0..).collect();
     let mut surface = Surface {
-        positions: Vec::new(),
+        positions: vertices.into_iter().map(|(_, position)| position).collect(),
         triangles: Vec::new(),
     };
-    let mut vertex_of: HashMap<IVec3, u32> = HashMap::new();
-    for cube in grid.points() {
-        if let Some(position) = grid.vertex(cube) {
-            vertex_of.insert(cube, surface.positions.len() as u32);
-            surface
-                .positions
-                .push(towards_surface(&distance, position, cell));
-        }
-    }
     for point in grid.points() {
         for axis in 0..3 {
             let (from, to) = (grid.value(point), grid.value(point + AXES[axis]));
@@ -89,6 +88,11 @@ impl Surface {
     }
 }
 
+/// Points of a grid with this z, x fastest.
+fn plane(size: IVec3, z: i32) -> impl Iterator<Item = IVec3> {
+    (0..size.y).flat_map(move |y| (0..size.x).map(move |x| IVec3::new(x, y, z)))
+}
+
 /// Values at the points of a grid, one layer wider than the box.
 struct Grid {
     low: DVec3,
@@ -98,7 +102,7 @@ struct Grid {
 }
 
 impl Grid {
-    fn sample(distance: impl Fn(DVec3) -> f64, low: DVec3, high: DVec3, cell: f64) -> Self {
+    fn sample(distance: impl Fn(DVec3) -> f64 + Sync, low: DVec3, high: DVec3, cell: f64) -> Self {
         let low = low - cell;
         let size = ((high - low) / cell).ceil().as_ivec3() + 2;
         let mut grid = Self {
@@ -107,19 +111,21 @@ impl Grid {
             size,
             values: Vec::new(),
         };
-        grid.values = grid
-            .points()
-            .map(|point| distance(grid.place(point)))
-            .collect();
+        grid.values = grid.points_of(|point| Some(distance(grid.place(point))));
         grid
     }
 
     /// All points, x fastest.
     fn points(&self) -> impl Iterator<Item = IVec3> + use<> {
         let size = self.size;
-        (0..size.z).flat_map(move |z| {
-            (0..size.y).flat_map(move |y| (0..size.x).map(move |x| IVec3::new(x, y, z)))
-        })
+        (0..size.z).flat_map(move |z| plane(size, z))
+    }
+
+    /// What `find` finds at all points, in their order; planes are looked at in parallel.
+    fn points_of<T: Send>(&self, find: impl Fn(IVec3) -> Option<T> + Sync) -> Vec<T> {
+        let planes = (0..self.size.z).into_par_iter();
+        let found = planes.flat_map_iter(|z| plane(self.size, z).filter_map(&find));
+        found.collect()
     }
 
     fn place(&self, point: IVec3) -> DVec3 {
