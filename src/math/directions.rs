@@ -5,7 +5,7 @@
 //! 1997), which preserves areas: its cells are the slots. The K of the paper are 4 × 4, 4 × 8 and 8
 //! × 8; 8 × 16 and 16 × 16 are finer. Slot index: `row · columns + column`.
 
-use std::f64::consts::{FRAC_PI_4, PI};
+use std::f64::consts::FRAC_PI_4;
 
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
@@ -208,22 +208,16 @@ pub fn from_square(square: DVec2) -> DVec3 {
 /// From the hemisphere to the square; a direction below the horizon is moved to the nearest on it.
 pub fn to_square(direction: DVec3) -> DVec2 {
     let r = (1.0 - direction.z.clamp(0.0, 1.0)).sqrt();
-    let angle = direction.y.atan2(direction.x);
-    // Quarter of the circle about +x, +y, −x, −y.
-    let turned = if angle < -FRAC_PI_4 {
-        angle + 2.0 * PI
+    let DVec3 { x, y, .. } = direction;
+    // Quarters of the circle about ±x and ±y.
+    if x == 0.0 && y == 0.0 {
+        DVec2::ZERO
+    } else if x.abs() > y.abs() {
+        let a = r.copysign(x);
+        DVec2::new(a, a * (y / x).atan() / FRAC_PI_4)
     } else {
-        angle
-    };
-    let quarter = ((turned + FRAC_PI_4) / (2.0 * FRAC_PI_4))
-        .floor()
-        .clamp(0.0, 3.0);
-    let across = (turned - quarter * 2.0 * FRAC_PI_4) / FRAC_PI_4 * r;
-    match quarter as u32 {
-        0 => DVec2::new(r, across),
-        1 => DVec2::new(-across, r),
-        2 => DVec2::new(-r, -across),
-        _ => DVec2::new(across, -r),
+        let b = r.copysign(y);
+        DVec2::new(b * (x / y).atan() / FRAC_PI_4, b)
     }
 }
 

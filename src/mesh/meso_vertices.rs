@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DVec3, Mat3A, Vec3, Vec3A};
 use rayon::prelude::*;
 
 use super::corners::Corners;
@@ -136,33 +136,27 @@ impl MesoVertices {
         moments: &[[Vec3; 3]],
     ) -> Vec<[Vec3; 3]> {
         let k = directions.count();
-        let columns = |frame: &[Vec3; 3]| {
-            let [t, b, n] = frame.map(Vec3::as_dvec3);
-            DMat3::from_cols(t, b, n)
-        };
-        self.frames
-            .par_iter()
-            .zip(&self.around)
-            .flat_map_iter(|(frame, around)| {
-                let to_vertex = columns(frame).transpose();
-                let mut sums = vec![[DVec3::ZERO; 3]; k];
-                for &(m, weight) in around {
-                    let turn = to_vertex * columns(&frames[m as usize]);
-                    for moment in &moments[m as usize * k..][..k] {
-                        // One slot for the colours: they are fitted together.
-                        let turned = moment.map(|c| turn * c.as_dvec3());
-                        let whole = turned[0] + turned[1] + turned[2];
-                        let Some(towards) = whole.try_normalize() else {
-                            continue;
-                        };
-                        let sum = &mut sums[directions.slot_of(towards)];
-                        for c in 0..3 {
-                            sum[c] += weight * turned[c].with_z(turned[c].z.max(0.0));
-                        }
+        let columns = |[t, b, n]: [Vec3; 3]| Mat3A::from_cols(t.into(), b.into(), n.into());
+        let mut all = vec![[Vec3::ZERO; 3]; self.frames.len() * k];
+        let of_vertices = all.par_chunks_mut(k).zip(&self.frames).zip(&self.around);
+        of_vertices.for_each(|((sums, &frame), around)| {
+            let to_vertex = columns(frame).transpose();
+            for &(m, weight) in around {
+                let turn = to_vertex * columns(frames[m as usize]);
+                for moment in &moments[m as usize * k..][..k] {
+                    // One slot for the colours: they are fitted together.
+                    let whole = turn * Vec3A::from(moment[0] + moment[1] + moment[2]);
+                    let Some(towards) = whole.as_dvec3().try_normalize() else {
+                        continue;
+                    };
+                    let sum = &mut sums[directions.slot_of(towards)];
+                    for (sum, &colour) in sum.iter_mut().zip(moment) {
+                        let turned = Vec3::from(turn * Vec3A::from(colour));
+                        *sum += weight as f32 * turned.with_z(turned.z.max(0.0));
                     }
                 }
-                sums.into_iter().map(|sum| sum.map(|c| c.as_vec3()))
-            })
-            .collect()
+            }
+        });
+        all
     }
 }

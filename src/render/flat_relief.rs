@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use glam::{DVec3, Vec3};
 
 use super::Show;
+use super::relief_light::Exits;
 use super::relief_scene::ReliefScene;
 use super::seen_scene::SeenScene;
 use crate::bake::solution::DirectionalLight;
@@ -39,8 +40,7 @@ pub struct Sorting<'a> {
     pub kept: &'a ReliefScene,
     /// Of the relief's base, `[vertex of the scene]`.
     pub normals: &'a [DVec3],
-    /// Radiosity sent, `[meso vertex][slot]`.
-    pub exits: &'a [Vec3],
+    pub exits: &'a Exits<'a>,
 }
 
 impl Sorting<'_> {
@@ -132,7 +132,7 @@ impl Sorting<'_> {
             let slots = self.kept.vertices.corners[m][k] as usize * directions.count();
             let looks = directions.bilinear(DVec3::from(local));
             looks
-                .map(|(slot, weight)| self.exits[slots + slot] * weight as f32)
+                .map(|(slot, weight)| self.exits.all()[slots + slot] * weight as f32)
                 .into_iter()
                 .sum()
         })

@@ -23,6 +23,7 @@ mod overdraw;
 mod parts;
 mod relief;
 mod relief_borders;
+mod relief_light;
 mod relief_mesh;
 mod relief_scene;
 mod relief_surfaces;

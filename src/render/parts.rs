@@ -6,7 +6,7 @@
 
 use glam::DVec3;
 
-use super::shafts::{Shafts, Starts};
+use super::shafts::{Blockers, Shafts, Starts};
 use crate::constants::PART_UNSURE;
 use crate::passes::types::LitTriangle;
 
@@ -50,13 +50,14 @@ pub fn states(shafts: &Shafts, triangle: &LitTriangle, level: u32) -> Vec<u8> {
         level: 0,
         upper: false,
     };
-    let state = whole.state(shafts, triangle);
+    let mut blockers = Blockers::default();
+    let state = whole.state(shafts, triangle, &mut blockers);
     if level == 0 || state != PART_UNSURE || shafts.is_empty() {
         return vec![state as u8];
     }
     let mut states = vec![PART_UNSURE as u8; 2 << (2 * level)];
     for child in whole.children() {
-        child.judge(shafts, triangle, level, &mut states);
+        child.judge((shafts, &mut blockers), triangle, level, &mut states);
     }
     states
 }
@@ -86,13 +87,19 @@ struct Part {
 
 impl Part {
     /// Judges it, or its parts down to a level.
-    fn judge(self, shafts: &Shafts, triangle: &LitTriangle, level: u32, states: &mut [u8]) {
-        let state = self.state(shafts, triangle);
+    fn judge(
+        self,
+        (shafts, blockers): (&Shafts, &mut Blockers),
+        triangle: &LitTriangle,
+        level: u32,
+        states: &mut [u8],
+    ) {
+        let state = self.state(shafts, triangle, blockers);
         if state != PART_UNSURE {
             self.set(level, state as u8, states);
         } else if self.level < level {
             for child in self.children() {
-                child.judge(shafts, triangle, level, states);
+                child.judge((shafts, blockers), triangle, level, states);
             }
         }
     }
@@ -148,9 +155,9 @@ impl Part {
         })
     }
 
-    fn state(self, shafts: &Shafts, triangle: &LitTriangle) -> u32 {
+    fn state(self, shafts: &Shafts, triangle: &LitTriangle, blockers: &mut Blockers) -> u32 {
         let [a, b, c] = [triangle.a, triangle.b, triangle.c].map(|v| v.as_dvec3());
         let corners = self.shares().map(|s| a * s.x + b * s.y + c * s.z);
-        shafts.state(&Starts::on_part(triangle, corners))
+        shafts.state(&Starts::on_part(triangle, corners), blockers)
     }
 }

@@ -1,8 +1,6 @@
 //! What is drawn of relief: prisms over the triangles with relief, their height maps, factors
 //! and light.
 
-use std::borrow::Cow;
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use bytemuck::Zeroable;
@@ -11,12 +9,14 @@ use rayon::prelude::*;
 
 use super::blocks::Blocks;
 use super::flat_relief::{FlatRelief, Sorting};
+use super::relief_light::{Exits, Incident, LightVertices, difference};
 use super::relief_scene::ReliefScene;
 use super::seen_scene::SeenScene;
-use super::shafts::{Shafts, Starts};
+use super::shafts::{Blockers, Shafts, Starts};
 use super::slots::slot_colour;
-use super::{Cuts, Light, Lighting, ReliefShading};
+use super::{Cuts, Show};
 use crate::bake::solution::DirectionalLight;
+use crate::constants::WIDEST_SAMPLE;
 use crate::error::Result;
 use crate::math::directions::Directions;
 use crate::mesh::clusters::{Cluster, Face, FaceClusters};
@@ -64,9 +64,7 @@ impl ReliefMesh {
         let (scene, lighting) = (seen.scene, seen.lighting);
         let directions = &kept.directions;
         let normals = relief_normals(scene);
-        let exits = kept
-            .vertices
-            .mean(&lighting.exits(scene, light), directions.count());
+        let exits = Exits::new(lighting, scene, light, kept);
         let sorting = Sorting {
             seen,
             light,
@@ -93,13 +91,10 @@ impl ReliefMesh {
             light,
             kept,
             normals: &normals,
-            exits: &exits,
-            incident: &incident,
-            shown: lighting.part.of(
-                &light.incident_moment,
-                &light.incident_moment_direct,
-                difference,
-            ),
+            shown: (lighting.show == Show::Slots).then(|| {
+                let (all, direct) = (&light.incident_moment, &light.incident_moment_direct);
+                lighting.part.of(all, direct, difference)
+            }),
             lit: LightVertices::default(),
             borders: Vec::new(),
         };
@@ -110,8 +105,10 @@ impl ReliefMesh {
             })
             .collect();
         if let Some(shafts) = shafts {
-            let judge = |p: &mut Prism| p.state = shafts.state(&Starts::on_prism(p));
-            list.par_iter_mut().for_each(judge);
+            let judge = |blockers: &mut Blockers, p: &mut Prism| {
+                p.state = shafts.state(&Starts::on_prism(p), blockers);
+            };
+            list.par_iter_mut().for_each_init(Blockers::default, judge);
         }
         let mut states = [0; 3];
         list.iter().for_each(|p| states[p.state as usize] += 1);
@@ -127,10 +124,17 @@ impl ReliefMesh {
             .iter()
             .flat_map(|p| [p.low_a, p.low_b, p.low_c, p.high_a, p.high_b, p.high_c])
             .collect();
+        let averaged = lighting.show == Show::Shaded
+            && lighting.shading.is_displaced()
+            && list.iter().any(|prism| may_be_wide(prism, seen));
+        let sent = match averaged {
+            true => prisms.lit.exits(&exits, directions.count()),
+            false => Vec::new(),
+        };
         let lights = Lights {
             factors: &kept.surfaces.factors,
-            coefficients: &prisms.lit.coefficients,
-            exits: &prisms.lit.exits,
+            coefficients: &prisms.lit.coefficients(kept, &incident),
+            exits: &sent,
             parallel_lights: &clusters.as_ref().map_or_else(Vec::new, parallel_lights),
             horizons: &kept.surfaces.horizons,
             borders: &prisms.borders,
@@ -165,6 +169,17 @@ fn is_mirrored(face: &Face) -> bool {
     matches!(face.corners, [0, 2, 1] | [1, 0, 2] | [2, 1, 0])
 }
 
+/// Whether a sample may be wider than WIDEST_SAMPLE texels somewhere on a prism, see
+/// `shared/relief_hit.glsl`.
+fn may_be_wide(p: &Prism, seen: &SeenScene<'_>) -> bool {
+    // More than what the device's distances are rounded by.
+    const MARGIN: f32 = 1.001;
+    let corners = [p.low_a, p.low_b, p.low_c, p.high_a, p.high_b, p.high_c];
+    let furthest = corners.iter().map(|v| v.length()).fold(0.0, f32::max);
+    let angle = seen.projection.sample_angle(seen.samples);
+    furthest * angle * MARGIN > WIDEST_SAMPLE as f32 * p.texel
+}
+
 /// Runs of equal materials, `[prism]`.
 fn ranges(materials: impl Iterator<Item = u32>) -> Vec<PrismRange> {
     let mut ranges: Vec<PrismRange> = Vec::new();
@@ -181,60 +196,16 @@ fn ranges(materials: impl Iterator<Item = u32>) -> Vec<PrismRange> {
     ranges
 }
 
-/// All light less its direct part, RGB.
-fn difference(all: [Vec3; 3], direct: [Vec3; 3]) -> [Vec3; 3] {
-    [0, 1, 2].map(|c| all[c] - direct[c])
-}
-
-/// Moments by which the relief is lit, `[meso vertex][slot][colour]`.
-struct Incident<'a> {
-    /// Light whose bounces inside the relief are drawn.
-    inside: Option<&'a [[Vec3; 3]]>,
-    /// Light that arrives and is drawn by factors.
-    arriving: Option<Cow<'a, [[Vec3; 3]]>>,
-    /// Light that arrives and is drawn by clusters.
-    clustered: Option<Cow<'a, [[Vec3; 3]]>>,
-}
-
-impl<'a> Incident<'a> {
-    fn new(lighting: &Lighting<'_>, kept: &'a ReliefScene) -> Self {
-        let (all, direct) = (&kept.all[..], &kept.direct[..]);
-        let indirect = || -> Vec<[Vec3; 3]> {
-            let pairs = all.iter().zip(direct);
-            pairs.map(|(&all, &d)| difference(all, d)).collect()
-        };
-        let sharp = lighting.sharp() && lighting.shading == ReliefShading::Factored;
-        let arriving = match (lighting.part, sharp) {
-            (Light::Global, false) => Some(Cow::Borrowed(all)),
-            (Light::Global, true) | (Light::Indirect, _) => Some(Cow::Owned(indirect())),
-            (Light::Direct, false) => Some(Cow::Borrowed(direct)),
-            (Light::Direct, true) => None,
-        };
-        let (arriving, clustered) = match lighting.shading {
-            ReliefShading::Clusters => (None, arriving),
-            _ => (arriving, None),
-        };
-        Self {
-            // Light that has bounced inside the relief counts as indirect.
-            inside: (lighting.part != Light::Direct).then_some(all),
-            arriving,
-            clustered,
-        }
-    }
-}
-
-/// Makes prisms, and the light at the vertices that they share.
+/// Makes prisms, and lists the vertices that they share.
 struct PrismBuilder<'a> {
     seen: &'a SeenScene<'a>,
     light: &'a DirectionalLight,
     kept: &'a ReliefScene,
     /// Of the relief's base, `[vertex of the scene]`.
     normals: &'a [DVec3],
-    /// Radiosity sent, `[meso vertex][slot]`.
-    exits: &'a [Vec3],
-    incident: &'a Incident<'a>,
-    /// Moments of the part of the light that is shown, `[meso element][slot][colour]`.
-    shown: Vec<[Vec3; 3]>,
+    /// Moments of the part of the light that is shown, `[meso element][slot][colour]`, where slots
+    /// are.
+    shown: Option<Vec<[Vec3; 3]>>,
     lit: LightVertices,
     /// Of the relief, near each prism: shares of its corners b and c at both ends.
     borders: Vec<Vec4>,
@@ -264,11 +235,10 @@ impl PrismBuilder<'_> {
         let whole = uv[0].floor();
         let [light_a, light_b, light_c] = face
             .corners
-            .map(|k| self.light_vertex(self.kept.vertices.corners[m][k], surface));
+            .map(|k| self.lit.index(self.kept.vertices.corners[m][k], surface));
         let [tangent, bitangent, normal] = self.light.frames[m];
         let first_border = self.borders.len() as u32;
         self.add_borders(e, face);
-        let k = self.kept.directions.count();
         Prism {
             low_a: low[0],
             low_b: low[1],
@@ -291,9 +261,19 @@ impl PrismBuilder<'_> {
             normal,
             first_cluster: clusters.0,
             cluster_count: clusters.1,
-            slots: slot_colour(&self.kept.directions, &self.shown[m * k..][..k]),
+            slots: self.slots(m),
             ..Prism::zeroed()
         }
+    }
+
+    /// The colour of the strongest slot of a meso element, where slots are shown.
+    fn slots(&self, m: usize) -> Vec3 {
+        let k = self.kept.directions.count();
+        let of_shown = |shown: &Vec<[Vec3; 3]>| {
+            let moments = &shown[m * k..][..k];
+            slot_colour(&self.kept.directions, moments)
+        };
+        self.shown.as_ref().map_or(Vec3::ZERO, of_shown)
     }
 
     fn add_borders(&mut self, triangle: usize, face: &Face) {
@@ -311,40 +291,6 @@ impl PrismBuilder<'_> {
             self.borders.push(Vec4::new(from.x, from.y, to.x, to.y));
         }
     }
-
-    /// Index of a meso vertex's light as a surface sees it.
-    fn light_vertex(&mut self, vertex: u32, surface: u32) -> u32 {
-        let next = self.lit.known.len() as u32;
-        let known = *self.lit.known.entry((vertex, surface)).or_insert(next);
-        if known == next {
-            let k = self.kept.directions.count();
-            let slots = vertex as usize * k..(vertex as usize + 1) * k;
-            let factors = &self.kept.factors[surface as usize];
-            let coefficients = |moments: Option<&[[Vec3; 3]]>| -> Vec<Vec3> {
-                let found = moments.map(|m| factors.coefficients(&m[slots.clone()]));
-                found.into_iter().flatten().collect()
-            };
-            let inside = coefficients(self.incident.inside);
-            let arriving = coefficients(self.incident.arriving.as_deref());
-            let packed = &self.kept.surfaces.packed[surface as usize];
-            let texels = packed.coefficients(&inside, &arriving);
-            self.lit.coefficients.extend(texels);
-            let exits = &self.exits[slots];
-            self.lit.exits.extend(exits.iter().map(|e| e.extend(0.0)));
-        }
-        known
-    }
-}
-
-/// Meso vertices with light, each as one surface sees it.
-#[derive(Default)]
-struct LightVertices {
-    /// Packed, of the light inside and of the light that arrives, `[light vertex][rank]`.
-    coefficients: Vec<[u32; 4]>,
-    /// Radiosity sent, `[light vertex][slot]`.
-    exits: Vec<Vec4>,
-    /// Index by meso vertex and surface.
-    known: HashMap<(u32, u32), u32>,
 }
 
 /// The clusters in the form that the device reads.

@@ -63,6 +63,11 @@ pub struct Shafts {
     margin: f64,
 }
 
+/// The triangle that last stood in the way to each lamp: often it does so again, near where it
+/// did, and then no other is looked for.
+#[derive(Default)]
+pub struct Blockers([Option<usize>; MOST_LAMPS]);
+
 impl Shafts {
     /// Shafts for `tree`, whose triangles are `scene`'s relative to the eye of `projection`.
     pub fn new(tree: ShadowTree, scene: &Scene, projection: &Projection) -> Self {
@@ -146,19 +151,23 @@ impl Shafts {
     }
 
     /// PART_… of where shadow rays start: open where no ray to any light is blocked, or none shines
-    /// towards it; hidden where all are blocked, each lamp's by one triangle.
-    pub fn state(&self, starts: &Starts) -> u32 {
+    /// towards it; hidden where all are blocked, each lamp's by one triangle. It does not depend on
+    /// `blockers`.
+    pub fn state(&self, starts: &Starts, Blockers(blockers): &mut Blockers) -> u32 {
         if self.is_empty() {
             return PART_UNSURE;
         }
+        let mut lamps = self.lamps.iter().zip(&mut *blockers);
+        if lamps.all(|(lamp, blocker)| self.is_clear(starts, lamp, blocker)) {
+            return PART_OPEN;
+        }
         let points = &starts.points;
-        let mut lamps = self.lamps.iter();
-        if lamps.clone().all(|lamp| self.is_clear(starts, lamp)) {
-            PART_OPEN
-        } else if lamps.all(|l| self.is_behind(points, l) || self.is_covered(points, l)) {
-            PART_HIDDEN
-        } else {
-            PART_UNSURE
+        let mut lamps = self.lamps.iter().zip(blockers);
+        match lamps
+            .all(|(l, blocker)| self.is_behind(points, l) || self.is_covered(points, l, blocker))
+        {
+            true => PART_HIDDEN,
+            false => PART_UNSURE,
         }
     }
 
@@ -172,27 +181,42 @@ impl Shafts {
 
     /// Whether one triangle stands on all ways from the starts to a lamp. Places where ways between
     /// two hulls pass a plane lie in the hull of those of ways between the corners.
-    fn is_covered(&self, starts: &[DVec3], lamp: &Lamp) -> bool {
+    fn is_covered(&self, starts: &[DVec3], lamp: &Lamp, blocker: &mut Option<usize>) -> bool {
         let middle = |points: &[DVec3]| points.iter().sum::<DVec3>() / points.len() as f64;
         let (from, to) = (middle(starts), middle(&lamp.ends));
+        let covers = |t: &ShadowTriangle| {
+            let plane = CasterPlane::new(t);
+            let mut ways = starts
+                .iter()
+                .flat_map(|&s| lamp.ends.iter().map(move |&e| (s, e)));
+            t.relief == 0
+                && plane.is_between(from, to, self.margin)
+                && ways.all(|(s, e)| plane.is_between(s, e, self.margin))
+        };
+        self.finds(|node| enters(node, from, to), covers, blocker)
+    }
+
+    /// Whether a triangle is what is looked for, of those in the nodes that `enter` lets pass; the
+    /// one that was last found is tried first.
+    fn finds(
+        &self,
+        enter: impl Fn(&ShadowNode) -> bool,
+        is_found: impl Fn(&ShadowTriangle) -> bool,
+        last: &mut Option<usize>,
+    ) -> bool {
+        let triangles = &self.tree.triangles;
+        if last.is_some_and(|i| is_found(&triangles[i])) {
+            return true;
+        }
         let nodes = self.tree.nodes();
         let mut at = 0;
         while let Some(node) = nodes.get(at) {
-            if !enters(node, from, to) {
+            if !enter(node) {
                 at = node.skip as usize;
                 continue;
             }
-            let mut casters = self.tree.triangles[node.triangles()].iter();
-            let covers = |t: &ShadowTriangle| {
-                let plane = CasterPlane::new(t);
-                let mut ways = starts
-                    .iter()
-                    .flat_map(|&s| lamp.ends.iter().map(move |&e| (s, e)));
-                t.relief == 0
-                    && plane.is_between(from, to, self.margin)
-                    && ways.all(|(s, e)| plane.is_between(s, e, self.margin))
-            };
-            if casters.any(covers) {
+            if let Some(i) = node.triangles().find(|&i| is_found(&triangles[i])) {
+                *last = Some(i);
                 return true;
             }
             at += 1;
@@ -200,7 +224,7 @@ impl Shafts {
         false
     }
 
-    fn is_clear(&self, starts: &Starts, lamp: &Lamp) -> bool {
+    fn is_clear(&self, starts: &Starts, lamp: &Lamp, blocker: &mut Option<usize>) -> bool {
         if self.is_behind(&starts.points, lamp) {
             return true;
         }
@@ -213,27 +237,16 @@ impl Shafts {
             };
             t.relief == 1 && starts.passed.is_some_and(limit)
         };
-        let nodes = self.tree.nodes();
-        let mut at = 0;
-        while let Some(node) = nodes.get(at) {
+        let enter = |node: &ShadowNode| {
             let (low, high) = (node.low.as_dvec3(), node.high.as_dvec3());
             let misses = |side: &Side| {
                 let nearest = DVec3::select(side.normal.cmpgt(DVec3::ZERO), low, high);
                 side.normal.dot(nearest) > side.limit
             };
-            if sides.iter().any(misses) {
-                at = node.skip as usize;
-                continue;
-            }
-            if self.tree.triangles[node.triangles()]
-                .iter()
-                .any(|t| !passed(t) && self.stands_in(t, &sides, &hull))
-            {
-                return false;
-            }
-            at += 1;
-        }
-        true
+            !sides.iter().any(misses)
+        };
+        let blocks = |t: &ShadowTriangle| !passed(t) && self.stands_in(t, &sides, &hull);
+        !self.finds(enter, blocks, blocker)
     }
 
     fn stands_in(&self, t: &ShadowTriangle, sides: &[Side], hull: &[DVec3]) -> bool {
