@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 const LAYERS: [&[&str]; 10] = [
     &["console", "constants", "error", "say", "structs"],
     &["atomic_file", "input_file", "math", "vk"],
-    &["scene"],
+    &["cache_folder", "scene"],
     &["meso", "picture"],
     &["mesh", "path_tracer"],
     &["passes", "reference"],

@@ -1,14 +1,14 @@
 //! Bakes kept on disk, keyed by their input, so that a scene that is drawn again is not solved
 //! again.
 
-use std::fs::{self, File};
+use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
 
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use crate::bake::solution::{Bake, Origin, Solution, VERSION};
+use crate::cache_folder::{mark_used, trim};
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::solver::{Settings, StopReason};
@@ -52,8 +52,7 @@ impl CachedBake {
         if bake.origin.hash != self.hash {
             return Err(Error::file(&self.path, "a bake of another scene"));
         }
-        // Marks the bake as just used; if that fails, it is only deleted earlier.
-        let _ = File::open(&self.path).and_then(|file| file.set_modified(SystemTime::now()));
+        mark_used(&self.path);
         Ok(Some(bake))
     }
 
@@ -77,64 +76,8 @@ impl CachedBake {
         let folder = self.path.parent().unwrap_or(Path::new("."));
         fs::create_dir_all(folder).map_err(|e| Error::write(folder, e))?;
         solution.save(&self.path, origin, settings)?;
-        trim(folder, &self.path, MOST_BAKES, MOST_BYTES);
+        let is_bake = |name: &str| name.starts_with("bake-") && name.ends_with(".safetensors");
+        trim(&self.path, is_bake, MOST_BAKES, MOST_BYTES);
         Ok(true)
-    }
-}
-
-/// Deletes bakes of the cache, least recently used first, until both limits hold; `newest` always
-/// stays. Files that cannot be read or deleted are left: another process may be doing the same.
-fn trim(folder: &Path, newest: &Path, most: usize, most_bytes: u64) {
-    let Ok(entries) = fs::read_dir(folder) else {
-        return;
-    };
-    let mut bakes: Vec<(SystemTime, u64, PathBuf)> = entries
-        .flatten()
-        .filter(|entry| {
-            let name = entry.file_name();
-            let name = name.to_string_lossy();
-            name.starts_with("bake-") && name.ends_with(".safetensors")
-        })
-        .filter(|entry| entry.path() != newest)
-        .filter_map(|entry| {
-            let found = entry.metadata().ok()?;
-            Some((found.modified().ok()?, found.len(), entry.path()))
-        })
-        .collect();
-    bakes.sort();
-    let mut bytes = fs::metadata(newest).map_or(0, |found| found.len());
-    for (kept, (_, size, path)) in (1..).zip(bakes.iter().rev()) {
-        bytes += size;
-        if kept >= most || bytes > most_bytes {
-            let _ = fs::remove_file(path);
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::time::Duration;
-
-    /// Five bakes of 10 bytes, a minute apart, beside another file.
-    #[test]
-    fn what_was_used_longest_ago_goes_first() {
-        for (most, most_bytes, left) in [(3, 1000, 3), (9, 25, 2), (9, 1000, 5), (1, 5, 1)] {
-            let folder = tempfile::tempdir().expect("a folder for the test");
-            let path = |i: u64| folder.path().join(format!("bake-{i}.safetensors"));
-            let now = SystemTime::now();
-            for i in 0..5 {
-                fs::write(path(i), [0; 10]).expect("written");
-                let file = File::options().write(true).open(path(i)).expect("open");
-                file.set_modified(now - Duration::from_secs(60 * i))
-                    .expect("set");
-            }
-            fs::write(folder.path().join("relief-1.bin"), [0; 10]).expect("written");
-            trim(folder.path(), &path(0), most, most_bytes);
-            for i in 0..5 {
-                assert_eq!(path(i).exists(), i < left, "{i} of {most}, {most_bytes}");
-            }
-            assert!(folder.path().join("relief-1.bin").exists());
-        }
     }
 }

@@ -1,10 +1,14 @@
-//! Factors of reliefs, kept while only the light changes.
+//! Factors of reliefs, kept while only the light changes, and on disk from run to run.
 
+use std::path::Path;
 use std::sync::{Arc, Mutex};
 
+use glam::Vec3;
 use sha2::{Digest, Sha256};
 
-use super::{Factors, HeightField, Shading, Visibility};
+use super::{CORNERS, Factors, HeightField, Shading, Visibility, visibility};
+use crate::cache_folder;
+use crate::constants::MOST_RANK;
 use crate::error::Result;
 use crate::math::directions::Directions;
 
@@ -15,9 +19,13 @@ type Key = [u8; 32];
 #[derive(Default)]
 pub struct KnownFactors(Mutex<Vec<(Key, Arc<Factors>)>>);
 
+/// Incremented when other factors are found of the same relief.
+const VERSION: &str = "relief factors 1";
+
 /// The key of a relief with its shading and directions.
 fn key(directions: &Directions, field: &HeightField, shading: &Shading) -> Key {
     let mut hash = Sha256::new();
+    hash.update(VERSION);
     hash.update(directions.columns.to_le_bytes());
     hash.update(directions.rows.to_le_bytes());
     hash.update(Visibility::key(field));
@@ -33,8 +41,8 @@ fn key(directions: &Directions, field: &HeightField, shading: &Shading) -> Key {
 }
 
 impl KnownFactors {
-    /// The factors of each relief, `[relief]`, computed by `find` where they are not known. Those of
-    /// other reliefs are dropped.
+    /// The factors of each relief, `[relief]`, computed by `find` where they are neither known nor
+    /// kept in the folder `cache`. Those of other reliefs are dropped from memory.
     ///
     /// # Errors
     /// Those of `find`.
@@ -42,6 +50,7 @@ impl KnownFactors {
         &self,
         directions: &Directions,
         reliefs: impl Iterator<Item = (&'a HeightField, &'a Shading)>,
+        cache: Option<&Path>,
         mut find: impl FnMut(&HeightField, &Shading) -> Result<Factors>,
     ) -> Result<Vec<Arc<Factors>>> {
         let mut known = self.0.lock().unwrap_or_else(|e| e.into_inner());
@@ -49,10 +58,22 @@ impl KnownFactors {
         let mut factors = Vec::new();
         for (field, shading) in reliefs {
             let key = key(directions, field, shading);
+            let (slots, facets) = (directions.count(), field.facet_count());
+            let load = |dir: &Path| Factors::load(dir, &key, slots, facets);
             let same = |(of, _): &&(Key, Arc<Factors>)| *of == key;
             let found = match known.iter().chain(&before).find(same) {
                 Some((_, found)) => Arc::clone(found),
-                None => Arc::new(find(field, shading)?),
+                None => Arc::new(match cache.and_then(load) {
+                    Some(kept) => kept,
+                    None => {
+                        let found = find(field, shading)?;
+                        if let Some(Err(error)) = cache.map(|dir| found.save(dir, &key)) {
+                            // It costs time in the next run but does not harm this one.
+                            tracing::warn!("relief factors are not kept: {error}");
+                        }
+                        found
+                    }
+                }),
             };
             known.push((key, Arc::clone(&found)));
             factors.push(found);
@@ -61,9 +82,55 @@ impl KnownFactors {
     }
 }
 
+/// Bytes of the numbers at the head of a file: rank, vectors of the basis, error.
+const HEAD: usize = 3 * size_of::<u64>();
+
+impl Factors {
+    /// Those kept by a key, of so many slots and facets; None if there are none, or their file is
+    /// damaged.
+    fn load(cache: &Path, key: &Key, slots: usize, facets: usize) -> Option<Self> {
+        let bytes = cache_folder::load(&visibility::file(cache, key))?;
+        let (head, rest) = bytes.split_first_chunk::<HEAD>()?;
+        let [rank, basis, error]: [u64; 3] = bytemuck::pod_read_unaligned(head);
+        let rank = usize::try_from(rank).ok()?;
+        let size = usize::try_from(basis)
+            .ok()?
+            .checked_mul(size_of::<Vec3>())?;
+        let (basis, corners) = rest.split_at_checked(size)?;
+        let found = Self {
+            rank,
+            basis: bytemuck::pod_collect_to_vec(basis),
+            corners: bytemuck::pod_collect_to_vec(corners),
+            error: f64::from_bits(error),
+        };
+        let fits = (1..=MOST_RANK as usize).contains(&rank)
+            && found.basis.len() == rank * slots
+            && found.corners.len() == facets / 2 * CORNERS * rank;
+        fits.then_some(found)
+    }
+
+    /// Keeps them by a key.
+    ///
+    /// # Errors
+    /// A folder or file that cannot be written.
+    fn save(&self, cache: &Path, key: &Key) -> Result<()> {
+        let head = [
+            self.rank as u64,
+            self.basis.len() as u64,
+            self.error.to_bits(),
+        ];
+        let parts = [
+            bytemuck::cast_slice(&head),
+            bytemuck::cast_slice(&self.basis),
+            bytemuck::cast_slice(&self.corners),
+        ];
+        visibility::keep(&visibility::file(cache, key), &parts)
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use glam::{DVec3, Vec3};
+    use glam::{DVec3, Vec3, Vec4};
 
     use super::*;
 
@@ -96,6 +163,7 @@ mod tests {
             let factors = known.of(
                 &directions(k),
                 made.iter().map(|(field, shading)| (field, shading)),
+                None,
                 |_, _| {
                     count += 1;
                     Ok(Factors {
@@ -114,5 +182,51 @@ mod tests {
         assert_eq!(found(16, &[(0.5, 0.7)]), 1);
         assert_eq!(found(16, &[(0.5, 0.8)]), 1);
         assert_eq!(found(32, &[(0.5, 0.8)]), 1);
+    }
+
+    /// What one run has found the next does not find again, unless its file is damaged, or what it
+    /// holds does not fit.
+    #[test]
+    fn what_is_kept_is_not_found_again() {
+        let folder = tempfile::tempdir().expect("a folder for the test");
+        let directions = Directions::new(16).expect("a number of slots");
+        let (field, shading) = (field(0.5), shading(0.8));
+        let factors = |rank: usize| Factors {
+            rank,
+            basis: (0..16 * rank).map(|i| Vec3::splat(i as f32)).collect(),
+            corners: (0..16 * rank).map(|i| Vec4::splat(-(i as f32))).collect(),
+            error: 0.25,
+        };
+        let run = |finds: usize| {
+            let mut was_found = false;
+            let reliefs = std::iter::once((&field, &shading));
+            let found =
+                KnownFactors::default().of(&directions, reliefs, Some(folder.path()), |_, _| {
+                    was_found = true;
+                    Ok(factors(finds))
+                });
+            let found = &found.expect("found")[0];
+            assert_eq!(found.error, 0.25);
+            assert_eq!(found.basis, factors(found.rank).basis);
+            assert_eq!(found.corners, factors(found.rank).corners);
+            (was_found, found.rank)
+        };
+        assert_eq!(run(4), (true, 4));
+        assert_eq!(run(8), (false, 4));
+        let path = visibility::file(folder.path(), &key(&directions, &field, &shading));
+        let mut bytes = std::fs::read(&path).expect("kept");
+        bytes[HEAD] ^= 1;
+        std::fs::write(&path, bytes).expect("written");
+        assert_eq!(run(8), (true, 8));
+        assert_eq!(run(4), (false, 8));
+        // The checksum is right, the rank is not.
+        let wrong = Factors {
+            rank: 4,
+            ..factors(8)
+        };
+        wrong
+            .save(folder.path(), &key(&directions, &field, &shading))
+            .expect("written");
+        assert_eq!(run(12), (true, 12));
     }
 }

@@ -5,10 +5,9 @@ use std::path::{Path, PathBuf};
 use sha2::{Digest, Sha256};
 
 use super::HeightField;
-use crate::atomic_file::write_atomically;
+use crate::cache_folder;
 use crate::constants::{AZIMUTHS, RAY_STRATA};
 use crate::error::Result;
-use crate::input_file;
 
 /// The parts of the sky and of the relief that each facet of a [`HeightField`] sees.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,6 +22,26 @@ pub struct Visibility {
 
 /// Incremented when the shaders' results change.
 const VERSION: &str = "relief visibility 1";
+
+/// Most bytes of reliefs that are kept; the least recently used are deleted first.
+const MOST_BYTES: u64 = 2 << 30;
+
+/// The file of what is kept of a relief by this key.
+pub(super) fn file(cache: &Path, key: &[u8; 32]) -> PathBuf {
+    let name: String = key.iter().map(|byte| format!("{byte:02x}")).collect();
+    cache.join(format!("relief-{name}.bin"))
+}
+
+/// Keeps parts of a relief in a file, and deletes others beyond [`MOST_BYTES`].
+///
+/// # Errors
+/// A folder or file that cannot be written.
+pub(super) fn keep(path: &Path, parts: &[&[u8]]) -> Result<()> {
+    cache_folder::save(path, parts)?;
+    let ours = |name: &str| name.starts_with("relief-") && name.ends_with(".bin");
+    cache_folder::trim(path, ours, usize::MAX, MOST_BYTES);
+    Ok(())
+}
 
 /// Rays from each facet.
 pub const RAYS: usize = (RAY_STRATA * RAY_STRATA) as usize;
@@ -46,42 +65,27 @@ impl Visibility {
 
     /// Its file in the cache.
     fn file(field: &HeightField, cache: &Path) -> PathBuf {
-        let name: String = Self::key(field)
-            .iter()
-            .map(|b| format!("{b:02x}"))
-            .collect();
-        cache.join(format!("relief-{name}.bin"))
+        file(cache, &Self::key(field))
     }
 
     /// The cached visibility of a height field; None if there is none or its file is damaged.
     pub fn load(field: &HeightField, cache: &Path) -> Option<Self> {
-        let bytes = input_file::read(&Self::file(field, cache)).ok()?;
-        let facets = field.facet_count();
-        let (body, sum) = bytes.split_at_checked(4 * facets * (AZIMUTHS as usize + RAYS))?;
-        if Sha256::digest(body).as_slice() != sum {
-            return None;
-        }
-        let (horizons, hits) = body.split_at(4 * facets * AZIMUTHS as usize);
-        let word = |b: &[u8]| [b[0], b[1], b[2], b[3]];
-        Some(Self {
-            horizons: horizons
-                .chunks_exact(4)
-                .map(|b| f32::from_le_bytes(word(b)))
-                .collect(),
-            hits: hits
-                .chunks_exact(4)
-                .map(|b| u32::from_le_bytes(word(b)))
-                .collect(),
-        })
+        let bytes = cache_folder::load(&Self::file(field, cache))?;
+        let (horizons, hits) =
+            bytes.split_at_checked(4 * field.facet_count() * AZIMUTHS as usize)?;
+        let found = Self {
+            horizons: bytemuck::pod_collect_to_vec(horizons),
+            hits: bytemuck::pod_collect_to_vec(hits),
+        };
+        (found.hits.len() == field.facet_count() * RAYS).then_some(found)
     }
 
     pub fn save(&self, field: &HeightField, cache: &Path) -> Result<()> {
-        std::fs::create_dir_all(cache).map_err(|e| crate::error::Error::write(cache, e))?;
-        let mut bytes: Vec<u8> = self.horizons.iter().flat_map(|h| h.to_le_bytes()).collect();
-        bytes.extend(self.hits.iter().flat_map(|h| h.to_le_bytes()));
-        let sum = Sha256::digest(&bytes);
-        bytes.extend_from_slice(&sum);
-        write_atomically(&Self::file(field, cache), |out| out.write_all(&bytes))
+        let parts = [
+            bytemuck::cast_slice(&self.horizons),
+            bytemuck::cast_slice(&self.hits),
+        ];
+        keep(&Self::file(field, cache), &parts)
     }
 
     /// Tangents of the horizon of a facet, `[azimuth]`.

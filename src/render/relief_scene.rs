@@ -78,7 +78,7 @@ impl ReliefScene {
         let none = KnownFactors::default();
         let reliefs = tiles.iter().map(|tile| (&tile.field, &tile.shading));
         let known = lighting.known.unwrap_or(&none);
-        let factors = known.of(&directions, reliefs, |field, shading| {
+        let factors = known.of(&directions, reliefs, lighting.cache, |field, shading| {
             let (seen, _) = visibility(field, lighting.cache, &mut march)?;
             Ok(Factors::new(
                 &directions,
