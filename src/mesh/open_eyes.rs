@@ -50,7 +50,7 @@ pub fn open_eyes<'a>(
         if !source.is_surface() || source.places.len() >= places.max(1) {
             return 0;
         }
-        let moved = open_eye(elements, source, occluders, wanted.turn as usize);
+        let moved = open_eye(elements, source, occluders, wanted);
         source.places = spread(&source.places, places);
         usize::from(moved)
     });
@@ -63,30 +63,35 @@ fn spread(places: &[SourcePlace], count: usize) -> Vec<SourcePlace> {
     (0..count).map(at).collect()
 }
 
-/// Gives a source all [`SOURCE_EYES`] places. Whether its eye was moved.
+/// Gives a source all [`SOURCE_EYES`] places, unless no places are `wanted` and its eye stays.
+/// Whether its eye was moved.
 fn open_eye(
     elements: &Elements,
     source: &mut Source,
     occluders: &ShadowTree<ShadowOccluder>,
-    turn: usize,
+    wanted: &Wanted,
 ) -> bool {
-    let tree = PartTree::of(elements, source);
-    let count = SOURCE_EYES as usize;
-    source.places = tree.places(elements, source, count, turn);
-    ends_first(source);
-    if source.element_count == 1 {
+    let most = LOOKS / 2;
+    let is_covered = |source: &Source, place: DVec3| {
+        let open = open_looks(source, place, occluders);
+        open.take(most).count() < most
+    };
+    let is_one = source.element_count == 1;
+    let eye = !is_one && is_covered(source, source.eye);
+    if wanted.places == 0 && !eye {
         return false;
     }
-    let open = |place: DVec3| open_looks(source, place, occluders);
-    let most = LOOKS / 2;
-    let covered = |place: DVec3| open(place).take(most).count() < most;
-    let eye = covered(source.eye);
-    let looked_at = || source.places.iter().step_by(EVERY);
-    if !eye && !looked_at().any(|place| covered(place.at)) {
+    let tree = PartTree::of(elements, source);
+    let count = SOURCE_EYES as usize;
+    source.places = tree.places(elements, source, count, wanted.turn as usize);
+    ends_first(source);
+    let mut looked_at = source.places.iter().step_by(EVERY);
+    if is_one || !eye && !looked_at.any(|place| is_covered(source, place.at)) {
         return false;
     }
     let places = &source.places;
-    let openness: Vec<usize> = places.iter().map(|place| open(place.at).count()).collect();
+    let open = |place: &SourcePlace| open_looks(source, place.at, occluders).count();
+    let openness: Vec<usize> = places.iter().map(open).collect();
     let best = openness.iter().copied().max().unwrap_or(0);
     let open: Vec<SourcePlace> = (places.iter().zip(&openness))
         .filter(|(_, open)| 2 * **open >= best)
