@@ -223,6 +223,8 @@ pub fn to_square(direction: DVec3) -> DVec2 {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
 
     const ALL: [u32; 5] = [16, 32, 64, 128, 256];
