@@ -11,7 +11,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::meso::{Relief, Response};
-use crate::scene::Scene;
+use crate::scene::{Scene, Texture};
 
 /// Steps of an internal coordinate in a unit: finer than f32, and coarser than the precision of f64
 /// at an offset of 10⁶ units, so that a scene far from the origin is ordered and grouped as the
@@ -100,8 +100,21 @@ fn by_material(scene: &Scene) -> Vec<Vec3> {
         .collect()
 }
 
+/// The mean of a texture over a triangle of texture coordinates.
+type Mean = fn(&Texture, &[[f32; 2]; 3]) -> [f32; 3];
+
 impl Elements {
     pub fn new(scene: &Scene) -> Self {
+        Self::by(scene, Texture::mean_over_triangle)
+    }
+
+    /// The same with reflectances by a few samples of their textures.
+    #[cfg(feature = "window")]
+    pub(crate) fn about(scene: &Scene) -> Self {
+        Self::by(scene, Texture::about_over_triangle)
+    }
+
+    fn by(scene: &Scene, mean: Mean) -> Self {
         let (origin, unit) = scene.local_frame();
         let vertices: Vec<_> = scene
             .vertices
@@ -116,10 +129,8 @@ impl Elements {
                 let own = || scene.corners(t).map(|v| (v - origin) / unit);
                 let cross = cross([a, b, c], own);
                 let material = &scene.materials[t.material as usize];
-                let texture = material
-                    .map_kd
-                    .as_ref()
-                    .map_or([1.0; 3], |map| map.mean_over_triangle(&t.uv));
+                let map = material.map_kd.as_ref();
+                let texture = map.map_or([1.0; 3], |map| mean(map, &t.uv));
                 (
                     (a + b + c) / 3.0,
                     cross.normalize(),

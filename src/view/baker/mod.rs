@@ -304,7 +304,7 @@ impl Work {
         let lights = &scene.lights;
         if let Some(quick) = first_light(&scene, settings) {
             // What takes longest comes after the first light.
-            let elements = Elements::new(&scene);
+            let elements = Elements::about(&scene);
             let solver = Solver::new(&device, elements, lights, &quick)?;
             let stage = first_stage(&scene, settings);
             self.start(scene, solver, epoch, None);
