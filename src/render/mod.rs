@@ -29,6 +29,7 @@ mod relief_scene;
 mod relief_surfaces;
 mod renderer;
 mod seen_scene;
+mod shaft_lamps;
 mod shafts;
 mod slots;
 mod textures;

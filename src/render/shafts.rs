@@ -1,44 +1,25 @@
 //! Places with nothing between them and the lights: their samples need no shadow rays.
 //!
 //! A shaft (Haines and Wallace 1991) contains all shadow rays from a part of a triangle, or from
-//! the relief over one, to a lamp. Here it is
-//! bounded by planes about the convex hull of the rays' starts and ends. A triangle wholly outside
-//! one of the planes, or whose own plane has the hull on one side, blocks no ray.
+//! the relief over one, to a lamp. Here it is bounded by planes about the convex hull of the rays'
+//! starts and ends. A triangle wholly outside one of the planes, or whose own plane has the hull on
+//! one side, blocks no ray.
 
 use glam::{DVec3, Vec3};
 
-use super::lights::sun_disc;
+use super::shaft_lamps::{Lamp, MOST_LAMPS, lamps};
 use crate::constants::{PART_HIDDEN, PART_OPEN, PART_UNSURE};
 use crate::mesh::shadow_tree::ShadowTree;
 use crate::passes::types::{LitTriangle, Prism, ShadowNode, ShadowTriangle};
 use crate::picture::Projection;
 use crate::scene::Scene;
 
-/// Most lamps, and so most shafts of a triangle; scenes with more lamps use no shafts.
-const MOST_LAMPS: usize = 8;
-/// Shadow rays end above an emitter by this share of the greatest coordinate: ABOVE of
-/// `shared/light_points.glsl`.
-const ABOVE: f64 = 3.8e-6;
 /// Margin of a shaft's planes, as a share of the greatest coordinate: the traversal of the tree
 /// tests nothing further from a ray, see `BOX_MARGIN`.
 const MARGIN: f64 = 1.0 / (1 << 20) as f64;
 /// The margin of planes that rays begin or end above: a share of the rays' height above them, which
 /// is 2⁻¹⁸ of coordinates that are rounded to 2⁻²².
 const MARGIN_ABOVE: f64 = 0.25;
-
-/// Emitters in one plane that face alike, or a point light.
-struct Lamp {
-    /// Shadow rays end in the hull of these points.
-    ends: Vec<DVec3>,
-    plane: Option<LampPlane>,
-}
-
-struct LampPlane {
-    normal: DVec3,
-    offset: f64,
-    /// Distance of the nearest end.
-    above: f64,
-}
 
 /// n·x ≤ `limit` inside, with the margin.
 struct Side {
@@ -72,25 +53,7 @@ impl Shafts {
     /// Shafts for `tree`, whose triangles are `scene`'s relative to the eye of `projection`.
     pub fn new(tree: ShadowTree, scene: &Scene, projection: &Projection) -> Self {
         let seen = |p: DVec3| (p - projection.eye) / projection.unit;
-        let mut lamps: Vec<_> = Self::emitters(scene, seen)
-            .iter()
-            .map(|l| l.lamp())
-            .collect();
-        lamps.extend(scene.lights.points.iter().map(|light| Lamp {
-            ends: vec![seen(light.position)],
-            plane: None,
-        }));
-        lamps.extend(scene.lights.suns.iter().map(|sun| {
-            Lamp {
-                ends: (sun_disc(scene, sun).iter().flatten())
-                    .map(|&corner| seen(corner))
-                    .collect(),
-                plane: None,
-            }
-        }));
-        if lamps.len() > MOST_LAMPS {
-            lamps.clear();
-        }
+        let lamps = lamps(scene, seen);
         let corners = tree.triangles.iter().flat_map(|t| [t.a, t.b, t.c]);
         let largest = corners
             .map(|v| v.abs().max_element())
@@ -109,40 +72,6 @@ impl Shafts {
             lamps: Vec::new(),
             margin: 0.0,
         }
-    }
-
-    fn emitters(scene: &Scene, seen: impl Fn(DVec3) -> DVec3) -> Vec<FlatEmitter> {
-        let mut all: Vec<FlatEmitter> = Vec::new();
-        for t in &scene.triangles {
-            if !scene.materials[t.material as usize].emits() {
-                continue;
-            }
-            let corners = scene.corners(t).map(&seen);
-            let [a, b, c] = corners;
-            let normal = (b - a).cross(c - a).normalize_or_zero();
-            if normal == DVec3::ZERO {
-                continue;
-            }
-            match all.iter_mut().find(|l| l.holds(corners, normal)) {
-                Some(lamp) => lamp.corners.extend(corners),
-                None => all.push(FlatEmitter {
-                    normal,
-                    along: [(b - a), (c - b), (a - c)].into_iter().fold(
-                        DVec3::ZERO,
-                        |longest, edge| {
-                            let longer = edge.length_squared() > longest.length_squared();
-                            if longer { edge } else { longest }
-                        },
-                    ),
-                    corners: corners.to_vec(),
-                }),
-            }
-            // A round lamp counts as one lamp per triangle, which soon exceeds the limit.
-            if all.len() > MOST_LAMPS {
-                break;
-            }
-        }
-        all
     }
 
     /// Whether there are no shafts: then every part is PART_UNSURE.
@@ -392,59 +321,6 @@ impl CasterPlane {
         }
         let place = from + (to - from) * (first / (first - last));
         (0..3).all(|k| self.inward[k].dot(place - self.corners[k]) > margin)
-    }
-}
-
-/// Emitters in a plane, relative to the eye.
-struct FlatEmitter {
-    normal: DVec3,
-    /// A long edge.
-    along: DVec3,
-    corners: Vec<DVec3>,
-}
-
-/// Largest distance of f64 positions from their common plane, as a share of the distance from the
-/// eye.
-const FLAT: f64 = 1e-9;
-
-impl FlatEmitter {
-    fn holds(&self, corners: [DVec3; 3], normal: DVec3) -> bool {
-        let far = self.corners[0].abs().max_element();
-        let off = |p: DVec3| self.normal.dot(p - self.corners[0]).abs();
-        normal.dot(self.normal) > 1.0 - FLAT && corners.into_iter().all(|p| off(p) < FLAT * far)
-    }
-
-    /// Its rectangle along its longest edge.
-    fn lamp(&self) -> Lamp {
-        let along = self.along.normalize_or_zero();
-        let across = self.normal.cross(along);
-        let extent = |axis: DVec3| {
-            let places = self.corners.iter().map(|p| axis.dot(*p));
-            places.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)))
-        };
-        let (u, v) = (extent(along), extent(across));
-        let offset = self.normal.dot(self.corners[0]);
-        let corner = |u: f64, v: f64| along * u + across * v + self.normal * offset;
-        let corners = [
-            corner(u.0, v.0),
-            corner(u.1, v.0),
-            corner(u.1, v.1),
-            corner(u.0, v.1),
-        ];
-        // The greatest coordinate of any point between the corners lies between these.
-        let low = corners.into_iter().reduce(DVec3::min).unwrap_or_default();
-        let high = corners.into_iter().reduce(DVec3::max).unwrap_or_default();
-        let nearest = low.max(-high).max(DVec3::ZERO).max_element();
-        let furthest = low.abs().max(high.abs()).max_element();
-        let raised = |by: f64| corners.map(|c| c + self.normal * (ABOVE * by));
-        Lamp {
-            ends: [raised(nearest), raised(furthest)].concat(),
-            plane: Some(LampPlane {
-                normal: self.normal,
-                offset,
-                above: ABOVE * nearest,
-            }),
-        }
     }
 }
 
