@@ -176,10 +176,9 @@ impl Viewer {
         let Session {
             settings, device, ..
         } = session.clone();
-        let screen = Screen::new(window, size, &device)?;
         let scene = Arc::new(base.clone());
         let shown_lamps = lamps(&base);
-        let surfaces = SurfacePass::new(screen.device(), screen.pass(), &scene)?;
+        // The bake begins while the window opens its device.
         let given = Given {
             scene: Arc::clone(&scene),
             settings: settings.clone(),
@@ -200,6 +199,8 @@ impl Viewer {
                 Snapshot::unlit(&scene)
             }
         });
+        let screen = Screen::new(window, size, &device)?;
+        let surfaces = SurfacePass::new(screen.device(), screen.pass(), &scene)?;
         let watched = Arc::new(AtomicBool::new(false));
         let on_change: Wake = {
             let (watched, wake) = (Arc::clone(&watched), Arc::clone(&wake));
