@@ -10,8 +10,8 @@ use crate::view::orders::Stage;
 /// Triangles of a scene from which on a coarse bake comes first.
 const MANY: usize = 1 << 13;
 
-/// Under a sky a first light is of so many sources, a sun before all; rays to each part of the sky
-/// take long, and what was not shot is shown spread evenly.
+/// Under a sky a first light is of the suns, or where there are none of so many parts of the sky, the
+/// strongest: rays to each take long, and what was not shot is shown spread evenly.
 const FIRST_OF_SKY: u32 = 4;
 
 /// Whether a scene has relief that takes part.
@@ -34,8 +34,9 @@ pub(super) fn first_light(scene: &Scene, settings: &Settings) -> Option<Settings
         && settings.estimator == Estimator::Receiver
         && scene.triangles.len() >= MANY;
     if coarser {
-        let sky = scene.lights.sky.is_some();
-        let first = sky.then_some(FIRST_OF_SKY);
+        let suns = scene.lights.suns.len() as u32;
+        let of_sky = if suns > 0 { suns } else { FIRST_OF_SKY };
+        let first = scene.lights.sky.is_some().then_some(of_sky);
         return Some(Settings {
             residual: preview.residual.max(settings.residual),
             budget: settings.budget,
