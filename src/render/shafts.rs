@@ -349,3 +349,63 @@ fn outline(points: &[DVec3], u: usize, v: usize) -> Vec<(DVec3, DVec3)> {
     let edges = |chain: &[DVec3]| -> Vec<_> { chain.windows(2).map(|w| (w[0], w[1])).collect() };
     [edges(&lower), edges(&upper)].concat()
 }
+
+#[cfg(test)]
+mod tests {
+    use bytemuck::Zeroable;
+
+    use super::*;
+    use crate::math::sampling::Random;
+
+    /// What is found of places one after another, each with the blockers of the one before, is what
+    /// is found of each alone: of some all lamps are open, of some all are hidden.
+    #[test]
+    fn blockers_change_nothing() {
+        let mut random = Random::new(1, 2, 3);
+        let mut point = |size: f64| {
+            let each = [0; 3].map(|_| 2.0 * random.unit() - 1.0);
+            DVec3::from(each) * size
+        };
+        let caster = |size: f64, point: &mut dyn FnMut(f64) -> DVec3| {
+            let middle = point(1.0).with_z(0.0);
+            let corners = [0; 3].map(|_| (middle + point(size)).as_vec3());
+            ShadowTriangle {
+                a: corners[0],
+                b: corners[1],
+                c: corners[2],
+                ..ShadowTriangle::zeroed()
+            }
+        };
+        let casters = [0.05, 0.2, 1.5].map(|size| [size; 12]);
+        let casters: Vec<_> = (casters.iter().flatten())
+            .map(|&size| caster(size, &mut point))
+            .collect();
+        let shafts = Shafts {
+            tree: ShadowTree::new(casters),
+            lamps: [0.5, -0.5]
+                .map(|x| Lamp {
+                    ends: (0..4)
+                        .map(|_| DVec3::new(x, 0.0, 4.0) + point(0.1))
+                        .collect(),
+                    plane: None,
+                })
+                .into(),
+            margin: MARGIN,
+        };
+        let mut blockers = Blockers::default();
+        let mut found = [0; 3];
+        for _ in 0..3000 {
+            let middle = point(1.5).with_z(-2.0);
+            let starts = Starts {
+                points: (0..3).map(|_| middle + point(0.02)).collect(),
+                above: None,
+                passed: None,
+            };
+            let state = shafts.state(&starts, &mut blockers);
+            assert_eq!(state, shafts.state(&starts, &mut Blockers::default()));
+            found[state as usize] += 1;
+        }
+        println!("{found:?}");
+        assert!(found.iter().all(|&count| count > 100), "{found:?}");
+    }
+}
