@@ -212,8 +212,8 @@ impl Corner {
     }
 }
 
-/// Light of all ranks, `[rank][colour]`, that the facets receive from other facets: x = G ρ (a + x).
-/// `direct` is a, `[facet][rank]`.
+/// Light of all ranks that the facets receive from other facets, `[facet][rank][colour]`:
+/// x = G ρ (a + x). `direct` is a, `[facet][rank]`.
 fn inside(
     visibility: &Visibility,
     sky: &[f64],

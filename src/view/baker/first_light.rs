@@ -10,8 +10,8 @@ use crate::view::orders::Stage;
 /// Triangles of a scene from which on a coarse bake comes first.
 const MANY: usize = 1 << 13;
 
-/// Under a sky a first light is of the suns, or where there are none of so many parts of the sky, the
-/// strongest: rays to each take long, and what was not shot is shown spread evenly.
+/// Under a sky a first light is of the suns, or where there are none of so many parts of the sky,
+/// the strongest: rays to each take long, and what was not shot is shown spread evenly.
 const FIRST_OF_SKY: u32 = 4;
 
 /// Whether a scene has relief that takes part.
