@@ -12,6 +12,9 @@ use mesolux::solver::Settings;
 /// Elements times sources of a part that makes rows, at most.
 const PAIRS: u64 = 1 << 17;
 
+/// Samples along a side of a tile of a picture, at most.
+const TILE: u32 = 256;
+
 fn loaded(name: &str, patches: Option<usize>) -> Scene {
     let options = LoadOptions {
         patches,
@@ -160,7 +163,9 @@ fn what_is_submitted_comes_in_parts() {
         };
         let least = solver.report().kept_sources * patches as u64 / PAIRS;
         assert!(count("make rows") >= least, "{least}");
-        assert!(count("shade") >= 16 * 12, "tiles of 40 pixels");
+        let [across, down] = [view.width, view.height].map(|side| (side * SAMPLES).div_ceil(TILE));
+        let tiles = u64::from(across * down);
+        assert!(count("shade") >= tiles, "{tiles} tiles");
     }
     assert_silent();
 }
