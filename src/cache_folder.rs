@@ -10,6 +10,29 @@ use crate::atomic_file::write_atomically;
 use crate::error::{Error, Result};
 use crate::input_file;
 
+/// What the folder `cache` keeps, or what `find` finds, which is then kept there as `what`; and
+/// whether it was kept.
+///
+/// # Errors
+/// Those of `find`.
+pub(crate) fn kept_or_found<T>(
+    cache: Option<&Path>,
+    what: &str,
+    load: impl FnOnce(&Path) -> Option<T>,
+    find: impl FnOnce() -> Result<T>,
+    save: impl FnOnce(&T, &Path) -> Result<()>,
+) -> Result<(T, bool)> {
+    if let Some(kept) = cache.and_then(load) {
+        return Ok((kept, true));
+    }
+    let found = find()?;
+    // A cache that cannot be written costs time in the next run but does not harm this one.
+    if let Some(Err(error)) = cache.map(|folder| save(&found, folder)) {
+        tracing::warn!("cannot keep {what}: {error}");
+    }
+    Ok((found, false))
+}
+
 /// The content of a file that [`save`] has written; None where there is none, or it is damaged.
 pub(crate) fn load(path: &Path) -> Option<Vec<u8>> {
     let mut bytes = input_file::read(path).ok()?;

@@ -19,13 +19,16 @@ type Key = [u8; 32];
 #[derive(Default)]
 pub struct KnownFactors(Mutex<Vec<(Key, Arc<Factors>)>>);
 
+/// Largest error of known factors, see [`Factors::error`].
+pub const FACTOR_ERROR: f64 = 0.01;
+
 /// Incremented when other factors are found of the same relief.
 const VERSION: &str = "relief factors 1";
 
 /// The key of a relief with its shading and directions.
 fn key(directions: &Directions, field: &HeightField, shading: &Shading) -> Key {
     let mut hash = Sha256::new();
-    hash.update(VERSION);
+    hash.update(format!("{VERSION} {FACTOR_ERROR} {MOST_RANK}"));
     hash.update(directions.columns.to_le_bytes());
     hash.update(directions.rows.to_le_bytes());
     hash.update(Visibility::key(field));
@@ -59,21 +62,19 @@ impl KnownFactors {
         for (field, shading) in reliefs {
             let key = key(directions, field, shading);
             let (slots, facets) = (directions.count(), field.facet_count());
-            let load = |dir: &Path| Factors::load(dir, &key, slots, facets);
             let same = |(of, _): &&(Key, Arc<Factors>)| *of == key;
             let found = match known.iter().chain(&before).find(same) {
                 Some((_, found)) => Arc::clone(found),
-                None => Arc::new(match cache.and_then(load) {
-                    Some(kept) => kept,
-                    None => {
-                        let found = find(field, shading)?;
-                        if let Some(Err(error)) = cache.map(|dir| found.save(dir, &key)) {
-                            // It costs time in the next run but does not harm this one.
-                            tracing::warn!("relief factors are not kept: {error}");
-                        }
-                        found
-                    }
-                }),
+                None => {
+                    let kept = cache_folder::kept_or_found(
+                        cache,
+                        "factors of a relief",
+                        |folder| Factors::load(folder, &key, slots, facets),
+                        || find(field, shading),
+                        |found, folder| found.save(folder, &key),
+                    );
+                    Arc::new(kept?.0)
+                }
             };
             known.push((key, Arc::clone(&found)));
             factors.push(found);

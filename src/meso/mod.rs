@@ -27,7 +27,7 @@ pub use footprints::Footprints;
 pub use height_field::{Facet, HeightField};
 pub use height_pyramid::HeightPyramid;
 pub use horizons::Horizons;
-pub use known_factors::KnownFactors;
+pub use known_factors::{FACTOR_ERROR, KnownFactors};
 pub use relief::{
     Class, March, MesoTexel, Options, Relief, Texels, TextureFacet, Transport, visibility,
 };

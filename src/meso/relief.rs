@@ -8,6 +8,7 @@ use glam::{DVec2, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::{HeightField, Response, Visibility};
+use crate::cache_folder::kept_or_found;
 use crate::constants::NONE;
 use crate::error::Result;
 use crate::math::directions::Directions;
@@ -183,15 +184,11 @@ pub fn visibility(
     cache: Option<&Path>,
     march: &mut March<'_>,
 ) -> Result<(Visibility, bool)> {
-    if let Some(kept) = cache.and_then(|dir| Visibility::load(field, dir)) {
-        return Ok((kept, true));
-    }
-    let found = march(field)?;
-    if let Some(dir) = cache {
-        // A cache that cannot be written costs time in the next run but does not harm this one.
-        if let Err(error) = found.save(field, dir) {
-            tracing::warn!("relief visibility is not kept: {error}");
-        }
-    }
-    Ok((found, false))
+    kept_or_found(
+        cache,
+        "visibility of a relief",
+        |folder| Visibility::load(field, folder),
+        || march(field),
+        |found, folder| found.save(field, folder),
+    )
 }

@@ -15,16 +15,13 @@ use crate::math::directions::Directions;
 use crate::mesh::elements::Elements;
 use crate::mesh::meso_vertices::MesoVertices;
 use crate::mesh::tiles::{Tile, tiles};
-use crate::meso::{Factors, KnownFactors, visibility};
+use crate::meso::{FACTOR_ERROR, Factors, KnownFactors, visibility};
 use crate::passes::relief::{Kind, Relief};
 use crate::passes::relief_hits::ReliefHits;
 use crate::passes::relief_overdraw::ReliefOverdraw;
 use crate::passes::shade::Shade;
 use crate::scene::Scene;
 use crate::vk::Device;
-
-/// Largest error of the factors, see [`Factors::error`].
-const FACTOR_ERROR: f64 = 0.01;
 
 /// How relief is drawn.
 pub enum ReliefPasses {
