@@ -9,7 +9,7 @@ use mesolux::bake::solution::Solution;
 use mesolux::math::directions::Directions;
 use mesolux::meso::Options;
 use mesolux::render::{Lighting, Renderer, SAMPLES, Show, View, render, slot_colour};
-use mesolux::scene::{Camera, Scene};
+use mesolux::scene::{Camera, Scene, Sun};
 use mesolux::solver::Settings;
 
 /// Scene units from the lowest to the highest of the plates.
@@ -128,6 +128,54 @@ fn slots_have_one_colour_a_triangle() {
         .count();
     println!("{unknown} of 1600 pixels lie on seams");
     assert!(unknown <= MIXED);
+    assert_silent();
+}
+
+/// A sun above a flat plate whose material has a hardly visible relief of 16 texels: what the plate
+/// sends is known. From near, its texels are shaded each; from afar, by what all of them send; in
+/// between, the near part of one picture is shaded the one way and the far part the other.
+#[test]
+fn relief_sends_as_much_from_afar() {
+    // Diameter of the disc that a sample of a picture looks at, at a distance of one, and texels
+    // that it may be wide.
+    let angle = 2.0 * 20.0_f64.to_radians().tan() / f64::from(40 * SAMPLES);
+    let widest = 2.0;
+    // A sample is as wide at a distance of 1.6, within the picture from a height of one.
+    let texel = angle * 1.6 / widest;
+    let mut build = Build::new();
+    let plate = build.material(0.5, 0.0);
+    build.relief(plate, 16, |x, y| HEIGHT * (x * (1.0 - x) * y * (1.0 - y)));
+    let cells = build.quad(
+        DVec3::new(-10.0, 0.0, -10.0),
+        20.0 * DVec3::Z,
+        20.0 * DVec3::X,
+        (20, 20),
+        plate,
+    );
+    build.uv(cells, 16.0 * texel * DVec3::Z, 16.0 * texel * DVec3::X);
+    build.scene.lights.suns.push(Sun {
+        name: "sun".into(),
+        towards: DVec3::Y,
+        irradiance: [1.0; 3],
+        angle: 0.0,
+    });
+    let scene = build.0.scene;
+    let solution = baked(&scene);
+    let expected = 0.5 / std::f32::consts::PI;
+    for height in [0.3, 1.0, 4.0] {
+        let camera = Camera {
+            position: DVec3::new(0.0, height, 0.0),
+            look_at: DVec3::new(height, 0.0, 0.0),
+            up: DVec3::Y,
+            ..above()
+        };
+        let lighting = Lighting::from(&solution);
+        let picture = render(&device(), &scene, lighting, &view(&camera)).expect("a picture");
+        let error = |p: &[f32; 3]| (Vec3::from(*p) / expected - 1.0).abs().max_element();
+        let largest = picture.radiance.iter().map(error).fold(0.0, f32::max);
+        println!("from {height}: {largest:.1e}");
+        assert!(largest < 5e-4, "from {height}: {largest}");
+    }
     assert_silent();
 }
 

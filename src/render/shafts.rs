@@ -376,9 +376,10 @@ mod tests {
                 ..ShadowTriangle::zeroed()
             }
         };
-        let casters = [0.05, 0.2, 1.5].map(|size| [size; 12]);
-        let casters: Vec<_> = (casters.iter().flatten())
-            .map(|&size| caster(size, &mut point))
+        let sizes = [(0.05, 6), (0.2, 6), (1.5, 3)];
+        let casters: Vec<_> = (sizes.iter())
+            .flat_map(|&(size, count)| std::iter::repeat_n(size, count))
+            .map(|size| caster(size, &mut point))
             .collect();
         let shafts = Shafts {
             tree: ShadowTree::new(casters),
@@ -405,7 +406,6 @@ mod tests {
             assert_eq!(state, shafts.state(&starts, &mut Blockers::default()));
             found[state as usize] += 1;
         }
-        println!("{found:?}");
-        assert!(found.iter().all(|&count| count > 15), "{found:?}");
+        assert!(found.iter().all(|&count| count > 100), "{found:?}");
     }
 }

@@ -239,6 +239,17 @@ mod tests {
             .collect();
         let mut alone = list.clone();
         let moved = open_eyes(&elements, &mut alone, &tree, &wanted);
+        // Without places fewer looks are taken, and the eyes are the same.
+        let none: Vec<Wanted> = (wanted.iter())
+            .map(|wanted| Wanted {
+                places: 0,
+                ..*wanted
+            })
+            .collect();
+        let mut bare = list.clone();
+        assert_eq!(open_eyes(&elements, &mut bare, &tree, &none), moved);
+        let pairs = || bare.iter().zip(&alone);
+        assert!(pairs().all(|(bare, full)| bare.eye == full.eye && bare.places.is_empty()));
         let of_alone = pairs_of(&elements, &alone, &tree, &nearness);
         let entries: usize = of_alone.iter().map(|of| of.entries.len()).sum();
         assert!(entries > 1000 && moved > 3, "{entries}, {moved}");
