@@ -10,8 +10,9 @@ use crate::view::orders::Stage;
 /// Triangles of a scene from which on a coarse bake comes first.
 const MANY: usize = 1 << 13;
 
-/// Under a sky a first light is of the suns, or where there are none of so many parts of the sky,
-/// the strongest: rays to each take long, and what was not shot is shown spread evenly.
+/// Under a sky a first light is of the suns, or where they are not the only other lights, of so many
+/// sources, the strongest: rays to each part of the sky take long, and what was not shot is shown
+/// spread evenly.
 const FIRST_OF_SKY: u32 = 4;
 
 /// Whether a scene has relief that takes part.
@@ -35,7 +36,11 @@ pub(super) fn first_light(scene: &Scene, settings: &Settings) -> Option<Settings
         && scene.triangles.len() >= MANY;
     if coarser {
         let suns = scene.lights.suns.len() as u32;
-        let of_sky = if suns > 0 { suns } else { FIRST_OF_SKY };
+        let others = !scene.lights.points.is_empty() || scene.materials.iter().any(Material::emits);
+        let of_sky = match suns == 0 || others {
+            true => FIRST_OF_SKY,
+            false => suns,
+        };
         let first = scene.lights.sky.is_some().then_some(of_sky);
         return Some(Settings {
             residual: preview.residual.max(settings.residual),
