@@ -21,7 +21,7 @@ use crate::scene::sky::Sky;
 use crate::vk::{Commands, Device, Timestamps};
 
 /// Samples along a side of a tile, each a submission: 16 of the squares that lavapipe shares among
-/// its cores. With tiles of 160 samples pictures took 2 to 8 % longer.
+/// its cores. With tiles of 160 samples pictures took up to 8 % longer.
 const TILE: u32 = 256;
 
 /// How draws of a view are cut. The picture does not depend on it.

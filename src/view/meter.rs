@@ -30,8 +30,8 @@ impl Meter {
     }
 
     /// The exposure, stops, for what does not emit: in this light `[triangle]` and `ambient`,
-    /// W·m⁻², of the scene with its lights as they are now. It does not depend on the view: a window
-    /// that orbits does not flicker.
+    /// W·m⁻², of the scene with its lights as they are now. It does not depend on the view: a
+    /// window that orbits does not flicker.
     pub fn exposure(&self, scene: &Scene, irradiance: &[Vec3], ambient: Vec3) -> f32 {
         let lit = (self.surfaces.iter().zip(&scene.triangles).zip(irradiance))
             .filter(|((_, t), _)| !scene.materials[t.material as usize].emits())
