@@ -51,10 +51,12 @@ bool stands_on(Caster t, vec3 way, float clear) {
     float least = min(min(of_a, of_b), of_c);
     float most = max(max(of_a, of_b), of_c);
     float whole = of_a + of_b + of_c;
-    vec3 place = (of_a * t.a + of_b * t.b + of_c * t.c) / whole;
-    float share = dot(place, way) / dot(way, way);
-    bool within = (least >= 0.0 || most <= 0.0) && whole != 0.0;
-    return within && share > (t.relief ? clear : 0.0) && share < 1.0;
+    vec3 place = of_a * t.a + of_b * t.b + of_c * t.c;
+    // Its share of the way is along / all.
+    float along = whole < 0.0 ? -dot(place, way) : dot(place, way);
+    float all = abs(whole) * dot(way, way);
+    bool within = least >= 0.0 || most <= 0.0;
+    return within && along > (t.relief ? clear * all : 0.0) && along < all;
 }
 
 // Follows ways from a place. A way is asked of no triangle whose box it misses: what it meets is
