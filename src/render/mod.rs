@@ -11,6 +11,7 @@
 mod background;
 mod blocks;
 mod compare;
+mod convex;
 mod emitters;
 mod factor_texels;
 mod flat_relief;

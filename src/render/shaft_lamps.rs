@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::convex::outline;
 use super::lights::sun_disc;
 use crate::scene::Scene;
 
@@ -64,13 +65,6 @@ fn emitters(scene: &Scene, seen: impl Fn(DVec3) -> DVec3) -> Vec<FlatEmitter> {
             Some(lamp) => lamp.corners.extend(corners),
             None => all.push(FlatEmitter {
                 normal,
-                along: [(b - a), (c - b), (a - c)].into_iter().fold(
-                    DVec3::ZERO,
-                    |longest, edge| {
-                        let longer = edge.length_squared() > longest.length_squared();
-                        if longer { edge } else { longest }
-                    },
-                ),
                 corners: corners.to_vec(),
             }),
         }
@@ -85,8 +79,6 @@ fn emitters(scene: &Scene, seen: impl Fn(DVec3) -> DVec3) -> Vec<FlatEmitter> {
 /// Emitters in a plane, relative to the eye.
 struct FlatEmitter {
     normal: DVec3,
-    /// A long edge.
-    along: DVec3,
     corners: Vec<DVec3>,
 }
 
@@ -101,17 +93,31 @@ impl FlatEmitter {
         normal.dot(self.normal) > 1.0 - FLAT && corners.into_iter().all(|p| off(p) < FLAT * far)
     }
 
-    /// Its rectangle along its longest edge.
+    /// The smallest rectangle about it: one along an edge of its outline.
     fn lamp(&self) -> Lamp {
-        let along = self.along.normalize_or_zero();
-        let across = self.normal.cross(along);
+        let (x, y) = self.normal.any_orthonormal_pair();
+        let flat = |p: &DVec3| DVec3::new(x.dot(*p), y.dot(*p), 0.0);
+        let flat: Vec<DVec3> = self.corners.iter().map(flat).collect();
+        let edges = outline(&flat, 0, 1);
         let extent = |axis: DVec3| {
-            let places = self.corners.iter().map(|p| axis.dot(*p));
+            let places = edges.iter().map(|(p, _)| axis.dot(*p));
             places.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)))
         };
-        let (u, v) = (extent(along), extent(across));
+        let rectangles = edges.iter().map(|(from, to)| {
+            let along = (to - from).normalize_or_zero();
+            let across = DVec3::Z.cross(along);
+            let (u, v) = (extent(along), extent(across));
+            (along, across, u, v)
+        });
+        let area =
+            |&(_, _, u, v): &(DVec3, DVec3, (f64, f64), (f64, f64))| (u.1 - u.0) * (v.1 - v.0);
+        let smallest = rectangles.min_by(|a, b| area(a).total_cmp(&area(b)));
+        let (along, across, u, v) = smallest.unwrap_or_default();
         let offset = self.normal.dot(self.corners[0]);
-        let corner = |u: f64, v: f64| along * u + across * v + self.normal * offset;
+        let corner = |u: f64, v: f64| {
+            let p = along * u + across * v;
+            x * p.x + y * p.y + self.normal * offset
+        };
         let corners = [
             corner(u.0, v.0),
             corner(u.1, v.0),

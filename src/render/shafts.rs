@@ -2,11 +2,12 @@
 //!
 //! A shaft (Haines and Wallace 1991) contains all shadow rays from a part of a triangle, or from
 //! the relief over one, to a lamp. Here it is bounded by planes about the convex hull of the rays'
-//! starts and ends. A triangle wholly outside one of the planes, or whose own plane has the hull on
-//! one side, blocks no ray.
+//! starts and ends. A triangle of which nothing is left between the planes, or whose own plane has
+//! the hull on one side, blocks no ray. Of a lamp that is below the horizon no ray is asked.
 
 use glam::{DVec3, Vec3};
 
+use super::convex::{Side, outline};
 use super::shaft_lamps::{Lamp, MOST_LAMPS, lamps};
 use crate::constants::{PART_HIDDEN, PART_OPEN, PART_UNSURE};
 use crate::mesh::shadow_tree::ShadowTree;
@@ -21,12 +22,6 @@ const MARGIN: f64 = 1.0 / (1 << 20) as f64;
 /// is 2⁻¹⁸ of coordinates that are rounded to 2⁻²².
 const MARGIN_ABOVE: f64 = 0.25;
 
-/// n·x ≤ `limit` inside, with the margin.
-struct Side {
-    normal: DVec3,
-    limit: f64,
-}
-
 /// Where shadow rays start.
 pub struct Starts {
     /// They start in the hull of these points,
@@ -35,6 +30,14 @@ pub struct Starts {
     above: Option<(DVec3, f64)>,
     /// and they pass triangles with relief below this height along a normal.
     passed: Option<(DVec3, f64)>,
+    /// What is lit, where its normals are known.
+    lit: Option<Facing>,
+}
+
+/// A part of a triangle: its corners, and the normals between which its own lie.
+struct Facing {
+    corners: [DVec3; 3],
+    normals: [DVec3; 3],
 }
 
 /// Shadow casters and lamps.
@@ -79,36 +82,46 @@ impl Shafts {
         self.lamps.is_empty()
     }
 
-    /// PART_… of where shadow rays start: open where no ray to any light is blocked, or none shines
-    /// towards it; hidden where all are blocked, each lamp's by one triangle. It does not depend on
-    /// `blockers`.
+    /// PART_… of where shadow rays start: hidden where no light shines towards it, or all rays are
+    /// blocked, each lamp's by one triangle; open where none is. It does not depend on `blockers`.
     pub fn state(&self, starts: &Starts, Blockers(blockers): &mut Blockers) -> u32 {
         if self.is_empty() {
             return PART_UNSURE;
         }
-        let mut lamps = self.lamps.iter().zip(&mut *blockers);
-        if lamps.all(|(lamp, blocker)| self.is_clear(starts, lamp, blocker)) {
+        let mut shining: Vec<_> = (self.lamps.iter().zip(blockers))
+            .map(|(lamp, blocker)| (lamp, self.ends(starts, lamp), blocker))
+            .filter(|(_, ends, _)| !ends.is_empty())
+            .collect();
+        if shining.is_empty() {
+            return PART_HIDDEN;
+        }
+        let mut all = shining.iter_mut();
+        if all.all(|(lamp, ends, blocker)| self.is_clear(starts, lamp, ends, blocker)) {
             return PART_OPEN;
         }
-        let points = &starts.points;
-        let mut lamps = self.lamps.iter().zip(blockers);
-        match lamps
-            .all(|(l, blocker)| self.is_behind(points, l) || self.is_covered(points, l, blocker))
-        {
+        let mut all = shining.iter_mut();
+        match all.all(|(lamp, _, blocker)| self.is_covered(&starts.points, lamp, blocker)) {
             true => PART_HIDDEN,
             false => PART_UNSURE,
         }
     }
 
-    /// Whether a lamp shines away from the starts.
-    fn is_behind(&self, starts: &[DVec3], lamp: &Lamp) -> bool {
-        lamp.plane.as_ref().is_some_and(|plane| {
+    /// Points whose hull holds the ends of rays to a lamp: none where it shines away from the
+    /// starts, or is below their horizon.
+    fn ends(&self, starts: &Starts, lamp: &Lamp) -> Vec<DVec3> {
+        let shines_away = lamp.plane.as_ref().is_some_and(|plane| {
             let behind = |p: &DVec3| plane.normal.dot(*p) < plane.offset - 2.0 * self.margin;
-            starts.iter().all(behind)
-        })
+            starts.points.iter().all(behind)
+        });
+        match &starts.lit {
+            _ if shines_away => Vec::new(),
+            Some(lit) => lit.above_horizon(&lamp.ends, 2.0 * self.margin),
+            None => lamp.ends.clone(),
+        }
     }
 
-    /// Whether one triangle stands on all ways from the starts to a lamp. Places where ways between
+    /// Whether one triangle stands on all ways from the starts to a lamp, those to parts of it below the
+    /// horizon too: a place that sees a rim of a lamp and none of its points counts as lit. Places where ways between
     /// two hulls pass a plane lie in the hull of those of ways between the corners.
     fn is_covered(&self, starts: &[DVec3], lamp: &Lamp, blocker: &mut Option<usize>) -> bool {
         let middle = |points: &[DVec3]| points.iter().sum::<DVec3>() / points.len() as f64;
@@ -153,12 +166,16 @@ impl Shafts {
         false
     }
 
-    fn is_clear(&self, starts: &Starts, lamp: &Lamp, blocker: &mut Option<usize>) -> bool {
-        if self.is_behind(&starts.points, lamp) {
-            return true;
-        }
-        let hull: Vec<DVec3> = starts.points.iter().chain(&lamp.ends).copied().collect();
-        let sides = self.sides(starts, lamp, &hull);
+    /// Whether nothing stands on a way from the starts to the ends, which are the lamp's.
+    fn is_clear(
+        &self,
+        starts: &Starts,
+        lamp: &Lamp,
+        ends: &[DVec3],
+        blocker: &mut Option<usize>,
+    ) -> bool {
+        let hull: Vec<DVec3> = starts.points.iter().chain(ends).copied().collect();
+        let sides = self.sides(starts, lamp, ends, &hull);
         let passed = |t: &ShadowTriangle| {
             let limit = |(normal, height): (DVec3, f64)| {
                 let below = |v: Vec3| normal.dot(v.as_dvec3()) < height - self.margin;
@@ -180,29 +197,34 @@ impl Shafts {
 
     fn stands_in(&self, t: &ShadowTriangle, sides: &[Side], hull: &[DVec3]) -> bool {
         let corners = [t.a, t.b, t.c].map(|v| v.as_dvec3());
-        let outside = |s: &Side| corners.iter().all(|v| s.normal.dot(*v) > s.limit);
-        if sides.iter().any(outside) {
+        if sides.iter().any(|side| side.misses(&corners)) {
             return false;
         }
         let [a, b, c] = corners;
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let off = |p: &DVec3| normal.dot(*p - a);
-        !(hull.iter().all(|p| off(p) > self.margin) || hull.iter().all(|p| off(p) < -self.margin))
+        if hull.iter().all(|p| off(p) > self.margin) || hull.iter().all(|p| off(p) < -self.margin) {
+            return false;
+        }
+        let mut within = corners.to_vec();
+        for side in sides {
+            within = side.cut(&within);
+        }
+        !within.is_empty()
     }
 
     /// Planes that bound the hull: across the axes, the planes of the triangle and of the lamp, and
     /// planes parallel to an axis that touch the hull.
-    fn sides(&self, starts: &Starts, lamp: &Lamp, hull: &[DVec3]) -> Vec<Side> {
-        let side = |normal: DVec3, margin: f64| Side {
-            normal,
-            limit: margin + hull.iter().map(|p| normal.dot(*p)).fold(f64::MIN, f64::max),
-        };
+    fn sides(&self, starts: &Starts, lamp: &Lamp, ends: &[DVec3], hull: &[DVec3]) -> Vec<Side> {
+        let side = |normal, margin| Side::of(hull, normal, margin);
         let mut sides = Vec::with_capacity(32);
         for axis in DVec3::AXES {
             sides.extend([side(axis, self.margin), side(-axis, self.margin)]);
         }
         if let Some((normal, above)) = starts.above {
             sides.push(side(-normal, MARGIN_ABOVE * above));
+            let lowest = lowest_plane(normal, &starts.points, ends);
+            sides.extend(lowest.map(|normal| side(-normal, self.margin)));
         }
         if let Some(plane) = &lamp.plane {
             sides.push(side(-plane.normal, MARGIN_ABOVE * plane.above));
@@ -219,6 +241,24 @@ impl Shafts {
             }
         }
         sides
+    }
+}
+
+impl Facing {
+    /// Points whose hull holds what of the hull of `ends` lies above the horizon of any place, or
+    /// less than `margin` below it: n·(e − c) > −margin for an end e, a corner c and a normal n.
+    fn above_horizon(&self, ends: &[DVec3], margin: f64) -> Vec<DVec3> {
+        let pairs = || ends.iter().flat_map(|e| self.corners.map(|c| *e - c));
+        let below = |n: &DVec3| pairs().all(|way| n.dot(way) < -margin);
+        if self.normals.iter().all(below) {
+            return Vec::new();
+        }
+        // A normal is within `spread` of the middle one: (n − middle)·(e − c) ≤ spread·reach.
+        let middle = self.normals.iter().sum::<DVec3>().normalize_or_zero();
+        let spread = (self.normals.iter()).map(|n| n.distance(middle));
+        let reach = pairs().map(DVec3::length).fold(0.0, f64::max);
+        let further = margin + spread.fold(0.0, f64::max) * reach;
+        Side::of(&self.corners, -middle, further).cut_hull(ends)
     }
 }
 
@@ -245,6 +285,7 @@ impl Starts {
             points: [low, high].concat(),
             above: None,
             passed: flat.then_some((normal, top)),
+            lit: None,
         }
     }
 
@@ -254,6 +295,10 @@ impl Starts {
             points: starts(t, corners),
             above: Some((t.plane.as_dvec3(), f64::from(t.above))),
             passed: None,
+            lit: Some(Facing {
+                corners,
+                normals: [t.normal_a, t.normal_b, t.normal_c].map(Vec3::as_dvec3),
+            }),
         }
     }
 }
@@ -278,6 +323,27 @@ fn starts(t: &LitTriangle, corners: [DVec3; 3]) -> Vec<DVec3> {
         }
     }
     starts
+}
+
+/// The normal of a plane that rays stay above, where some end lower than they start above a plane
+/// with this normal: of one that falls from the starts to these ends. It need not touch either.
+fn lowest_plane(normal: DVec3, starts: &[DVec3], ends: &[DVec3]) -> Option<DVec3> {
+    let least = |points: &[DVec3], along: DVec3| {
+        let places = points.iter().map(|p| along.dot(*p));
+        places.fold(f64::MAX, f64::min)
+    };
+    let from = least(starts, normal);
+    let low: Vec<DVec3> = ends
+        .iter()
+        .copied()
+        .filter(|e| normal.dot(*e) < from)
+        .collect();
+    let middle = |points: &[DVec3]| points.iter().sum::<DVec3>() / points.len() as f64;
+    let way = middle(&low) - middle(starts);
+    let along = way.reject_from_normalized(normal).try_normalize()?;
+    let length = least(&low, along) + least(starts, -along);
+    let fall = from - least(&low, normal);
+    (length > 0.0).then(|| (normal + along * (fall / length)).normalize())
 }
 
 /// Whether a way passes a node's box.
@@ -324,32 +390,6 @@ impl CasterPlane {
     }
 }
 
-/// Edges of the convex outline of the points along two axes, counter-clockwise: Andrew's monotone
-/// chain.
-fn outline(points: &[DVec3], u: usize, v: usize) -> Vec<(DVec3, DVec3)> {
-    let mut sorted = points.to_vec();
-    sorted.sort_by(|a, b| a[u].total_cmp(&b[u]).then(a[v].total_cmp(&b[v])));
-    let turns_left = |a: DVec3, b: DVec3, c: DVec3| {
-        (b[u] - a[u]) * (c[v] - a[v]) - (b[v] - a[v]) * (c[u] - a[u]) > 0.0
-    };
-    let half = |points: &mut dyn Iterator<Item = &DVec3>| {
-        let mut chain: Vec<DVec3> = Vec::new();
-        for &p in points {
-            while let [.., a, b] = chain[..]
-                && !turns_left(a, b, p)
-            {
-                chain.pop();
-            }
-            chain.push(p);
-        }
-        chain
-    };
-    let lower = half(&mut sorted.iter());
-    let upper = half(&mut sorted.iter().rev());
-    let edges = |chain: &[DVec3]| -> Vec<_> { chain.windows(2).map(|w| (w[0], w[1])).collect() };
-    [edges(&lower), edges(&upper)].concat()
-}
-
 #[cfg(test)]
 mod tests {
     use bytemuck::Zeroable;
@@ -357,55 +397,116 @@ mod tests {
     use super::*;
     use crate::math::sampling::Random;
 
-    /// What is found of places one after another, each with the blockers of the one before, is what
-    /// is found of each alone: of some all lamps are open, of some all are hidden.
-    #[test]
-    fn blockers_change_nothing() {
-        let mut random = Random::new(1, 2, 3);
-        let mut point = |size: f64| {
-            let each = [0; 3].map(|_| 2.0 * random.unit() - 1.0);
-            DVec3::from(each) * size
-        };
-        let caster = |size: f64, point: &mut dyn FnMut(f64) -> DVec3| {
-            let middle = point(1.0).with_z(0.0);
-            let corners = [0; 3].map(|_| (middle + point(size)).as_vec3());
+    /// Points about the middle.
+    fn point(random: &mut Random, size: f64) -> DVec3 {
+        DVec3::from([0; 3].map(|_| 2.0 * random.unit() - 1.0)) * size
+    }
+
+    /// Two lamps, without planes, over casters of three sizes.
+    fn lamps_over_casters(random: &mut Random) -> Shafts {
+        let sizes = [(0.05, 6), (0.2, 6), (1.5, 3)];
+        let sizes = sizes.map(|(size, count)| std::iter::repeat_n(size, count));
+        let casters = sizes.into_iter().flatten().map(|size| {
+            let middle = point(random, 1.0).with_z(0.0);
+            let corners = [0; 3].map(|_| (middle + point(random, size)).as_vec3());
             ShadowTriangle {
                 a: corners[0],
                 b: corners[1],
                 c: corners[2],
                 ..ShadowTriangle::zeroed()
             }
-        };
-        let sizes = [(0.05, 6), (0.2, 6), (1.5, 3)];
-        let casters: Vec<_> = (sizes.iter())
-            .flat_map(|&(size, count)| std::iter::repeat_n(size, count))
-            .map(|size| caster(size, &mut point))
-            .collect();
-        let shafts = Shafts {
-            tree: ShadowTree::new(casters),
+        });
+        Shafts {
+            tree: ShadowTree::new(casters.collect()),
             lamps: [0.5, -0.5]
                 .map(|x| Lamp {
                     ends: (0..4)
-                        .map(|_| DVec3::new(x, 0.0, 4.0) + point(0.1))
+                        .map(|_| DVec3::new(x, 0.0, 4.0) + point(random, 0.1))
                         .collect(),
                     plane: None,
                 })
                 .into(),
             margin: MARGIN,
-        };
+        }
+    }
+
+    /// What is found of places one after another, each with the blockers of the one before, is what
+    /// is found of each alone: of some all lamps are open, of some all are hidden.
+    #[test]
+    fn blockers_change_nothing() {
+        let mut random = Random::new(1, 2, 3);
+        let shafts = lamps_over_casters(&mut random);
         let mut blockers = Blockers::default();
         let mut found = [0; 3];
         for _ in 0..3000 {
-            let middle = point(1.5).with_z(-2.0);
+            let middle = point(&mut random, 1.5).with_z(-2.0);
             let starts = Starts {
-                points: (0..3).map(|_| middle + point(0.02)).collect(),
+                points: (0..3).map(|_| middle + point(&mut random, 0.02)).collect(),
                 above: None,
                 passed: None,
+                lit: None,
             };
             let state = shafts.state(&starts, &mut blockers);
             assert_eq!(state, shafts.state(&starts, &mut Blockers::default()));
             found[state as usize] += 1;
         }
         assert!(found.iter().all(|&count| count > 100), "{found:?}");
+    }
+
+    /// Of parts of bent triangles at all angles to the lamps, no way that is asked for is blocked
+    /// where they are open, and each is where they are hidden.
+    #[test]
+    fn states_are_those_of_ways() {
+        let mut random = Random::new(4, 5, 6);
+        let mut found = [0; 3];
+        for _ in 0..30 {
+            let shafts = lamps_over_casters(&mut random);
+            let planes: Vec<_> = (shafts.tree.triangles.iter().map(CasterPlane::new)).collect();
+            for _ in 0..60 {
+                let middle = point(&mut random, 1.5).with_z(-0.5 - 1.5 * random.unit());
+                let corners = [0; 3].map(|_| middle + point(&mut random, 0.1));
+                let [a, b, c] = corners;
+                let plane = (b - a).cross(c - a).normalize();
+                let normals = [0; 3].map(|_| (plane + point(&mut random, 0.1)).normalize());
+                let lit = LitTriangle {
+                    a: a.as_vec3(),
+                    b: b.as_vec3(),
+                    c: c.as_vec3(),
+                    normal_a: normals[0].as_vec3(),
+                    normal_b: normals[1].as_vec3(),
+                    normal_c: normals[2].as_vec3(),
+                    plane: plane.as_vec3(),
+                    above: 1e-5,
+                    ..LitTriangle::zeroed()
+                };
+                let starts = Starts::on_part(&lit, corners);
+                let state = shafts.state(&starts, &mut Blockers::default());
+                found[state as usize] += 1;
+                for lamp in &shafts.lamps {
+                    for _ in 0..20 {
+                        let share = mixture(&mut random, 3);
+                        let mix = |points: &[DVec3], shares: &[f64]| -> DVec3 {
+                            points.iter().zip(shares).map(|(p, s)| *p * *s).sum()
+                        };
+                        let (at, normal) = (mix(&corners, &share), mix(&normals, &share));
+                        let from = mix(&starts.points, &mixture(&mut random, starts.points.len()));
+                        let to = mix(&lamp.ends, &mixture(&mut random, lamp.ends.len()));
+                        let asked = normal.dot(to - at) > 0.0;
+                        let between = |p: &CasterPlane| p.is_between(from, to, 0.0);
+                        let blocked = planes.iter().any(between);
+                        assert!(state != PART_OPEN || !asked || !blocked, "{from} to {to}");
+                        assert!(state != PART_HIDDEN || !asked || blocked, "{from} to {to}");
+                    }
+                }
+            }
+        }
+        assert!(found.iter().all(|&count| count > 100), "{found:?}");
+    }
+
+    /// Shares that sum to 1.
+    fn mixture(random: &mut Random, count: usize) -> Vec<f64> {
+        let shares: Vec<f64> = (0..count).map(|_| random.unit().powi(3)).collect();
+        let sum: f64 = shares.iter().sum();
+        shares.iter().map(|s| s / sum).collect()
     }
 }
