@@ -88,6 +88,27 @@ pub fn outline(points: &[DVec3], u: usize, v: usize) -> Vec<(DVec3, DVec3)> {
     [edges(&lower), edges(&upper)].concat()
 }
 
+/// The normal of a plane that rays stay above, where some end lower than they start above a plane
+/// with this normal: of one that falls from the starts to these ends. It need not touch either.
+pub fn lowest_plane(normal: DVec3, starts: &[DVec3], ends: &[DVec3]) -> Option<DVec3> {
+    let least = |points: &[DVec3], along: DVec3| {
+        let places = points.iter().map(|p| along.dot(*p));
+        places.fold(f64::MAX, f64::min)
+    };
+    let from = least(starts, normal);
+    let low: Vec<DVec3> = ends
+        .iter()
+        .copied()
+        .filter(|e| normal.dot(*e) < from)
+        .collect();
+    let middle = |points: &[DVec3]| points.iter().sum::<DVec3>() / points.len() as f64;
+    let way = middle(&low) - middle(starts);
+    let along = way.reject_from_normalized(normal).try_normalize()?;
+    let length = least(&low, along) + least(starts, -along);
+    let fall = from - least(&low, normal);
+    (length > 0.0).then(|| (normal + along * (fall / length)).normalize())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

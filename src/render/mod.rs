@@ -31,6 +31,7 @@ mod relief_surfaces;
 mod renderer;
 mod seen_scene;
 mod shaft_lamps;
+mod shaft_starts;
 mod shafts;
 mod slots;
 mod textures;

@@ -6,7 +6,8 @@
 
 use glam::DVec3;
 
-use super::shafts::{Blockers, Shafts, Starts};
+use super::shaft_starts::Starts;
+use super::shafts::{Blockers, Shafts};
 use crate::constants::PART_UNSURE;
 use crate::passes::types::LitTriangle;
 

@@ -7,38 +7,18 @@
 
 use glam::{DVec3, Vec3};
 
-use super::convex::{Side, outline};
+use super::convex::{Side, lowest_plane, outline};
 use super::shaft_lamps::{Lamp, MOST_LAMPS, lamps};
+use super::shaft_starts::{MARGIN_ABOVE, Starts};
 use crate::constants::{PART_HIDDEN, PART_OPEN, PART_UNSURE};
 use crate::mesh::shadow_tree::ShadowTree;
-use crate::passes::types::{LitTriangle, Prism, ShadowNode, ShadowTriangle};
+use crate::passes::types::{ShadowNode, ShadowTriangle};
 use crate::picture::Projection;
 use crate::scene::Scene;
 
 /// Margin of a shaft's planes, as a share of the greatest coordinate: the traversal of the tree
 /// tests nothing further from a ray, see `BOX_MARGIN`.
 const MARGIN: f64 = 1.0 / (1 << 20) as f64;
-/// The margin of planes that rays begin or end above: a share of the rays' height above them, which
-/// is 2⁻¹⁸ of coordinates that are rounded to 2⁻²².
-const MARGIN_ABOVE: f64 = 0.25;
-
-/// Where shadow rays start.
-pub struct Starts {
-    /// They start in the hull of these points,
-    points: Vec<DVec3>,
-    /// and above a plane with this normal, by so much;
-    above: Option<(DVec3, f64)>,
-    /// and they pass triangles with relief below this height along a normal.
-    passed: Option<(DVec3, f64)>,
-    /// What is lit, where its normals are known.
-    lit: Option<Facing>,
-}
-
-/// A part of a triangle: its corners, and the normals between which its own lie.
-struct Facing {
-    corners: [DVec3; 3],
-    normals: [DVec3; 3],
-}
 
 /// Shadow casters and lamps.
 pub struct Shafts {
@@ -244,108 +224,6 @@ impl Shafts {
     }
 }
 
-impl Facing {
-    /// Points whose hull holds what of the hull of `ends` lies above the horizon of any place, or
-    /// less than `margin` below it: n·(e − c) > −margin for an end e, a corner c and a normal n.
-    fn above_horizon(&self, ends: &[DVec3], margin: f64) -> Vec<DVec3> {
-        let pairs = || ends.iter().flat_map(|e| self.corners.map(|c| *e - c));
-        let below = |n: &DVec3| pairs().all(|way| n.dot(way) < -margin);
-        if self.normals.iter().all(below) {
-            return Vec::new();
-        }
-        // A normal is within `spread` of the middle one: (n − middle)·(e − c) ≤ spread·reach.
-        let middle = self.normals.iter().sum::<DVec3>().normalize_or_zero();
-        let spread = (self.normals.iter()).map(|n| n.distance(middle));
-        let reach = pairs().map(DVec3::length).fold(0.0, f64::max);
-        let further = margin + spread.fold(0.0, f64::max) * reach;
-        Side::of(&self.corners, -middle, further).cut_hull(ends)
-    }
-}
-
-/// Cosine of the greatest angle between a flat triangle and the relief's axes at its corners.
-const STRAIGHT: f64 = 1.0 - 5e-7;
-
-impl Starts {
-    /// On the relief of a prism, see `relief.frag`.
-    pub fn on_prism(p: &Prism) -> Self {
-        let low = [p.low_a, p.low_b, p.low_c].map(|v| v.as_dvec3());
-        let high = [p.high_a, p.high_b, p.high_c].map(|v| v.as_dvec3());
-        let normal = (high[1] - high[0]).cross(high[2] - high[0]);
-        let normal = normal.normalize_or_zero();
-        // Mirrored prisms turn the other way round.
-        let normal = normal * normal.dot(p.normal.as_dvec3()).signum();
-        let upright = |k: usize| (high[k] - low[k]).normalize_or_zero().dot(normal) > STRAIGHT;
-        // Where the surface bends, a way may leave the relief lower than the prism's top.
-        let flat = (0..3).all(upright);
-        let top = high
-            .map(|v| normal.dot(v))
-            .into_iter()
-            .fold(f64::MAX, f64::min);
-        Self {
-            points: [low, high].concat(),
-            above: None,
-            passed: flat.then_some((normal, top)),
-            lit: None,
-        }
-    }
-
-    /// On the part of a triangle that has these corners, see `shade.frag`.
-    pub fn on_part(t: &LitTriangle, corners: [DVec3; 3]) -> Self {
-        Self {
-            points: starts(t, corners),
-            above: Some((t.plane.as_dvec3(), f64::from(t.above))),
-            passed: None,
-            lit: Some(Facing {
-                corners,
-                normals: [t.normal_a, t.normal_b, t.normal_c].map(Vec3::as_dvec3),
-            }),
-        }
-    }
-}
-
-/// Points whose hull contains the starts of all rays from the triangle, see `shade.frag`: the
-/// starts reach up to the tangent planes of its corners. `corners` are those of the part of the
-/// triangle that is asked for.
-fn starts(t: &LitTriangle, corners: [DVec3; 3]) -> Vec<DVec3> {
-    let above = f64::from(t.above);
-    let raised = corners.map(|c| c + t.plane.as_dvec3() * above);
-    let mut starts = raised.to_vec();
-    for (corner, normal) in [t.a, t.b, t.c]
-        .map(|v| v.as_dvec3())
-        .iter()
-        .zip([t.normal_a, t.normal_b, t.normal_c].map(Vec3::as_dvec3))
-    {
-        let lift = corners.map(|c| normal.dot(*corner - c));
-        let lift = lift.into_iter().fold(0.0, f64::max);
-        // Smaller values are rounding, which the margins cover.
-        if lift > MARGIN_ABOVE * above {
-            starts.extend(raised.map(|c| c + normal * lift));
-        }
-    }
-    starts
-}
-
-/// The normal of a plane that rays stay above, where some end lower than they start above a plane
-/// with this normal: of one that falls from the starts to these ends. It need not touch either.
-fn lowest_plane(normal: DVec3, starts: &[DVec3], ends: &[DVec3]) -> Option<DVec3> {
-    let least = |points: &[DVec3], along: DVec3| {
-        let places = points.iter().map(|p| along.dot(*p));
-        places.fold(f64::MAX, f64::min)
-    };
-    let from = least(starts, normal);
-    let low: Vec<DVec3> = ends
-        .iter()
-        .copied()
-        .filter(|e| normal.dot(*e) < from)
-        .collect();
-    let middle = |points: &[DVec3]| points.iter().sum::<DVec3>() / points.len() as f64;
-    let way = middle(&low) - middle(starts);
-    let along = way.reject_from_normalized(normal).try_normalize()?;
-    let length = least(&low, along) + least(starts, -along);
-    let fall = from - least(&low, normal);
-    (length > 0.0).then(|| (normal + along * (fall / length)).normalize())
-}
-
 /// Whether a way passes a node's box.
 fn enters(node: &ShadowNode, from: DVec3, to: DVec3) -> bool {
     let way = to - from;
@@ -396,6 +274,7 @@ mod tests {
 
     use super::*;
     use crate::math::sampling::Random;
+    use crate::passes::types::LitTriangle;
 
     /// Points about the middle.
     fn point(random: &mut Random, size: f64) -> DVec3 {
