@@ -34,6 +34,8 @@ layout(constant_id = 0) const uint LIT = LIT_IN_PARTS;
 layout(constant_id = 1) const uint BEAMS = 1;
 // Ways to lights that are followed together.
 layout(constant_id = 2) const uint WAYS = 4;
+// Whether points light what is open: without point lights, and emitters in closed form, none does.
+layout(constant_id = 3) const uint POINTS = 1;
 
 layout(push_constant, scalar) uniform Parameters {
     vec3 x;
@@ -115,6 +117,9 @@ vec3 straight() {
     vec3 points = vec3(0.0);    // of point lights
     uint emitters = emitter_samples();
     uint samples = light_samples();
+    if (LIT == LIT_OPEN && POINTS == 0) {
+        return exact;
+    }
     if (samples == 0) {
         return state == PART_HIDDEN ? vec3(0.0) : exact;
     }

@@ -274,6 +274,42 @@ fn suns_and_horizons_are_exact() {
     assert_silent();
 }
 
+/// Largest difference of the means. Measured: XX.
+const MANY: f64 = 1.0;
+
+/// Lamps that are too many for the closed form, beside a sun.
+#[test]
+fn a_sun_takes_no_light_of_many_lamps() {
+    let mut scene = scene();
+    scene.triangles.truncate(2);
+    scene.lights.suns.push(sun());
+    let mut build = Build::of(scene);
+    let lamp = build.material(0.0, LAMP as f32);
+    // Their shadows in the sun fall outside of the picture.
+    let (u, v) = (0.08 * DVec3::X, 0.08 * DVec3::Z);
+    let corners: Vec<DVec3> = (0..25)
+        .map(|i| (f64::from(i % 5), f64::from(i / 5)))
+        .map(|(i, j)| DVec3::new(0.3 + 0.12 * i, 0.8, 0.6 + 0.16 * j))
+        .collect();
+    for &corner in &corners {
+        build.quad(corner, u, v, (1, 1), lamp);
+    }
+    let (eye, half) = (DVec3::new(1.0, 0.5, 1.0), 0.25);
+    let found = picture(&build.scene, eye, half);
+    let (mut sum, mut wanted) = (0.0, 0.0);
+    for (i, radiance) in found.radiance.iter().enumerate() {
+        let seen = |&a: &DVec3| {
+            let at = place(eye, half, i);
+            to_polygon(at, DVec3::Y, &[a, a + u, a + u + v, a + v]).abs()
+        };
+        sum += f64::from(radiance[1]);
+        wanted += FLOOR * (LAMP * corners.iter().map(seen).sum::<f64>() + 2.0 * 0.8 / PI);
+    }
+    println!("{:+.1e}", sum / wanted - 1.0);
+    assert!((sum / wanted - 1.0).abs() < MANY);
+    assert_silent();
+}
+
 /// Power of a picture in a frequency, cycles over its side, under Hann's window.
 fn power(values: &[f64], [u, v]: [usize; 2]) -> f64 {
     let side = SIDE as usize;

@@ -128,7 +128,7 @@ impl Shade {
         let state = GraphicsState {
             name: "shade",
             shaders: &SHADER,
-            constants: &[LIT_NOT, 0, 1],
+            constants: &[LIT_NOT, 0, 1, 1],
             vertex_stride: size_of::<Vertex>() as u32,
             attributes: &[
                 attribute(
@@ -149,7 +149,7 @@ impl Shade {
             ..state
         };
         let lit = |how| {
-            let constants = [how, lights.beams.into(), lights.ways];
+            let constants = [how, lights.beams.into(), lights.ways, lights.points.into()];
             let state = GraphicsState {
                 constants: &constants,
                 ..state

@@ -3,6 +3,8 @@
 
 use std::sync::Arc;
 
+use bytemuck::Zeroable;
+
 use super::buffers::{download, upload};
 use super::groups;
 use super::shaders::shadow_rays::{Bindings, Parameters, SHADER};
@@ -41,6 +43,8 @@ pub struct LightKinds {
     pub beams: bool,
     /// Ways to lights that a sample follows together, at least 1.
     pub ways: u32,
+    /// Whether places that nothing shadows are lit by points.
+    pub points: bool,
 }
 
 /// Lights that are seen from places.
@@ -65,12 +69,18 @@ impl LightBuffers {
         } = lights;
         let emitters = points.iter().filter(|p| p.kind == KIND_SURFACE).count();
         let texels = BufferUse::Texels;
+        // Shaders look at one whether there is any or none.
+        let none = [LightPolygon::zeroed()];
+        let listed = match polygons.is_empty() {
+            true => &none[..],
+            false => polygons,
+        };
         Ok(Self {
             points: upload(device, "light points", points, texels)?,
             nodes: upload(device, "shadow nodes", tree.nodes(), texels)?,
             triangles: upload(device, "shadow triangles", &tree.triangles, texels)?,
             webs: upload(device, "webs", webs, BufferUse::Storage)?,
-            polygons: upload(device, "light polygons", polygons, texels)?,
+            polygons: upload(device, "light polygons", listed, texels)?,
             counts: LightCounts {
                 points: points.len() as u32,
                 of_emitters: emitters as u32,

@@ -96,11 +96,11 @@ pub fn lowest_plane(normal: DVec3, starts: &[DVec3], ends: &[DVec3]) -> Option<D
         places.fold(f64::MAX, f64::min)
     };
     let from = least(starts, normal);
-    let low: Vec<DVec3> = ends
-        .iter()
-        .copied()
-        .filter(|e| normal.dot(*e) < from)
-        .collect();
+    let is_low = |e: &DVec3| normal.dot(*e) < from;
+    let low: Vec<DVec3> = ends.iter().copied().filter(is_low).collect();
+    if low.is_empty() {
+        return None;
+    }
     let middle = |points: &[DVec3]| points.iter().sum::<DVec3>() / points.len() as f64;
     let way = middle(&low) - middle(starts);
     let along = way.reject_from_normalized(normal).try_normalize()?;

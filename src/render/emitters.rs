@@ -51,8 +51,8 @@ fn emitters(scene: &Scene) -> Vec<Emitter> {
 
 /// What emits in a scene.
 pub struct Emitters {
-    /// All, or none where they are many.
-    polygons: Vec<Polygon>,
+    /// All; None where they are many.
+    polygons: Option<Vec<Polygon>>,
     /// LIGHT_SETS sets of LIGHT_POINTS points on the emitters, distributed by power, if there are
     /// emitters; then the point lights.
     pub points: Vec<Shining>,
@@ -67,9 +67,19 @@ impl Emitters {
         }
     }
 
-    /// Emitters and suns whose light is found in closed form.
+    /// Whether places that nothing shadows are lit by points: by point lights, or by emitters that
+    /// are not in closed form.
+    pub fn light_by_points(&self, scene: &Scene) -> bool {
+        self.polygons.is_none() || !scene.lights.points.is_empty()
+    }
+
+    /// Emitters and suns, if their light is found in closed form: all, or none where the emitters
+    /// are many.
     pub fn seen_from(&self, scene: &Scene, projection: &Projection) -> Vec<LightPolygon> {
-        let emitters = self.polygons.iter().map(|polygon| {
+        let Some(polygons) = &self.polygons else {
+            return Vec::new();
+        };
+        let emitters = polygons.iter().map(|polygon| {
             let seen = |p: DVec3| ((p - projection.eye) / projection.unit).as_vec3();
             let [a, b, c, d] = polygon.corners.map(seen);
             let strength = std::f32::consts::PI * Vec3::from(polygon.radiance);
@@ -134,8 +144,8 @@ impl Polygon {
     }
 }
 
-/// All emitters in closed form, or none where they are many.
-fn polygons(emitters: &[Emitter]) -> Vec<Polygon> {
+/// All emitters in closed form; None where they are many.
+fn polygons(emitters: &[Emitter]) -> Option<Vec<Polygon>> {
     let mut found: Vec<Polygon> = Vec::new();
     for &Emitter { corners, radiance } in emitters {
         let joins = |(i, polygon): (usize, &Polygon)| Some((i, polygon.joined(corners, radiance)?));
@@ -150,10 +160,10 @@ fn polygons(emitters: &[Emitter]) -> Vec<Polygon> {
             }
         }
         if found.len() > MOST_POLYGONS {
-            return Vec::new();
+            return None;
         }
     }
-    found
+    Some(found)
 }
 
 /// An emitter or a part of a sun that points are taken on.

@@ -50,7 +50,7 @@ pub(super) fn sun_disc(scene: &Scene, sun: &Sun) -> Vec<[DVec3; 3]> {
 const MOST_WAYS: usize = 4;
 
 /// What shaders are made for where these lights are drawn sharply.
-pub(super) fn light_kinds(scene: &Scene) -> LightKinds {
+pub(super) fn light_kinds(scene: &Scene, lights: &LightScene) -> LightKinds {
     let emits = |t: &Triangle| scene.materials[t.material as usize].emits();
     let most = match scene.lights.suns.is_empty() && !scene.triangles.iter().any(emits) {
         true => scene.lights.points.len().clamp(1, MOST_WAYS),
@@ -59,6 +59,7 @@ pub(super) fn light_kinds(scene: &Scene) -> LightKinds {
     LightKinds {
         beams: scene.lights.have_beams(),
         ways: most as u32,
+        points: (lights.emitters.as_ref()).is_none_or(|lit| lit.light_by_points(scene)),
     }
 }
 

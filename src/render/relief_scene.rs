@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::lights::light_kinds;
 use super::relief_borders::{Borders, Relief as OfTriangle};
 use super::relief_surfaces::Surfaces;
 use super::{Light, Lighting, ReliefShading, Show};
@@ -20,6 +19,7 @@ use crate::passes::relief::{Kind, Relief};
 use crate::passes::relief_hits::ReliefHits;
 use crate::passes::relief_overdraw::ReliefOverdraw;
 use crate::passes::shade::Shade;
+use crate::passes::shadow_rays::LightKinds;
 use crate::scene::Scene;
 use crate::vk::Device;
 
@@ -58,6 +58,7 @@ impl ReliefScene {
         shade: &Shade,
         scene: &Scene,
         lighting: &Lighting<'_>,
+        lights: LightKinds,
     ) -> Result<Option<Self>> {
         let Some((light, shading)) = lighting.relief() else {
             return Ok(None);
@@ -105,7 +106,7 @@ impl ReliefScene {
             factored: lighting.part != Light::Direct || !(sharp || clustered),
             sharp,
             clustered,
-            lights: light_kinds(scene),
+            lights,
             borders: !borders.is_empty(),
             levels: clustered || surfaces.long_ways,
         };

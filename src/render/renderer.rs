@@ -140,11 +140,13 @@ impl<'a> Renderer<'a> {
         );
         view.check()?;
         let glows = scene.materials.iter().any(|m| m.map_ke.is_some());
-        let shade = Shade::new(device, glows, light_kinds(scene))?;
+        let light_scene = LightScene::new(scene, &lighting);
+        let kinds = light_kinds(scene, &light_scene);
+        let shade = Shade::new(device, glows, kinds)?;
         let fixed = Fixed {
             textures: Textures::new(device, scene)?,
-            light_scene: LightScene::new(scene, &lighting),
-            relief: ReliefScene::new(device, &shade, scene, &lighting)?,
+            light_scene,
+            relief: ReliefScene::new(device, &shade, scene, &lighting, kinds)?,
             device: Arc::clone(device),
             scene,
             lighting,
