@@ -3,8 +3,10 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
+#extension GL_KHR_shader_subgroup_ballot : require
 #include "shared/types.glsl"
 #include "shared/texels.glsl"
+#include "shared/any_lane.glsl"
 
 layout(local_size_x = GROUP) in;
 

@@ -2,7 +2,7 @@
 // src/passes/shadow_rays.rs. Nodes stand in depth-first order, and each knows the one to go on with
 // if its box is missed: no stack, however deep the tree. Including files have
 // shared/types.glsl, shared/texels.glsl, `usamplerBuffer`s shadow_nodes and shadow_triangles, and
-// WAYS, how many ways are followed together.
+// WAYS, how many ways are followed together, and shared/any_lane.glsl.
 
 // Components of a way below this count as this, so that their reciprocals are finite: boxes are
 // padded by far more.
@@ -74,7 +74,7 @@ void follow(vec3 from, inout Ways ways) {
     // Without casters the only texel is 0.
     uint count = any_open ? fetch_words(shadow_nodes, 0).w : 0;
     uint at = 0;
-    while (at < count) {
+    do {
         // On to the next leaf that a way enters, in a loop of its own: a software device works
         // through what a branch leaves out. The condition stands before the loop: lanes that are
         // done lose what they have found if others go on to a condition behind it (Mesa 22.3).
@@ -105,17 +105,20 @@ void follow(vec3 from, inout Ways ways) {
             leaf = entered ? high.w & ~RELIEF_NODE : 0;
             at = entered ? at + 1 : low.w;
         }
-        uint first = leaf / LEAF_TRIANGLES;
-        for (uint k = first; k < first + leaf % LEAF_TRIANGLES; k++) {
-            Caster t = caster_at(k, from);
+        uint k = leaf / LEAF_TRIANGLES;
+        uint end = k + leaf % LEAF_TRIANGLES;
+        do {
+            Caster t = caster_at(min(k, max(end, 1) - 1), from);
             for (uint i = 0; i < WAYS; i++) {
-                ways.open[i] = ways.open[i] && !(enters[i] && stands_on(t, way[i], ways.clear[i]));
+                bool asks = ways.open[i] && enters[i] && k < end;
+                ways.open[i] = ways.open[i] && !(asks && stands_on(t, way[i], ways.clear[i]));
             }
-        }
+            k++;
+        } while (any_lane(k < end));
         any_open = false;
         for (uint i = 0; i < WAYS; i++) {
             any_open = any_open || ways.open[i];
         }
         count = any_open ? count : 0;
-    }
+    } while (any_lane(at < count));
 }
