@@ -164,7 +164,7 @@ fn shadows_of_cut_surfaces_are_those_of_whole_ones() {
 }
 
 /// Shares of the parts of all triangles that are open, and that are hidden.
-/// Measured: 0.49 to 0.57, and 0.044 to 0.066.
+/// Measured: 0.58 to 0.66, and 0.030 to 0.055.
 const KNOWN: [f64; 2] = [0.25, 0.022];
 
 /// Parts of large triangles that see all of the lamp, or none, follow no shadow rays, and the
@@ -274,8 +274,8 @@ fn suns_and_horizons_are_exact() {
     assert_silent();
 }
 
-/// Largest difference of the means. Measured: XX.
-const MANY: f64 = 1.0;
+/// Largest difference of the means. Measured: 2.1e-4.
+const MANY: f64 = 4e-4;
 
 /// Lamps that are too many for the closed form, beside a sun.
 #[test]
