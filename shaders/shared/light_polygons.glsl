@@ -7,9 +7,10 @@
 // Texels of struct LightPolygon.
 const uint POLYGON_TEXELS = 4;
 
-// Form factor from the receiver to a convex quadrangle, positive if it is counter-clockwise from its
-// front. Its contour leaves the horizon once at most: a closing edge is looked at once, where Contour
-// looks at one for each edge, which costs a software device the same whether there is one or not.
+// Form factor from the receiver to a convex quadrangle, positive if it is counter-clockwise from
+// its front. Its contour leaves the horizon once at most: a closing edge is looked at once, where
+// Contour looks at one for each edge, which costs a software device the same whether there is one
+// or not.
 float quadrangle_form_factor(vec3 corners[4], vec3 n) {
     float sum = 0.0;
     bool crosses = false;
@@ -38,8 +39,8 @@ float quadrangle_form_factor(vec3 corners[4], vec3 n) {
 vec3 unshadowed(vec3 at, vec3 normal) {
     vec3 sum = vec3(0.0);
     uint i = 0;
-    // A software device runs a loop once more than its condition says if that stands before it (Mesa
-    // 22.3). Without polygons the only one is 0.
+    // A software device runs a loop once more than its condition says if that stands before it
+    // (Mesa 22.3). Without polygons the only one is 0.
     do {
         vec4 first = fetch(light_polygons, POLYGON_TEXELS * i);
         vec4 second = fetch(light_polygons, POLYGON_TEXELS * i + 1);
