@@ -13,8 +13,8 @@ use crate::passes::types::LitTriangle;
 
 /// Most cuts of a side in two.
 const MOST_LEVELS: u32 = 7;
-/// Pixels along a side of a part. With 4, fewer places follow shadow rays than by those of 8, but to
-/// judge the parts took longer: `cornell-box` 1.38 s in place of 1.26, `fruit-platter` 4.30 of 4.21.
+/// Pixels along a side of a part. With 4 fewer places follow shadow rays, but to judge the parts
+/// took longer: `cornell-box` 1.38 s in place of 1.26, `fruit-platter` 4.30 in place of 4.21.
 const PART_PIXELS: f64 = 8.0;
 /// Parts are judged so much larger than they are: the shares of a drawn place are rounded.
 const LARGER: f64 = 1.03;

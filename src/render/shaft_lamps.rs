@@ -36,8 +36,9 @@ pub fn lamps(scene: &Scene, seen: impl Fn(DVec3) -> DVec3) -> Vec<Lamp> {
     }));
     lamps.extend(scene.lights.suns.iter().map(|sun| {
         Lamp {
-            ends: (sun_disc(scene, sun).iter().flatten())
-                .map(|&corner| seen(corner))
+            // The other corners are the middle, and those of the next triangle.
+            ends: (sun_disc(scene, sun).iter())
+                .map(|&[_, corner, _]| seen(corner))
                 .collect(),
             plane: None,
         }

@@ -100,10 +100,10 @@ impl Shafts {
         }
     }
 
-    /// Whether one triangle stands on all ways from the starts to a lamp, those to parts of it below
-    /// the horizon too: a place that sees a rim of a lamp and none of its points counts as lit.
-    /// Places where ways between two hulls pass a plane lie in the hull of those of ways between the
-    /// corners.
+    /// Whether one triangle stands on all ways from the starts to a lamp, those to parts of it
+    /// below the horizon too: a place that sees a rim of a lamp and none of its points counts as
+    /// lit. Places where ways between two hulls pass a plane lie in the hull of those of ways
+    /// between the corners.
     fn is_covered(&self, starts: &[DVec3], lamp: &Lamp, blocker: &mut Option<usize>) -> bool {
         let middle = |points: &[DVec3]| points.iter().sum::<DVec3>() / points.len() as f64;
         let (from, to) = (middle(starts), middle(&lamp.ends));

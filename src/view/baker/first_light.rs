@@ -10,9 +10,9 @@ use crate::view::orders::Stage;
 /// Triangles of a scene from which on a coarse bake comes first.
 const MANY: usize = 1 << 13;
 
-/// Under a sky a first light is of the suns, or where they are not the only other lights, of so many
-/// sources, the strongest: rays to each part of the sky take long, and what was not shot is shown
-/// spread evenly.
+/// Under a sky a first light is of the suns, or where they are not the only other lights, of so
+/// many sources, the strongest: rays to each part of the sky take long, and what was not shot is
+/// shown spread evenly.
 const FIRST_OF_SKY: u32 = 4;
 
 /// Whether a scene has relief that takes part.
