@@ -43,12 +43,7 @@ pub(super) fn build(options: &LoadOptions) -> Result<Scene> {
     let patches = stage::planned(NAME, options, PATCHES, LEAST_PATCHES)?;
     let mut figure = match &options.statue {
         Some(path) => stage::read_statue(path)?,
-        None => solid::sculpt(
-            bunny::distance,
-            bunny::LOW,
-            bunny::HIGH,
-            even_share(patches, SHARE),
-        ),
+        None => solid::sculpt(&bunny::BUNNY, even_share(patches, SHARE)),
     };
     stage::place(&mut figure, BUNNY_HEIGHT, BUNNY_TURN, BUNNY_FOOT);
     stage::cover(&mut figure, BUNNY, REPEATS);

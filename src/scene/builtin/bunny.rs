@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::round_cone::{RoundCone, cone, figure};
+use super::surface_nets::Implicit;
 
 /// Parts on the plane x = 0. The bunny has units of its own; the head looks towards −z, y is up.
 const TRUNK: [RoundCone; 5] = [
@@ -32,11 +33,10 @@ const LIMBS: [RoundCone; 7] = [
 ];
 
 const BLEND: f64 = 0.06;
-/// A box around the figure.
-pub(super) const LOW: DVec3 = DVec3::new(-0.48, -0.05, -0.52);
-pub(super) const HIGH: DVec3 = DVec3::new(0.48, 1.62, 0.68);
 
 /// See [`figure`].
-pub(super) fn distance(p: DVec3) -> f64 {
-    figure(&TRUNK, &LIMBS, BLEND, p)
-}
+pub(super) const BUNNY: Implicit<fn(DVec3) -> f64> = Implicit {
+    distance: |p| figure(&TRUNK, &LIMBS, BLEND, p),
+    low: DVec3::new(-0.48, -0.05, -0.52),
+    high: DVec3::new(0.48, 1.62, 0.68),
+};

@@ -28,7 +28,7 @@ pub(super) fn build(options: &LoadOptions) -> Result<Scene> {
         None => {
             let patches = stage::planned(NAME, options, PATCHES, LEAST_PATCHES)?;
             let count = even_share(patches, SHARE);
-            solid::sculpt(statue::distance, statue::LOW, statue::HIGH, count)
+            solid::sculpt(&statue::HORSE, count)
         }
     };
     let room = cornell::ROOM;

@@ -6,6 +6,7 @@ use glam::{DVec2, DVec3};
 use super::round_cone::{cone, smooth_union};
 use super::solid::{revolve, sculpt};
 use super::stage::diffuse;
+use super::surface_nets::Implicit;
 use crate::scene::Material;
 use crate::scene::assemble::Mesh;
 
@@ -123,32 +124,42 @@ fn grape(count: usize) -> Mesh {
 }
 
 fn sphere(radius: f64, count: usize) -> Mesh {
-    let reach = DVec3::splat(radius);
-    sculpt(|p| p.length() - radius, -reach, reach, count)
+    let ball = Implicit {
+        distance: |p: DVec3| p.length() - radius,
+        low: DVec3::splat(-radius),
+        high: DVec3::splat(radius),
+    };
+    sculpt(&ball, count)
 }
 
 /// A spindle torus, narrower below, so that it has hollows above and below.
-fn apple(count: usize) -> Mesh {
-    let (ring, tube) = (0.0175, 0.0225);
-    let distance = |p: DVec3| {
+pub(super) const APPLE: Implicit<fn(DVec3) -> f64> = Implicit {
+    distance: |p| {
+        let (ring, tube) = (0.0175, 0.0225);
         let narrow = 1.0 + 4.0 * p.y.min(0.03);
         let across = DVec3::new(p.x, 0.0, p.z).length() / narrow;
         (across - ring).hypot(p.y / 1.45) - tube
-    };
-    sculpt(distance, DVec3::splat(-0.05), DVec3::splat(0.05), count)
+    },
+    low: DVec3::splat(-0.05),
+    high: DVec3::splat(0.05),
+};
+
+fn apple(count: usize) -> Mesh {
+    sculpt(&APPLE, count)
 }
 
+pub(super) const PEAR_BODY: Implicit<fn(DVec3) -> f64> = Implicit {
+    distance: |p| {
+        let below = cone([0.0, 0.036, 0.0], 0.036, [0.0, 0.044, 0.0], 0.036);
+        let above = cone([0.0, 0.060, 0.0], 0.026, [0.003, 0.092, 0.0], 0.015);
+        smooth_union(below.distance(p), above.distance(p), 0.03)
+    },
+    low: DVec3::new(-0.05, -0.01, -0.05),
+    high: DVec3::new(0.05, 0.12, 0.05),
+};
+
 fn pear(count: usize) -> Mesh {
-    let parts = [
-        cone([0.0, 0.036, 0.0], 0.036, [0.0, 0.044, 0.0], 0.036),
-        cone([0.0, 0.060, 0.0], 0.026, [0.003, 0.092, 0.0], 0.015),
-    ];
-    let distance = |p: DVec3| smooth_union(parts[0].distance(p), parts[1].distance(p), 0.03);
-    let (low, high) = (
-        DVec3::new(-0.05, -0.01, -0.05),
-        DVec3::new(0.05, 0.12, 0.05),
-    );
-    sculpt(distance, low, high, count)
+    sculpt(&PEAR_BODY, count)
 }
 
 pub(super) fn stem(count: usize) -> Mesh {
@@ -162,8 +173,12 @@ pub(super) fn stem(count: usize) -> Mesh {
     revolve(&profile.map(DVec2::from), count)
 }
 
-/// Round cones along an arc that lies on the table, thin towards the ends.
 fn banana(count: usize) -> Mesh {
+    sculpt(&bent(), count)
+}
+
+/// Round cones along an arc that lies on the table, thin towards the ends.
+pub(super) fn bent() -> Implicit<impl Fn(DVec3) -> f64 + Sync> {
     let parts: Vec<_> = (0..10)
         .map(|i| {
             let at = |i: i32| {
@@ -174,15 +189,14 @@ fn banana(count: usize) -> Mesh {
             cone(at(i), radius(i), at(i + 1), radius(i + 1))
         })
         .collect();
-    let distance = |p: DVec3| {
-        parts
-            .iter()
-            .map(|part| part.distance(p))
-            .fold(f64::INFINITY, |a, b| smooth_union(a, b, 0.01))
-    };
-    let (low, high) = (
-        DVec3::new(-0.15, -0.03, -0.15),
-        DVec3::new(0.15, 0.03, 0.05),
-    );
-    sculpt(distance, low, high, count)
+    Implicit {
+        distance: move |p: DVec3| {
+            parts
+                .iter()
+                .map(|part| part.distance(p))
+                .fold(f64::INFINITY, |a, b| smooth_union(a, b, 0.01))
+        },
+        low: DVec3::new(-0.15, -0.03, -0.15),
+        high: DVec3::new(0.15, 0.03, 0.05),
+    }
 }

@@ -8,6 +8,9 @@ pub(super) struct RoundCone {
     from_radius: f64,
     to: [f64; 3],
     to_radius: f64,
+    /// A sphere about it.
+    middle: [f64; 3],
+    reach: f64,
 }
 
 pub(super) const fn cone(
@@ -16,11 +19,23 @@ pub(super) const fn cone(
     to: [f64; 3],
     to_radius: f64,
 ) -> RoundCone {
+    let (mut middle, mut sum, mut longest) = ([0.0; 3], 0.0, 0.0);
+    let mut axis = 0;
+    while axis < 3 {
+        middle[axis] = 0.5 * (from[axis] + to[axis]);
+        let length = (to[axis] - from[axis]).abs();
+        sum += length;
+        longest = f64::max(longest, length);
+        axis += 1;
+    }
     RoundCone {
         from,
         from_radius,
         to,
         to_radius,
+        middle,
+        // No length is more than its longest part and half the others.
+        reach: 0.25 * (longest + sum) + f64::max(from_radius, to_radius),
     }
 }
 
@@ -34,14 +49,24 @@ pub(super) fn smooth_union(a: f64, b: f64, blend: f64) -> f64 {
 /// inside; approximately the distance, which is enough to polygonise it.
 pub(super) fn figure(trunk: &[RoundCone], limbs: &[RoundCone], blend: f64, p: DVec3) -> f64 {
     let aside = DVec3::new(p.x.abs(), p.y, p.z);
-    let trunk = trunk.iter().map(|part| part.distance(p));
-    let limbs = limbs.iter().map(|part| part.distance(aside));
-    trunk
-        .chain(limbs)
-        .fold(f64::INFINITY, |a, b| smooth_union(a, b, blend))
+    let trunk = trunk.iter().map(|part| (part, p));
+    let limbs = limbs.iter().map(|part| (part, aside));
+    trunk.chain(limbs).fold(f64::INFINITY, |found, (part, p)| {
+        // A part as far off changes nothing.
+        match part.is_beyond(p, found + blend) {
+            true => found,
+            false => smooth_union(found, part.distance(p), blend),
+        }
+    })
 }
 
 impl RoundCone {
+    /// Whether it is further off for certain.
+    fn is_beyond(&self, p: DVec3, distance: f64) -> bool {
+        let reach = (self.reach + distance).max(0.0);
+        p.distance_squared(DVec3::from(self.middle)) > reach * reach
+    }
+
     /// Distance to the spheres swept along the axis, the nearest sphere taken perpendicular to it;
     /// negative inside.
     pub fn distance(&self, p: DVec3) -> f64 {

@@ -5,24 +5,19 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 
 use super::splitting;
-use super::surface_nets::{Surface, polygonise};
+use super::surface_nets::{Implicit, Surface};
 use crate::scene::assemble::Mesh;
 
 /// Grids to try, and the share of the wanted triangles that is close enough to stop at.
 const ATTEMPTS: u32 = 60;
 const NEAR_ENOUGH: f64 = 0.93;
 
-/// The surface `distance` = 0 within a box in exactly `count` triangles, which is even: closed,
-/// every edge shared by two, fronts outward.
-pub(super) fn sculpt(
-    distance: impl Fn(DVec3) -> f64 + Sync,
-    low: DVec3,
-    high: DVec3,
-    count: usize,
-) -> Mesh {
+/// A surface in exactly `count` triangles, which is even: closed, every edge shared by two, fronts
+/// outward.
+pub(super) fn sculpt(of: &Implicit<impl Fn(DVec3) -> f64 + Sync>, count: usize) -> Mesh {
     // The first estimate, a solid with the surface of the box: eight triangles for six cells' worth
     // of it.
-    let size = high - low;
+    let size = of.high - of.low;
     let faces = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
     let mut cell = (2.0 * faces / count as f64).sqrt();
     let mut best: Option<Surface> = None;
@@ -30,14 +25,13 @@ pub(super) fn sculpt(
         // A saddle that just touches a grid plane is not manifold: other offsets of the grid are
         // tried.
         let shift = (DVec3::new(0.755, 0.570, 0.430) * f64::from(attempt)).fract();
-        let surface = polygonise(&distance, low - shift * cell, high, cell);
-        let got = surface.triangles.len();
-        let fits = got > 0 && got <= count && surface.is_manifold();
-        if fits && best.as_ref().is_none_or(|b| b.triangles.len() < got) {
-            best = Some(surface);
+        let net = of.net(cell, shift);
+        let got = net.triangles();
+        let triangles = |best: &Option<Surface>| best.as_ref().map_or(0, |b| b.triangles.len());
+        if got > triangles(&best) && got <= count && net.is_manifold() {
+            best = Some(of.surface(&net)).filter(Surface::is_manifold).or(best);
         }
-        let found = best.as_ref().map_or(0, |b| b.triangles.len()) as f64;
-        if found >= NEAR_ENOUGH * count as f64 {
+        if triangles(&best) as f64 >= NEAR_ENOUGH * count as f64 {
             break;
         }
         // Aim a little below: the number goes with the inverse square of the cell. Near the goal,

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::round_cone::{RoundCone, cone, figure};
-use super::surface_nets::{Surface, polygonise};
+use super::surface_nets::{Implicit, Net, Surface};
 use crate::scene::assemble::Mesh;
 
 /// Parts on the plane x = 0.
@@ -43,9 +43,12 @@ const LIMBS: [RoundCone; 9] = [
 
 /// Width of the fillets between parts.
 const BLEND: f64 = 0.07;
-/// A box around the figure.
-pub(super) const LOW: DVec3 = DVec3::new(-0.5, -0.05, -1.5);
-pub(super) const HIGH: DVec3 = DVec3::new(0.5, 2.1, 1.15);
+/// See [`figure`].
+pub(super) const HORSE: Implicit<fn(DVec3) -> f64> = Implicit {
+    distance: |p| figure(&TRUNK, &LIMBS, BLEND, p),
+    low: DVec3::new(-0.5, -0.05, -1.5),
+    high: DVec3::new(0.5, 2.1, 1.15),
+};
 /// Triangles times the square of a cell's edge, measured.
 const TRIANGLES_PER_CELL: f64 = 17.5;
 
@@ -58,18 +61,15 @@ pub(super) fn build(triangles: usize) -> Mesh {
     let surface = (0..100)
         .map(|attempt| {
             let shift = (DVec3::new(0.755, 0.570, 0.430) * f64::from(attempt)).fract();
-            polygonise(distance, LOW - shift * cell, HIGH, cell)
+            HORSE.net(cell, shift)
         })
+        .filter(Net::is_manifold)
+        .map(|net| HORSE.surface(&net))
         .find(Surface::is_manifold);
     let Some(surface) = surface else {
         unreachable!("of a hundred grids one gives a manifold");
     };
     Mesh::bare(surface.positions, surface.triangles)
-}
-
-/// See [`figure`].
-pub(super) fn distance(p: DVec3) -> f64 {
-    figure(&TRUNK, &LIMBS, BLEND, p)
 }
 
 #[cfg(test)]
