@@ -289,4 +289,11 @@ impl Target {
     pub fn rows(&self, rows: u32) -> Vec<[f32; 4]> {
         self.readback.read(0, self.width as usize * rows as usize)
     }
+
+    /// Shows those rows to `look`.
+    pub fn look_at_rows<R>(&self, rows: u32, look: impl FnOnce(&[[f32; 4]]) -> R) -> R {
+        let count = self.width as usize * rows as usize;
+        self.readback
+            .look_at(|samples: &[[f32; 4]]| look(&samples[..count]))
+    }
 }

@@ -1,5 +1,6 @@
 //! Samples gathered into pixels, tile by tile.
 
+use glam::Vec3A;
 use rayon::prelude::*;
 
 use crate::picture::{self, Picture, SAMPLES, Samples, Tile, tone};
@@ -20,6 +21,13 @@ pub struct Gathered {
     metered: Vec<f32>,
 }
 
+/// What is kept of a row of pixels beside their radiance.
+#[derive(Default)]
+struct Kept {
+    contrasts: Vec<(u32, Samples)>,
+    metered: Vec<f32>,
+}
+
 impl Gathered {
     pub fn new((width, height): (u32, u32), samples: u32) -> Self {
         Self {
@@ -34,46 +42,32 @@ impl Gathered {
 
     /// Adds a tile's samples, in rows of `stride`.
     pub fn add(&mut self, tile: Tile, samples: &[[f32; 4]], stride: usize) {
-        let drawn = self.samples as usize;
-        let kept = SAMPLES as usize;
-        let each = drawn / kept;
-        let share = 1.0 / (each * each) as f32;
-        let rows: Vec<Vec<(Samples, bool)>> = (0..tile.height as usize)
-            .into_par_iter()
-            .map(|row| {
-                (0..tile.width as usize)
-                    .map(|column| {
-                        let sample = |y: usize, x: usize| {
-                            samples[(row * drawn + y) * stride + column * drawn + x]
-                        };
-                        let colours = std::array::from_fn(|i| {
-                            let mut sum = [0.0; 3];
-                            for k in 0..each * each {
-                                let (y, x) =
-                                    (i / kept * each + k / each, i % kept * each + k % each);
-                                let of = sample(y, x);
-                                (0..3).for_each(|c| sum[c] += of[c]);
-                            }
-                            sum.map(|c| c * share)
-                        });
-                        let metered = |i: usize| sample(i / drawn, i % drawn)[3] > 0.5;
-                        (colours, (0..drawn * drawn).all(metered))
-                    })
-                    .collect()
-            })
-            .collect();
-        for (row, pixels) in rows.into_iter().enumerate() {
-            let start = (tile.row + row as u32) * self.width + tile.column;
-            for (place, (samples, metered)) in (start..).zip(pixels) {
-                let mean = picture::mean(&samples);
-                self.radiance[place as usize] = mean;
-                if metered {
-                    self.metered.push(tone::luminance(mean));
+        let side = self.samples as usize;
+        let first = (tile.row * self.width) as usize;
+        let rows = self.radiance[first..].par_chunks_mut(self.width as usize);
+        let rows = rows.zip(samples.par_chunks(side * stride)).enumerate();
+        let kept = rows
+            .take(tile.height as usize)
+            .map(|(row, (radiance, samples))| {
+                let start = (tile.row + row as u32) * self.width + tile.column;
+                let mut kept = Kept::default();
+                let pixels = radiance[tile.column as usize..].iter_mut().zip(start..);
+                for (column, (mean, place)) in pixels.take(tile.width as usize).enumerate() {
+                    let drawn = |y: usize, x: usize| samples[y * stride + column * side + x];
+                    let (samples, metered) = resolved(side, drawn);
+                    *mean = picture::mean(&samples);
+                    if metered {
+                        kept.metered.push(tone::luminance(*mean));
+                    }
+                    if contrasts(&samples) {
+                        kept.contrasts.push((place, samples));
+                    }
                 }
-                if contrasts(&samples) {
-                    self.contrasts.push((place, samples));
-                }
-            }
+                kept
+            });
+        for mut kept in kept.collect::<Vec<_>>() {
+            self.metered.append(&mut kept.metered);
+            self.contrasts.append(&mut kept.contrasts);
         }
     }
 
@@ -114,12 +108,32 @@ impl Gathered {
     }
 }
 
+/// The samples of a pixel that is `drawn` by row and column with `side` along a side, and whether
+/// all of it is metered.
+fn resolved(side: usize, drawn: impl Fn(usize, usize) -> [f32; 4]) -> (Samples, bool) {
+    const KEPT: usize = SAMPLES as usize;
+    let each = side / KEPT;
+    let share = 1.0 / (each * each) as f32;
+    let mut metered = true;
+    let samples = std::array::from_fn(|i| {
+        let mut sum = [0.0; 3];
+        for k in 0..each * each {
+            let (y, x) = (i / KEPT * each + k / each, i % KEPT * each + k % each);
+            let [r, g, b, is_metered] = drawn(y, x);
+            sum = [sum[0] + r, sum[1] + g, sum[2] + b];
+            metered &= is_metered > 0.5;
+        }
+        sum.map(|c| c * share)
+    });
+    (samples, metered)
+}
+
+/// Whether the samples differ by more than [`CONTRAST`].
 fn contrasts(samples: &Samples) -> bool {
-    (0..3).any(|c| {
-        let values = samples.iter().map(|s| s[c]);
-        let (low, high) = values.fold((f32::INFINITY, 0.0_f32), |(low, high), v| {
-            (low.min(v), high.max(v))
-        });
-        low < CONTRAST * high
-    })
+    let (mut low, mut high) = (Vec3A::INFINITY, Vec3A::ZERO);
+    for sample in samples {
+        let sample = Vec3A::from(*sample);
+        (low, high) = (low.min(sample), high.max(sample));
+    }
+    low.cmplt(CONTRAST * high).any()
 }

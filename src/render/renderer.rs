@@ -261,17 +261,17 @@ impl<'a> Renderer<'a> {
         commands.wait()?;
         let target = &canvas.target;
         let per_side = self.fixed.samples;
-        let (mut samples, stride) = (target.rows(tile.height * per_side), target.width);
-        if let Some(sky) = self.fixed.sky() {
-            draw_sky(
-                sky,
-                &self.view.projection,
-                (tile, per_side),
-                &mut samples,
-                stride,
-            );
+        let (rows, stride) = (tile.height * per_side, target.width);
+        let mut add = |samples: &[[f32; 4]]| gathered.add(tile, samples, stride as usize);
+        match self.fixed.sky() {
+            None => target.look_at_rows(rows, add),
+            Some(sky) => {
+                let mut samples = target.rows(rows);
+                let projection = &self.view.projection;
+                draw_sky(sky, projection, (tile, per_side), &mut samples, stride);
+                add(&samples);
+            }
         }
-        gathered.add(tile, &samples, stride as usize);
         Ok(())
     }
 
