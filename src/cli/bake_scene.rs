@@ -18,13 +18,20 @@ pub struct BakeScene {
 }
 
 impl BakeScene {
-    /// The scene of a bake that was read from a file, cut as it was there: from the file that is
-    /// given, or from where it lay as seen from the bake, or from where it was.
+    /// A bake and its scene.
+    ///
+    /// # Errors
+    /// As [`Bake::load`] and [`Self::of`].
+    pub fn load(&self, path: &Path) -> Result<(Bake, Scene)> {
+        Bake::load_with(path, |origin, on_input| self.of(path, origin, on_input))
+    }
+
+    /// The scene of a bake in the file `path` that says this of its scene, cut as it was there: from
+    /// the file that is given, or from where it lay as seen from the bake, or from where it was.
     ///
     /// # Errors
     /// A scene that is at none of these places, cannot be read, or is not the one that was baked.
-    pub fn of(&self, path: &Path, bake: &Bake) -> Result<Scene> {
-        let origin = &bake.origin;
+    pub fn of(&self, path: &Path, origin: &Origin, on_input: &[OnInput]) -> Result<Scene> {
         if origin.file().is_none() {
             if let Some(moved) = &self.moved {
                 return Err(Error::Usage(format!(
@@ -34,7 +41,7 @@ impl BakeScene {
                     origin.scene
                 )));
             }
-            return scene(path, bake, origin);
+            return scene(path, on_input, origin);
         }
         let places = match &self.moved {
             Some(moved) => vec![moved.clone()],
@@ -42,7 +49,7 @@ impl BakeScene {
         };
         let mut first = None;
         for place in places.iter().filter(|place| place.is_file()) {
-            match scene(path, bake, &origin.moved(place)) {
+            match scene(path, on_input, &origin.moved(place)) {
                 Ok(scene) => return Ok(scene),
                 Err(error) => first.get_or_insert(error),
             };
@@ -73,7 +80,7 @@ impl BakeScene {
     }
 }
 
-fn scene(path: &Path, bake: &Bake, origin: &Origin) -> Result<Scene> {
+fn scene(path: &Path, on_input: &[OnInput], origin: &Origin) -> Result<Scene> {
     let builtin = Builtin {
         patches: origin.patches,
         statue: origin.statue.clone(),
@@ -88,7 +95,7 @@ fn scene(path: &Path, bake: &Bake, origin: &Origin) -> Result<Scene> {
     let scene = builtin.load(&origin.scene)?;
     let count = scene.triangles.len();
     let is_of_it = |on: &OnInput| (on.triangle as usize) < count;
-    if scene.hash() != origin.hash || !bake.on_input.iter().all(is_of_it) {
+    if scene.hash() != origin.hash || !on_input.iter().all(is_of_it) {
         let place = origin.file().map(|file| file.display().to_string());
         return Err(Error::file(
             path,
@@ -100,9 +107,9 @@ fn scene(path: &Path, bake: &Bake, origin: &Origin) -> Result<Scene> {
         ));
     }
     let is_whole = |(t, on): (u32, &OnInput)| *on == OnInput::whole(t);
-    let same = bake.on_input.len() == count && (0..).zip(&bake.on_input).all(is_whole);
+    let same = on_input.len() == count && (0..).zip(on_input).all(is_whole);
     match same {
         true => Ok(scene),
-        false => Ok(scene.cut_as(&bake.on_input)),
+        false => Ok(scene.cut_as(on_input)),
     }
 }

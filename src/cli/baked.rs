@@ -78,8 +78,8 @@ impl<'a> Wanted<'a> {
         let settings = self.solve.settings()?;
         let path = Path::new(self.input);
         let (scene, bake) = if is_bake(self.input) {
-            let bake = Bake::load(path)?;
-            (self.bake_scene.of(path, &bake)?, Some(bake))
+            let (bake, scene) = self.bake_scene.load(path)?;
+            (scene, Some(bake))
         } else {
             settings.check()?;
             let quality = self.solve.quality();

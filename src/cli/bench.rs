@@ -338,7 +338,7 @@ fn run_irradiance(options: &IrradianceOptions) -> Result<()> {
         let (scene, truth) = match same {
             Some((_, scene, truth)) => (scene, truth),
             None => {
-                let scene = options.bake_scene.of(path, &bake)?;
+                let scene = options.bake_scene.of(path, &bake.origin, &bake.on_input)?;
                 let Some(truth) = irradiance::truth(&scene, &wanted, folder, &go_on)? else {
                     return Ok(());
                 };

@@ -250,9 +250,24 @@ fn watched(asked: bool) -> bool {
 
 impl DeviceOptions {
     fn open(&self) -> Result<std::sync::Arc<mesolux::vk::Device>> {
-        let device = mesolux::solver::open_device(self.device.as_deref(), watched(self.validate))?;
-        tracing::info!("device: {}", device.name());
+        let (device, ()) = self.open_beside(|| Ok(()))?;
         Ok(device)
+    }
+
+    /// Opens the device while `read` reads what is given, whose errors come first.
+    fn open_beside<T>(
+        &self,
+        read: impl FnOnce() -> Result<T>,
+    ) -> Result<(std::sync::Arc<mesolux::vk::Device>, T)> {
+        let open = || mesolux::solver::open_device(self.device.as_deref(), watched(self.validate));
+        let (given, device) = std::thread::scope(|scope| {
+            let device = scope.spawn(open);
+            (read(), device.join())
+        });
+        let given = given?;
+        let device = device.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
+        tracing::info!("device: {}", device.name());
+        Ok((device, given))
     }
 
     /// Fails if the validation layer has reported a message.

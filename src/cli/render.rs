@@ -100,11 +100,14 @@ pub fn run(options: &Options, given: &ArgMatches) -> Result<()> {
         }
         return run_reference(options);
     }
-    let opened = wanted.open()?;
-    // Errors in the views are reported before the bake.
-    let camera = options.camera.of(&opened.scene)?;
-    let cameras = options.series.cameras(&opened.scene, &camera)?;
-    let device = options.device.open()?;
+    let read = || {
+        let opened = wanted.open()?;
+        // Errors in the views are reported before the bake.
+        let camera = options.camera.of(&opened.scene)?;
+        let cameras = options.series.cameras(&opened.scene, &camera)?;
+        Ok((opened, camera, cameras))
+    };
+    let (device, (opened, camera, cameras)) = options.device.open_beside(read)?;
     let cache = opened.cache();
     let (scene, bake) = opened.baked(&device)?;
     let lighting = Lighting {

@@ -16,7 +16,6 @@ use super::render::size;
 use super::solve_options::SolveOptions;
 use super::{Builtin, DeviceOptions};
 use mesolux::bake::quality::Quality;
-use mesolux::bake::solution::Bake;
 use mesolux::error::{Error, Result};
 use mesolux::scene::builtin;
 use mesolux::solver::Visibility;
@@ -103,8 +102,7 @@ impl Reader {
     fn open(&self, input: &str) -> Result<Opened> {
         let path = Path::new(input);
         let (scene, bake, kept) = if is_bake(input) {
-            let bake = Bake::load(path)?;
-            let scene = self.bake_scene.of(path, &bake)?;
+            let (bake, scene) = self.bake_scene.load(path)?;
             let beside = beside(path);
             let kept = match beside.is_file() {
                 true => Some(Visibility::load(&beside)?),

@@ -43,23 +43,56 @@ impl Bake {
     /// A file that is not a bake, is of another version, or whose tensors differ from what was
     /// written.
     pub fn load(path: &Path) -> Result<Self> {
-        let bytes = read(path)?;
-        let file = File::new(path, &bytes)?;
-        let (sound, bake) = rayon::join(|| file.check(), || Self::of(&file));
-        sound.and(bake)
+        let (bake, ()) = Self::load_with(path, |_, _| Ok(()))?;
+        Ok(bake)
     }
 
+    /// Reads a bake, and meanwhile what `scene` makes of where it says that its scene is and where
+    /// its triangles lie in that.
+    ///
+    /// # Errors
+    /// As [`Self::load`]; then those of `scene`.
+    pub fn load_with<T: Send>(
+        path: &Path,
+        scene: impl FnOnce(&Origin, &[OnInput]) -> Result<T> + Send,
+    ) -> Result<(Self, T)> {
+        let bytes = read(path)?;
+        let file = File::new(path, &bytes)?;
+        let (origin, on_input) = match (file.origin(), file.on_input()) {
+            (Ok(origin), Ok(on_input)) => (origin, on_input),
+            (origin, on_input) => {
+                file.check()?;
+                (origin?, on_input?)
+            }
+        };
+        let (scene, (sound, bake)) = rayon::join(
+            || scene(&origin, &on_input),
+            || rayon::join(|| file.check(), || Self::of(&file)),
+        );
+        sound?;
+        let bake = Self {
+            origin,
+            on_input,
+            ..bake?
+        };
+        match bake.on_input.len() == bake.irradiance.len() {
+            true => Ok((bake, scene?)),
+            false => Err(file.bad("input_triangle", "not of as many triangles as irradiance")),
+        }
+    }
+
+    /// All but `origin` and `on_input`.
     fn of(file: &File<'_>) -> Result<Self> {
         let path = file.path;
         let irradiance = file.vectors("irradiance", &[])?;
         let bake = Self {
-            origin: file.origin()?,
+            origin: Origin::default(),
+            on_input: Vec::new(),
             irradiance_direct: file.vectors("irradiance_direct", &[])?,
             radiosity: file.vectors("radiosity", &[])?,
             corner_irradiance: file.corners("corner_irradiance", irradiance.len())?,
             corner_irradiance_direct: file.corners("corner_irradiance_direct", irradiance.len())?,
             relief: file.relief(irradiance.len())?,
-            on_input: file.on_input(irradiance.len())?,
             by_paper: file.json::<Value>("report")?["estimator"] == BY_PAPER,
             irradiance,
         };
@@ -240,15 +273,18 @@ impl<'a> File<'a> {
         }
     }
 
-    /// Where each of so many triangles lies in the input.
-    fn on_input(&self, triangles: usize) -> Result<Vec<OnInput>> {
+    /// Where each triangle lies in the input.
+    fn on_input(&self) -> Result<Vec<OnInput>> {
         let words = self.words("input_triangle")?;
         let corners = self.tensor("input_corners", Dtype::F32, &[3, 2])?;
         let corners: Vec<f64> = (corners.iter())
             .map(|&word| f64::from(f32::from_le_bytes(word)))
             .collect();
-        if words.len() != triangles || corners.len() != 6 * triangles {
-            return Err(self.bad("input_corners", "not of as many triangles as irradiance"));
+        if corners.len() != 6 * words.len() {
+            return Err(self.bad(
+                "input_corners",
+                "not of as many triangles as input_triangle",
+            ));
         }
         if !corners.iter().all(|weight| (0.0..=1.0).contains(weight)) {
             return Err(self.bad("input_corners", "a corner lies outside its triangle"));
