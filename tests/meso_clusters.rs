@@ -9,6 +9,7 @@ use mesolux::math::directions::Directions;
 use mesolux::mesh::clusters::{
     Cluster, CornerLight, Face, FaceClusters, NEAR_PARALLEL_COS, clusters,
 };
+use mesolux::mesh::corners::Corners;
 use mesolux::mesh::meso_vertices::MesoVertices;
 use mesolux::scene::Scene;
 
@@ -130,7 +131,7 @@ fn lit(scene: &Scene, directions: &Directions, towards: DVec3, strength: Vec3) -
     let light = light_on(scene, directions, |frame| {
         parallel(directions, frame, towards, strength)
     });
-    let vertices = MesoVertices::new(scene, &light.elements, &light.frames);
+    let vertices = MesoVertices::new(scene, &Corners::new(scene), &light.elements, &light.frames);
     let gathered = vertices.gather(directions, &light.frames, &light.incident_moment);
     let faces: Vec<_> = (0..light.elements.len() as u32)
         .map(|meso| Face {

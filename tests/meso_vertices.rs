@@ -6,6 +6,7 @@ use common::sheet::{light_on, parallel, sheet};
 use glam::{DVec3, Vec3};
 use mesolux::bake::solution::DirectionalLight;
 use mesolux::math::directions::Directions;
+use mesolux::mesh::corners::Corners;
 use mesolux::mesh::meso_vertices::MesoVertices;
 use mesolux::scene::Scene;
 
@@ -25,7 +26,12 @@ fn parallel_light_is_the_same_vector_in_every_frame() {
         let light = light_on(&scene, &directions, |frame| {
             parallel(&directions, frame, towards, strength)
         });
-        let vertices = MesoVertices::new(&scene, &light.elements, &light.frames);
+        let vertices = MesoVertices::new(
+            &scene,
+            &Corners::new(&scene),
+            &light.elements,
+            &light.frames,
+        );
         assert_eq!(
             vertices.frames.len(),
             81,
@@ -70,7 +76,12 @@ fn slots_of_a_plane_stay_apart() {
     for (i, moment) in light.incident_moment.iter_mut().enumerate() {
         moment.iter_mut().for_each(|c| *c *= (i / 64) as f32);
     }
-    let vertices = MesoVertices::new(&scene, &light.elements, &light.frames);
+    let vertices = MesoVertices::new(
+        &scene,
+        &Corners::new(&scene),
+        &light.elements,
+        &light.frames,
+    );
     let gathered = vertices.gather(&directions, &light.frames, &light.incident_moment);
     // The middle of the sheet lies on all four cells, two triangles of 45° or one of 90° in each.
     let middle = scene
@@ -107,7 +118,7 @@ fn seams_part_vertices() {
     let up = |_| vec![[Vec3::Z; 3]; 16];
     let whole = sheet(2, 0.0);
     let count = |scene: &Scene, light: &DirectionalLight| {
-        MesoVertices::new(scene, &light.elements, &light.frames)
+        MesoVertices::new(scene, &Corners::new(scene), &light.elements, &light.frames)
             .frames
             .len()
     };

@@ -154,13 +154,7 @@ impl Surface {
 /// Normals at the corners, `[triangle][corner]`.
 pub(super) fn smooth_normals(scene: &Scene) -> Vec<[DVec3; 3]> {
     let corners = Corners::new(scene);
-    (0..scene.triangles.len())
-        .map(|e| {
-            [0, 1, 2].map(|corner| {
-                let about = corners.smooth(e, corner);
-                let sum: DVec3 = about.map(|(t, angle)| angle * corners.normals[t]).sum();
-                sum.try_normalize().unwrap_or(corners.normals[e])
-            })
-        })
-        .collect()
+    let smooth = corners.smooth();
+    let all = 0..scene.triangles.len();
+    all.map(|e| smooth.normals(e)).collect()
 }

@@ -100,17 +100,18 @@ impl Corners {
         }
     }
 
-    fn smooth_around(&self) -> &Around {
-        self.smooth.get_or_init(|| Around::new(self, CREASE_COS))
-    }
-
-    /// The triangles about a corner of triangle `e` that continue its surface there, itself among
-    /// them, each with its angle at the vertex: with these weights the diagonals of a fan do not
-    /// matter.
-    pub fn smooth(&self, e: usize, corner: usize) -> impl Iterator<Item = (usize, f64)> {
-        let around = self.smooth_around().of(3 * e + corner).iter();
-        let around = around.map(|&c| (c as usize / 3, c as usize % 3));
-        around.map(|(other, k)| (other, self.angles[other][k]))
+    /// Smooth surfaces; found when they are first asked for.
+    pub fn smooth(&self) -> Smooth<'_> {
+        // Nothing is locked meanwhile: a thread that waits for others takes up work that may ask
+        // for them, too.
+        let around = self.smooth.get().unwrap_or_else(|| {
+            let found = Around::new(self, CREASE_COS);
+            self.smooth.get_or_init(|| found)
+        });
+        Smooth {
+            corners: self,
+            around,
+        }
     }
 
     /// The corners at a vertex of triangle `e` of triangles whose normals have this cosine at least
@@ -123,6 +124,34 @@ impl Corners {
             let other = corner as usize / 3;
             let even = || self.normals[e].dot(self.normals[other]) >= cosine;
             other == e || (!crowded && even())
+        })
+    }
+}
+
+/// Smooth surfaces, to 35°, about the corners.
+#[derive(Clone, Copy)]
+pub struct Smooth<'a> {
+    corners: &'a Corners,
+    around: &'a Around,
+}
+
+impl<'a> Smooth<'a> {
+    /// The triangles about a corner of triangle `e` that continue its surface there, itself among
+    /// them, each with its angle at the vertex: with these weights the diagonals of a fan do not
+    /// matter.
+    pub fn about(self, e: usize, corner: usize) -> impl Iterator<Item = (usize, f64)> + use<'a> {
+        let around = self.around.of(3 * e + corner).iter();
+        let around = around.map(|&c| (c as usize / 3, c as usize % 3));
+        around.map(move |(other, k)| (other, self.corners.angles[other][k]))
+    }
+
+    /// At the corners of triangle `e`, unit.
+    pub fn normals(self, e: usize) -> [DVec3; 3] {
+        let normals = &self.corners.normals;
+        [0, 1, 2].map(|corner| {
+            let about = self.about(e, corner);
+            let sum: DVec3 = about.map(|(t, angle)| normals[t] * angle).sum();
+            sum.try_normalize().unwrap_or(normals[e])
         })
     }
 }
@@ -154,9 +183,10 @@ impl Corners {
     /// Means at each corner of what triangles of its smooth surface have, `[triangle][corner]`, by
     /// their angles there.
     pub fn means<const N: usize>(&self, values: &[[Vec3; N]]) -> Vec<[[Vec3; N]; 3]> {
+        let smooth = self.smooth();
         let mean = |e: usize, corner: usize| {
             let (mut sum, mut weight) = ([DVec3::ZERO; N], 0.0);
-            for (other, angle) in self.smooth(e, corner) {
+            for (other, angle) in smooth.about(e, corner) {
                 for (sum, value) in sum.iter_mut().zip(values[other]) {
                     *sum += value.as_dvec3() * angle;
                 }
@@ -180,7 +210,7 @@ impl Corners {
     pub fn irradiance(&self, irradiance: &[Vec3], joined: Joined) -> Vec<[Vec3; 3]> {
         let of_planes;
         let around = match joined {
-            Joined::Smooth => self.smooth_around(),
+            Joined::Smooth => self.smooth().around,
             Joined::Plane => {
                 of_planes = Around::new(self, PLANE_COS);
                 &of_planes
@@ -244,4 +274,63 @@ impl Corners {
 /// [`Corners::irradiance`] of a scene's own corners.
 pub fn corner_irradiance(scene: &Scene, irradiance: &[Vec3], joined: Joined) -> Vec<[Vec3; 3]> {
     Corners::new(scene).irradiance(irradiance, joined)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::{RecvTimeoutError, channel};
+    use std::time::Duration;
+
+    use super::*;
+    use crate::scene::Triangle;
+
+    /// A strip of `n` triangles that bends by 10° at each edge.
+    fn strip(n: u32) -> Scene {
+        let vertex = |i: u32| {
+            let turn = 10_f64.to_radians() * f64::from(i / 2);
+            DVec3::new(turn.cos(), turn.sin(), f64::from(i % 2))
+        };
+        let triangle = |i: u32| Triangle {
+            vertices: match i % 2 {
+                0 => [i, i + 2, i + 1],
+                _ => [i, i + 1, i + 2],
+            },
+            ..Triangle::default()
+        };
+        Scene {
+            vertices: (0..n + 2).map(vertex).collect(),
+            triangles: (0..n).map(triangle).collect(),
+            ..Scene::default()
+        }
+    }
+
+    /// Threads of a pool that wait for smooth surfaces take up work that asks for them, too.
+    #[test]
+    fn many_threads_ask_at_once() {
+        let (done, all_done) = channel();
+        std::thread::spawn(move || {
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(32)
+                .build()
+                .unwrap();
+            let scene = strip(50_000);
+            let alone = Corners::new(&scene);
+            for _ in 0..60 {
+                let corners = Corners::new(&scene);
+                // Threads with work of another kind come back for parts of what others do.
+                let ask = |e: usize| match e % 2 {
+                    0 => assert_eq!(corners.smooth().normals(e), alone.smooth().normals(e)),
+                    _ => std::thread::sleep(Duration::from_micros(20 * (e as u64 % 7))),
+                };
+                let each = (0..64).into_par_iter().with_max_len(1);
+                pool.install(|| each.for_each(ask));
+            }
+            done.send(()).unwrap();
+        });
+        match all_done.recv_timeout(Duration::from_secs(120)) {
+            Ok(()) => {}
+            Err(RecvTimeoutError::Timeout) => panic!("threads wait for one another"),
+            Err(RecvTimeoutError::Disconnected) => panic!("the results differ"),
+        }
+    }
 }

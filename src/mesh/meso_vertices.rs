@@ -1,8 +1,6 @@
 //! Light by direction at the vertices of a surface with a relief, gathered from the elements about
 //! them: the paper's Figure 1, from slots to slots between the frames of neighbours.
 
-use std::collections::HashMap;
-
 use glam::{DVec3, Mat3A, Vec3, Vec3A};
 use rayon::prelude::*;
 
@@ -25,84 +23,118 @@ pub struct MesoVertices {
     around: Vec<Vec<(u32, f64)>>,
 }
 
+fn elements_of(around: &[(u32, f64)]) -> impl Iterator<Item = u32> {
+    around.iter().map(|&(m, _)| m)
+}
+
+/// Makes weights sum to 1.
+fn normalize(around: &mut [(u32, f64)]) {
+    let whole: f64 = around.iter().map(|a| a.1).sum();
+    let count = around.len() as f64;
+    for (_, weight) in around {
+        *weight = if whole > 0.0 {
+            *weight / whole
+        } else {
+            1.0 / count
+        };
+    }
+}
+
+/// The mean of elements' frames, made orthonormal; the axes of `own` stand in for what has none.
+fn mean_frame(
+    around: &[(u32, f64)],
+    frame: impl Fn(u32) -> [DVec3; 3],
+    own: [DVec3; 3],
+) -> [Vec3; 3] {
+    let mean = |axis: usize| -> DVec3 {
+        around
+            .iter()
+            .map(|&(n, weight)| frame(n)[axis] * weight)
+            .sum()
+    };
+    let normal = mean(2).try_normalize().unwrap_or(own[2]);
+    let tangent = mean(0);
+    let tangent = (tangent - normal * normal.dot(tangent))
+        .try_normalize()
+        .unwrap_or(own[0]);
+    let bitangent = normal.cross(tangent);
+    let bitangent = if bitangent.dot(own[1]) < 0.0 {
+        -bitangent
+    } else {
+        bitangent
+    };
+    [tangent, bitangent, normal].map(|v| v.as_vec3())
+}
+
 impl MesoVertices {
-    /// The vertices of the meso elements that are the triangles `elements` of the scene; `frames`
-    /// are their tangents, bitangents and normals. Both are `[meso element]`.
-    pub fn new(scene: &Scene, elements: &[u32], frames: &[[Vec3; 3]]) -> Self {
-        let meso: HashMap<usize, u32> =
-            (0..).zip(elements).map(|(m, &e)| (e as usize, m)).collect();
-        let neighbours = Corners::new(scene);
+    /// The vertices of the meso elements that are the triangles `elements` of the scene with these
+    /// `neighbours`; `frames` are their tangents, bitangents and normals. Both are
+    /// `[meso element]`.
+    pub fn new(
+        scene: &Scene,
+        neighbours: &Corners,
+        elements: &[u32],
+        frames: &[[Vec3; 3]],
+    ) -> Self {
+        let mut meso = vec![None; scene.triangles.len()];
+        for (m, &e) in (0..).zip(elements) {
+            meso[e as usize] = Some(m);
+        }
+        let smooth = neighbours.smooth();
         let frame = |m: u32| frames[m as usize].map(Vec3::as_dvec3);
         let turn = |[t, b, n]: [DVec3; 3]| t.cross(b).dot(n) > 0.0;
-        let mut known: HashMap<(u32, Vec<u32>), u32> = HashMap::new();
-        let mut vertices = Self {
-            frames: Vec::new(),
-            corners: Vec::with_capacity(elements.len()),
-            around: Vec::new(),
-        };
-        for (m, &e) in (0_u32..).zip(elements) {
-            let triangle = &scene.triangles[e as usize];
-            let own = frame(m);
-            let corners = [0, 1, 2].map(|corner| {
-                let vertex = triangle.vertices[corner];
-                let around: Vec<(u32, f64)> = neighbours
-                    .smooth(e as usize, corner)
-                    .filter_map(|(other, angle)| Some((*meso.get(&other)?, other, angle)))
-                    .filter(|&(n, other, _)| {
-                        let theirs = frame(n);
-                        n == m
-                            || (scene.triangles[other].material == triangle.material
-                                && theirs[0].dot(own[0]) >= SEAM_COS
-                                && turn(theirs) == turn(own))
-                    })
-                    .map(|(n, _, angle)| (n, angle))
-                    .collect();
-                let key = (vertex, around.iter().map(|a| a.0).collect());
-                *known
-                    .entry(key)
-                    .or_insert_with(|| vertices.push(around, frame, own))
-            });
-            vertices.corners.push(corners);
-        }
-        vertices
-    }
-
-    fn push(
-        &mut self,
-        mut around: Vec<(u32, f64)>,
-        frame: impl Fn(u32) -> [DVec3; 3],
-        own: [DVec3; 3],
-    ) -> u32 {
-        let whole: f64 = around.iter().map(|a| a.1).sum();
-        let count = around.len() as f64;
-        for (_, weight) in &mut around {
-            *weight = if whole > 0.0 {
-                *weight / whole
-            } else {
-                1.0 / count
+        let about = |(m, &e): (usize, &u32)| {
+            let material = scene.triangles[e as usize].material;
+            let (m, own) = (m as u32, frame(m as u32));
+            let continues = |&(n, other, _): &(u32, usize, f64)| {
+                let theirs = frame(n);
+                n == m
+                    || (scene.triangles[other].material == material
+                        && theirs[0].dot(own[0]) >= SEAM_COS
+                        && turn(theirs) == turn(own))
             };
+            [0, 1, 2].map(|corner| {
+                let all = smooth.about(e as usize, corner);
+                let all = all.filter_map(|(other, angle)| Some((meso[other]?, other, angle)));
+                all.filter(continues)
+                    .map(|(n, _, angle)| (n, angle))
+                    .collect()
+            })
+        };
+        let found: Vec<[Vec<(u32, f64)>; 3]> = elements.par_iter().enumerate().map(about).collect();
+        // Of each vertex of the scene.
+        let mut known: Vec<Vec<u32>> = vec![Vec::new(); scene.vertices.len()];
+        let mut around: Vec<Vec<(u32, f64)>> = Vec::new();
+        // Whose axes stand in for what has no mean, `[vertex]`.
+        let mut first = Vec::new();
+        let mut index = |vertex: u32, m: u32, found: Vec<(u32, f64)>| {
+            let known = &mut known[vertex as usize];
+            let same = |&&v: &&u32| elements_of(&around[v as usize]).eq(elements_of(&found));
+            if let Some(&v) = known.iter().find(same) {
+                return v;
+            }
+            let v = around.len() as u32;
+            known.push(v);
+            around.push(found);
+            first.push(m);
+            v
+        };
+        let corners = (0_u32..).zip(elements).zip(found);
+        let corners: Vec<[u32; 3]> = corners
+            .map(|((m, &e), [a, b, c])| {
+                let [at_a, at_b, at_c] = scene.triangles[e as usize].vertices;
+                [index(at_a, m, a), index(at_b, m, b), index(at_c, m, c)]
+            })
+            .collect();
+        around.par_iter_mut().for_each(|around| normalize(around));
+        let frames = around.par_iter().zip(&first);
+        Self {
+            frames: frames
+                .map(|(around, &m)| mean_frame(around, frame, frame(m)))
+                .collect(),
+            corners,
+            around,
         }
-        let mean = |axis: usize| -> DVec3 {
-            around
-                .iter()
-                .map(|&(n, weight)| frame(n)[axis] * weight)
-                .sum()
-        };
-        let normal = mean(2).try_normalize().unwrap_or(own[2]);
-        let tangent = mean(0);
-        let tangent = (tangent - normal * normal.dot(tangent))
-            .try_normalize()
-            .unwrap_or(own[0]);
-        let bitangent = normal.cross(tangent);
-        let bitangent = if bitangent.dot(own[1]) < 0.0 {
-            -bitangent
-        } else {
-            bitangent
-        };
-        self.frames
-            .push([tangent, bitangent, normal].map(|v| v.as_vec3()));
-        self.around.push(around);
-        self.frames.len() as u32 - 1
     }
 
     /// Weighted means at the vertices, `[vertex][slot]`, of the elements' `values`,

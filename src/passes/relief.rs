@@ -7,7 +7,7 @@ use glam::Vec4;
 
 use super::buffers::upload;
 use super::relief_hits::{Hits, ShapeBuffers};
-use super::shade::Shade;
+use super::shade::Passes;
 use super::shaders::relief::{Bindings, SHADER};
 use super::shadow_rays::{LightBuffers, LightKinds};
 use super::types::ParallelLight;
@@ -80,18 +80,18 @@ pub struct Relief {
 }
 
 impl Relief {
-    /// Draws into the targets of `shade`.
+    /// Draws into the targets of [`super::shade`].
     ///
     /// # Errors
     /// A device that fails.
-    pub fn new(device: &Arc<Device>, shade: &Shade, kind: Kind) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, passes: &Passes, kind: Kind) -> Result<Self> {
         let lit = [kind.factored, kind.sharp, kind.clustered, kind.lights.beams].map(u32::from);
         let last = [kind.lights.ways, kind.borders.into(), kind.levels.into()];
         let constants = [&[kind.shading, kind.view], &lit[..], &last].concat();
         Ok(Self {
             pipeline: GraphicsPipeline::new(
                 device,
-                shade.pass(),
+                &passes.first,
                 &GraphicsState {
                     name: "relief",
                     shaders: &SHADER,

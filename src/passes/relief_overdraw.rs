@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::pass_parts::PartedPass;
 use super::relief_hits::{self, Drawn, ShapeBuffers};
-use super::shade::Shade;
+use super::shade::Passes;
 use super::shaders::relief_overdraw::SHADER;
 use crate::error::Result;
 use crate::vk::{Blending, DescriptorSet, Device, GraphicsPipeline, GraphicsState};
@@ -15,18 +15,19 @@ pub struct ReliefOverdraw {
 }
 
 impl ReliefOverdraw {
-    /// Draws into the targets of `shade`; `shading` is one of SHADING_… of [`crate::constants`].
+    /// Draws into the targets of [`super::shade`]; `shading` is one of SHADING_… of
+    /// [`crate::constants`].
     ///
     /// # Errors
     /// A device that fails.
-    pub fn new(device: &Arc<Device>, shade: &Shade, shading: u32) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, passes: &Passes, shading: u32) -> Result<Self> {
         let constants = [shading];
         let state = GraphicsState {
             blending: Blending::Sum,
             ..relief_hits::prisms("relief overdraw", &SHADER, &constants)
         };
         Ok(Self {
-            pipeline: GraphicsPipeline::new(device, shade.pass(), &state)?,
+            pipeline: GraphicsPipeline::new(device, &passes.first, &state)?,
         })
     }
 

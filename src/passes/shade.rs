@@ -86,12 +86,32 @@ pub struct Draw<'a> {
     pub parameters: Parameters,
 }
 
-pub struct Shade {
-    pass: RenderPass,
+/// Render passes into a [`Target`].
+#[derive(Clone)]
+pub struct Passes {
+    pub(super) first: RenderPass,
     /// The same over depths that another pass has drawn.
     over_depths: RenderPass,
     /// For the parts after the first.
     further: RenderPass,
+}
+
+impl Passes {
+    /// # Errors
+    /// A device that fails.
+    pub fn new(device: &Arc<Device>) -> Result<Self> {
+        let colour = Attachment::copied(FORMAT);
+        let [first, further] = RenderPass::in_parts(device, "shade", colour)?;
+        Ok(Self {
+            over_depths: RenderPass::over_depths(device, "shade", colour)?,
+            first,
+            further,
+        })
+    }
+}
+
+pub struct Shade {
+    passes: Passes,
     /// `[LIT_…]`
     lit: [GraphicsPipeline; 3],
     /// For draws that add; None unless asked for.
@@ -117,10 +137,12 @@ impl Shade {
     ///
     /// # Errors
     /// A device that fails.
-    pub fn new(device: &Arc<Device>, adds: bool, lights: LightKinds) -> Result<Self> {
-        let colour = Attachment::copied(FORMAT);
-        let [pass, further] = RenderPass::in_parts(device, "shade", colour)?;
-        let over_depths = RenderPass::over_depths(device, "shade", colour)?;
+    pub fn new(
+        device: &Arc<Device>,
+        passes: &Passes,
+        adds: bool,
+        lights: LightKinds,
+    ) -> Result<Self> {
         let attribute = |format, offset: usize| VertexAttribute {
             format,
             offset: offset as u32,
@@ -154,20 +176,14 @@ impl Shade {
                 constants: &constants,
                 ..state
             };
-            GraphicsPipeline::new(device, &pass, &state)
+            GraphicsPipeline::new(device, &passes.first, &state)
         };
-        let adding = adds.then(|| GraphicsPipeline::new(device, &pass, &added));
+        let adding = adds.then(|| GraphicsPipeline::new(device, &passes.first, &added));
         Ok(Self {
             lit: [lit(LIT_NOT)?, lit(LIT_OPEN)?, lit(LIT_IN_PARTS)?],
             adding: adding.transpose()?,
-            over_depths,
-            further,
-            pass,
+            passes: passes.clone(),
         })
-    }
-
-    pub(super) fn pass(&self) -> &RenderPass {
-        &self.pass
     }
 
     /// Binds the texture of a material, the light points with what casts shadows, and what they
@@ -213,11 +229,11 @@ impl Shade {
     ) {
         let clear = [0, 0, 0, mesh.background.to_bits()];
         let pass = match mesh.over_depths {
-            true => &self.over_depths,
-            false => &self.pass,
+            true => &self.passes.over_depths,
+            false => &self.passes.first,
         };
         let parts = PassParts {
-            passes: [pass, &self.further],
+            passes: [pass, &self.passes.further],
             framebuffer: &target.framebuffer,
             size: mesh.size,
             clear,
@@ -273,7 +289,7 @@ impl Target {
         Ok(Self {
             width,
             height,
-            framebuffer: Framebuffer::new(device, "shade", &shade.pass, &colour, &depth)?,
+            framebuffer: Framebuffer::new(device, "shade", &shade.passes.first, &colour, &depth)?,
             colour,
             depth,
             readback: readback("shade readback", samples * TEXEL_BYTES)?,

@@ -33,19 +33,49 @@ enum DrawnAs {
     Far([Vec3; 3]),
 }
 
-/// Decides how each triangle with relief is drawn.
-pub struct Sorting<'a> {
-    pub seen: &'a SeenScene<'a>,
+/// The triangles with relief, by how an eye sees them.
+pub struct SortedRelief<'a> {
     pub light: &'a DirectionalLight,
     pub kept: &'a ReliefScene,
-    /// Of the relief's base, `[vertex of the scene]`.
-    pub normals: &'a [DVec3],
-    pub exits: &'a Exits<'a>,
+    pub exits: Exits<'a>,
+    /// Meso elements that are drawn as prisms, in order of their materials.
+    pub prisms: Vec<usize>,
+    pub flat: FlatRelief,
+}
+
+impl<'a> SortedRelief<'a> {
+    /// None where no relief is drawn by rays or its response.
+    pub fn new(seen: &SeenScene<'a>, kept: Option<&'a ReliefScene>) -> Option<Self> {
+        let ((light, _), kept) = seen.lighting.relief().zip(kept)?;
+        let exits = Exits::new(seen.lighting, seen.scene, light, kept);
+        let sorting = Sorting {
+            seen,
+            light,
+            kept,
+            exits: &exits,
+        };
+        let (flat, prisms) = sorting.sort();
+        Some(Self {
+            light,
+            kept,
+            exits,
+            prisms,
+            flat,
+        })
+    }
+}
+
+/// Decides how each triangle with relief is drawn.
+struct Sorting<'a> {
+    seen: &'a SeenScene<'a>,
+    light: &'a DirectionalLight,
+    kept: &'a ReliefScene,
+    exits: &'a Exits<'a>,
 }
 
 impl Sorting<'_> {
     /// The flat ones, and the meso elements that are drawn as prisms, in order of their materials.
-    pub fn sort(&self) -> (FlatRelief, Vec<usize>) {
+    fn sort(&self) -> (FlatRelief, Vec<usize>) {
         let scene = self.seen.scene;
         let mut flat = FlatRelief {
             prism: vec![false; scene.triangles.len()],
@@ -89,21 +119,20 @@ impl Sorting<'_> {
         let steepest = self.kept.surfaces.steepest[surface as usize];
         let away = |&v: &u32| {
             let way = (scene.vertices[v as usize] - projection.eye).normalize_or_zero();
-            way.dot(self.normals[v as usize]) > steepest
+            way.dot(self.kept.normals[v as usize]) > steepest
         };
         let range = &self.kept.surfaces.ranges[surface as usize];
-        let hull = [range.lowest, range.highest].map(|height| {
-            let raised =
-                |v| scene.vertices[v as usize] + self.normals[v as usize] * range.above(height);
-            triangle.vertices.map(raised)
-        });
+        let at_height = |height: f64| {
+            let above = range.above(height);
+            let place = |v| scene.vertices[v as usize] + self.kept.normals[v as usize] * above;
+            triangle.vertices.map(place)
+        };
+        let hull = [range.lowest, range.highest].map(at_height);
         if projection.misses(hull.as_flattened()) {
             return Some(DrawnAs::Unseen);
         }
         if triangle.vertices.iter().all(away) {
-            let lowest = range.above(range.lowest);
-            let lowered = |v| scene.vertices[v as usize] + self.normals[v as usize] * lowest;
-            return Some(DrawnAs::Away(triangle.vertices.map(lowered)));
+            return Some(DrawnAs::Away(at_height(range.lowest)));
         }
         let widest = f64::from(WIDEST_SAMPLE) / f64::from(projection.sample_angle(samples));
         let averaged = lighting.shading.is_displaced() && lighting.show == Show::Shaded;

@@ -50,7 +50,7 @@ pub(super) fn sun_disc(scene: &Scene, sun: &Sun) -> Vec<[DVec3; 3]> {
 const MOST_WAYS: usize = 4;
 
 /// What shaders are made for where these lights are drawn sharply.
-pub(super) fn light_kinds(scene: &Scene, lights: &LightScene) -> LightKinds {
+pub(super) fn light_kinds(scene: &Scene, emitters: Option<&Emitters>) -> LightKinds {
     let emits = |t: &Triangle| scene.materials[t.material as usize].emits();
     let most = match scene.lights.suns.is_empty() && !scene.triangles.iter().any(emits) {
         true => scene.lights.points.len().clamp(1, MOST_WAYS),
@@ -59,7 +59,7 @@ pub(super) fn light_kinds(scene: &Scene, lights: &LightScene) -> LightKinds {
     LightKinds {
         beams: scene.lights.have_beams(),
         ways: most as u32,
-        points: (lights.emitters.as_ref()).is_none_or(|lit| lit.light_by_points(scene)),
+        points: emitters.is_none_or(|lit| lit.light_by_points(scene)),
     }
 }
 
@@ -100,20 +100,22 @@ pub struct LightScene {
     casters: Vec<Merged<bool>>,
 }
 
+/// What shines in a scene; None where no light is drawn sharply.
+pub(super) fn sharp_emitters(scene: &Scene, lighting: &Lighting<'_>) -> Option<Emitters> {
+    let emitters = lighting.sharp().then(|| Emitters::new(scene));
+    emitters.filter(|emitters| !emitters.points.is_empty())
+}
+
 impl LightScene {
-    pub fn new(scene: &Scene, lighting: &Lighting<'_>) -> Self {
-        if !lighting.sharp() {
-            return Self::default();
-        }
-        let emitters = Emitters::new(scene);
-        if emitters.points.is_empty() {
+    pub fn new(scene: &Scene, lighting: &Lighting<'_>, emitters: Option<Emitters>) -> Self {
+        if emitters.is_none() {
             return Self::default();
         }
         let relief_is_drawn = lighting.relief().is_some();
         let has_relief = |t: &Triangle| scene.materials[t.material as usize].has_relief();
         let kind = |i: usize| Some(relief_is_drawn && has_relief(&scene.triangles[i]));
         Self {
-            emitters: Some(emitters),
+            emitters,
             casters: merged(scene, kind),
         }
     }

@@ -10,19 +10,19 @@ use rayon::prelude::*;
 
 use super::blocks::Blocks;
 use super::flat_relief::FlatRelief;
+use super::mesh_scene::MeshScene;
 use super::seen_scene::SeenScene;
 use super::shafts::Shafts;
 use super::textures::Bound;
-use super::{Cuts, Joined, Light, Lighting, Show, corner_irradiance, parts};
+use super::{Cuts, Light, Lighting, parts};
 use crate::constants::{LIT_IN_PARTS, LIT_NOT, LIT_OPEN, PART_HIDDEN, PART_OPEN, PART_UNSURE};
 use crate::error::Result;
-use crate::mesh::corners::Corners;
 use crate::passes::buffers::upload;
 use crate::passes::shade::{Draw, LitBuffers, Parameters, Vertex};
 use crate::passes::shadow_rays::LightCounts;
 use crate::passes::types::LitTriangle;
 use crate::picture::{NEAR, Projection, Tile};
-use crate::scene::{Material, Scene};
+use crate::scene::Material;
 use crate::vk::{Buffer, BufferUse, Device};
 
 /// The scene's fronts by material, then its backs.
@@ -82,6 +82,7 @@ impl Mesh {
     pub fn new(
         device: &Arc<Device>,
         seen: &SeenScene<'_>,
+        kept: &MeshScene,
         rest: Option<&FlatRelief>,
         shafts: Option<&Shafts>,
     ) -> Result<Self> {
@@ -92,18 +93,6 @@ impl Mesh {
             ..
         } = *seen;
         let far = |e: usize| rest.and_then(|rest| rest.far.get(&e));
-        let smooth = match lighting.show {
-            // L = ρ · E / π is to be what is shown.
-            Show::Albedo => vec![[Vec3::splat(PI); 3]; scene.triangles.len()],
-            Show::Height => vec![[Vec3::splat(0.5 * PI); 3]; scene.triangles.len()],
-            Show::Normal => {
-                let neighbours = Corners::new(scene);
-                let coded = |n: DVec3| (PI * 0.5) * (n.as_vec3() + 1.0);
-                let of = |e| smooth_normals(&neighbours, e).map(coded);
-                (0..scene.triangles.len()).into_par_iter().map(of).collect()
-            }
-            _ => corner_irradiance(scene, &lighting.baked(), Joined::Smooth),
-        };
         // The visible side is decided here in f64: a rasteriser decides it from rounded corners,
         // wrongly for slivers.
         let mut order: Vec<_> = scene
@@ -142,7 +131,7 @@ impl Mesh {
                 let light = match kind {
                     // L = ρ · E / π with the emission for ρ.
                     Kind::Glow(_) => [Vec3::splat(PI); 3],
-                    _ => far(e).copied().unwrap_or(smooth[e]),
+                    _ => far(e).copied().unwrap_or(kept.light[e]),
                 };
                 let triangle = &scene.triangles[e];
                 let away = rest.and_then(|rest| rest.away.get(&e));
@@ -155,7 +144,7 @@ impl Mesh {
             })
             .collect();
         let mut lit = shafts.map_or_else(Lit::default, |shafts| {
-            let lit = lit_triangles(scene, &order, &vertices);
+            let lit = lit_triangles(kept, &order, &vertices);
             let pixel = projection.sample_angle(1);
             Lit::new(lit, &order, shafts, pixel.into())
         });
@@ -330,17 +319,15 @@ const STATES_IN_WORD: usize = 16;
 const ABOVE: f32 = 1.0 / (1 << 18) as f32;
 
 /// `vertices` are those of the triangles in `order`, three each.
-fn lit_triangles(scene: &Scene, order: &[Drawn], vertices: &[Vertex]) -> Vec<LitTriangle> {
-    let neighbours = Corners::new(scene);
+fn lit_triangles(kept: &MeshScene, order: &[Drawn], vertices: &[Vertex]) -> Vec<LitTriangle> {
     order
         .par_iter()
         .zip(vertices.par_chunks(3))
         .map(|(&Drawn { triangle: e, .. }, drawn)| {
-            let plane = neighbours.normals[e];
-            let normals = smooth_normals(&neighbours, e);
-            let [normal_a, normal_b, normal_c] = normals.map(|normal| normal.as_vec3());
+            let normals = &kept.lit[e];
             let [a, b, c] = [0, 1, 2].map(|k| drawn[k].position);
             let furthest = a.abs().max(b.abs()).max(c.abs()).max_element();
+            let [normal_a, normal_b, normal_c] = normals.corners;
             LitTriangle {
                 a,
                 b,
@@ -348,21 +335,12 @@ fn lit_triangles(scene: &Scene, order: &[Drawn], vertices: &[Vertex]) -> Vec<Lit
                 normal_a,
                 normal_b,
                 normal_c,
-                plane: plane.as_vec3(),
+                plane: normals.plane,
                 above: ABOVE * furthest,
                 ..LitTriangle::zeroed()
             }
         })
         .collect()
-}
-
-/// Of a triangle's corners, unit.
-fn smooth_normals(neighbours: &Corners, e: usize) -> [DVec3; 3] {
-    [0, 1, 2].map(|corner| {
-        let about = neighbours.smooth(e, corner);
-        let sum: DVec3 = about.map(|(t, angle)| neighbours.normals[t] * angle).sum();
-        sum.try_normalize().unwrap_or(neighbours.normals[e])
-    })
 }
 
 fn shows_emission(lighting: &Lighting<'_>) -> bool {

@@ -9,6 +9,7 @@
 //! ```
 
 mod background;
+mod beside;
 mod blocks;
 mod compare;
 mod convex;
@@ -20,6 +21,7 @@ mod gathered;
 mod lighting;
 mod lights;
 mod mesh;
+mod mesh_scene;
 mod overdraw;
 mod parts;
 mod relief;

@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use super::ReliefShading;
+use super::flat_relief::SortedRelief;
 use super::mesh::parameters;
 use super::relief_mesh::{PrismRange, ReliefMesh};
-use super::relief_scene::{ReliefPasses, ReliefScene};
+use super::relief_scene::ReliefPasses;
 use super::seen_scene::SeenScene;
 use super::shafts::Shafts;
 use super::textures::Textures;
@@ -35,29 +36,25 @@ pub struct ReliefTarget {
 }
 
 impl Relief {
-    /// None where no relief is drawn by rays or its response.
-    ///
     /// # Errors
     /// A device without the memory.
     pub fn new(
         device: &Arc<Device>,
         seen: &SeenScene<'_>,
-        kept: Option<&ReliefScene>,
+        sorted: &SortedRelief<'_>,
         shafts: Option<&Shafts>,
-    ) -> Result<Option<Self>> {
-        let Some(((light, _), kept)) = seen.lighting.relief().zip(kept) else {
-            return Ok(None);
-        };
-        let mesh = ReliefMesh::new(device, seen, light, kept, shafts)?;
+    ) -> Result<Self> {
+        let kept = sorted.kept;
+        let mesh = ReliefMesh::new(device, seen, sorted, shafts)?;
         let set = match &*kept.passes {
             ReliefPasses::Shaded(hits, _) => hits.bind(&mesh.shape)?,
             ReliefPasses::Overdraw(overdraw) => overdraw.bind(&mesh.shape)?,
         };
-        Ok(Some(Self {
+        Ok(Self {
             passes: Arc::clone(&kept.passes),
             mesh,
             set,
-        }))
+        })
     }
 
     /// What the relief of a tile needs beside the target of the tile.

@@ -4,12 +4,12 @@
 use std::sync::Arc;
 
 use bytemuck::Zeroable;
-use glam::{DVec2, DVec3, Vec3, Vec4};
+use glam::{DVec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::blocks::Blocks;
-use super::flat_relief::{FlatRelief, Sorting};
-use super::relief_light::{Exits, Incident, LightVertices, difference};
+use super::flat_relief::SortedRelief;
+use super::relief_light::{Incident, LightVertices, difference};
 use super::relief_scene::ReliefScene;
 use super::seen_scene::SeenScene;
 use super::shaft_starts::Starts;
@@ -25,7 +25,7 @@ use crate::passes::relief::{Buffers, Lights};
 use crate::passes::relief_hits::{Shape, ShapeBuffers};
 use crate::passes::types::{ParallelLight, Prism};
 use crate::picture::Tile;
-use crate::scene::{Triangle, relief_normals};
+use crate::scene::Triangle;
 use crate::vk::Device;
 
 /// The relief of a scene on the device.
@@ -37,7 +37,6 @@ pub struct ReliefMesh {
     /// Of prisms.
     pub blocks: Blocks,
     pub prism_count: u32,
-    pub rest: FlatRelief,
     /// Number of prisms in each state, `[PART_…]`.
     pub states: [usize; 3],
 }
@@ -50,30 +49,20 @@ pub struct PrismRange {
 }
 
 impl ReliefMesh {
-    /// Prisms over those triangles of `light` that the eye sees from near and from the front; what
-    /// `shafts` show to be open or hidden follows no shadow rays past other surfaces.
+    /// Prisms over what was sorted as such; those that `shafts` show to be open or hidden follow no
+    /// shadow rays past other surfaces.
     ///
     /// # Errors
     /// A device without the memory.
     pub fn new(
         device: &Arc<Device>,
         seen: &SeenScene<'_>,
-        light: &DirectionalLight,
-        kept: &ReliefScene,
+        sorted: &SortedRelief<'_>,
         shafts: Option<&Shafts>,
     ) -> Result<Self> {
         let (scene, lighting) = (seen.scene, seen.lighting);
+        let (light, kept, drawn) = (sorted.light, sorted.kept, &sorted.prisms);
         let directions = &kept.directions;
-        let normals = relief_normals(scene);
-        let exits = Exits::new(lighting, scene, light, kept);
-        let sorting = Sorting {
-            seen,
-            light,
-            kept,
-            normals: &normals,
-            exits: &exits,
-        };
-        let (rest, drawn) = sorting.sort();
         let triangle = |m: usize| &scene.triangles[light.elements[m] as usize];
         let faces: Vec<Face> = drawn
             .iter()
@@ -91,7 +80,6 @@ impl ReliefMesh {
             seen,
             light,
             kept,
-            normals: &normals,
             shown: (lighting.show == Show::Slots).then(|| {
                 let (all, direct) = (&light.incident_moment, &light.incident_moment_direct);
                 lighting.part.of(all, direct, difference)
@@ -129,7 +117,7 @@ impl ReliefMesh {
             && lighting.shading.is_displaced()
             && list.iter().any(|prism| may_be_wide(prism, seen));
         let sent = match averaged {
-            true => prisms.lit.exits(&exits, directions.count()),
+            true => prisms.lit.exits(&sorted.exits, directions.count()),
             false => Vec::new(),
         };
         let lights = Lights {
@@ -147,7 +135,6 @@ impl ReliefMesh {
             ranges: ranges(drawn.iter().map(|&m| triangle(m).material)),
             blocks: Blocks::new(seen.projection, &corners, 6),
             prism_count: list.len() as u32,
-            rest,
             states,
         })
     }
@@ -202,8 +189,6 @@ struct PrismBuilder<'a> {
     seen: &'a SeenScene<'a>,
     light: &'a DirectionalLight,
     kept: &'a ReliefScene,
-    /// Of the relief's base, `[vertex of the scene]`.
-    normals: &'a [DVec3],
     /// Moments of the part of the light that is shown, `[meso element][slot][colour]`, where slots
     /// are.
     shown: Option<Vec<[Vec3; 3]>>,
@@ -225,7 +210,7 @@ impl PrismBuilder<'_> {
         let texel = self.kept.tiles[surface as usize].size / surfaces.size(surface);
         let place = |k: usize, height: f64| {
             let vertex = triangle.vertices[face.corners[k]] as usize;
-            let at = scene.vertices[vertex] + self.normals[vertex] * range.above(height);
+            let at = scene.vertices[vertex] + self.kept.normals[vertex] * range.above(height);
             ((at - projection.eye) / projection.unit).as_vec3()
         };
         let low = [0, 1, 2].map(|k| place(k, range.lowest));

@@ -3,14 +3,16 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
+use super::beside::beside;
 use super::relief_borders::{Borders, Relief as OfTriangle};
 use super::relief_surfaces::Surfaces;
 use super::{Light, Lighting, ReliefShading, Show};
 use crate::bake::marcher;
 use crate::error::Result;
 use crate::math::directions::Directions;
+use crate::mesh::corners::Corners;
 use crate::mesh::elements::Elements;
 use crate::mesh::meso_vertices::MesoVertices;
 use crate::mesh::tiles::{Tile, tiles};
@@ -18,9 +20,9 @@ use crate::meso::{FACTOR_ERROR, Factors, KnownFactors, visibility};
 use crate::passes::relief::{Kind, Relief};
 use crate::passes::relief_hits::ReliefHits;
 use crate::passes::relief_overdraw::ReliefOverdraw;
-use crate::passes::shade::Shade;
+use crate::passes::shade::Passes;
 use crate::passes::shadow_rays::LightKinds;
-use crate::scene::Scene;
+use crate::scene::{Scene, relief_normals};
 use crate::vk::Device;
 
 /// How relief is drawn.
@@ -43,6 +45,8 @@ pub struct ReliefScene {
     pub factors: Vec<Arc<Factors>>,
     pub surfaces: Surfaces,
     pub vertices: MesoVertices,
+    /// Of the relief's base, `[vertex of the scene]`.
+    pub normals: Vec<DVec3>,
     /// Moments at the vertices, `[vertex][slot][colour]`: all of the light and what is direct.
     pub all: Vec<[Vec3; 3]>,
     pub direct: Vec<[Vec3; 3]>,
@@ -55,8 +59,8 @@ impl ReliefScene {
     /// As [`super::render`].
     pub fn new(
         device: &Arc<Device>,
-        shade: &Shade,
-        scene: &Scene,
+        passes: &Passes,
+        (scene, neighbours): (&Scene, &Corners),
         lighting: &Lighting<'_>,
         lights: LightKinds,
     ) -> Result<Option<Self>> {
@@ -86,7 +90,7 @@ impl ReliefScene {
                 FACTOR_ERROR,
             ))
         })?;
-        let vertices = MesoVertices::new(scene, &light.elements, &light.frames);
+        let vertices = MesoVertices::new(scene, neighbours, &light.elements, &light.frames);
         let sharp = lighting.sharp() && lighting.shading == ReliefShading::Factored;
         let clustered = lighting.shading == ReliefShading::Clusters;
         let skipped = lighting.skip_open && (sharp || clustered);
@@ -111,19 +115,28 @@ impl ReliefScene {
             levels: clustered || surfaces.long_ways,
         };
         let gather = |moments| vertices.gather(&directions, &light.frames, moments);
-        Ok(Some(Self {
-            passes: Arc::new(match lighting.show {
+        let make_passes = || -> Result<ReliefPasses> {
+            Ok(match lighting.show {
                 Show::Overdraw => {
-                    ReliefPasses::Overdraw(ReliefOverdraw::new(device, shade, shading)?)
+                    ReliefPasses::Overdraw(ReliefOverdraw::new(device, passes, shading)?)
                 }
                 _ => ReliefPasses::Shaded(
                     ReliefHits::new(device, shading)?,
-                    Relief::new(device, shade, kind)?,
+                    Relief::new(device, passes, kind)?,
                 ),
-            }),
+            })
+        };
+        let gathered = || {
+            let [all, direct] = [&light.incident_moment, &light.incident_moment_direct];
+            (gather(all), gather(direct))
+        };
+        let ((all, direct), passes) = beside(gathered, make_passes);
+        Ok(Some(Self {
+            passes: Arc::new(passes?),
+            normals: relief_normals(scene),
             surfaces,
-            all: gather(&light.incident_moment),
-            direct: gather(&light.incident_moment_direct),
+            all,
+            direct,
             directions,
             borders,
             tiles,

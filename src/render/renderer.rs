@@ -3,17 +3,21 @@
 use std::sync::Arc;
 
 use super::background::{BEHIND, draw_sky};
+use super::beside::beside;
+use super::flat_relief::SortedRelief;
 use super::gathered::Gathered;
-use super::lights::{LightScene, light_buffers, light_kinds};
+use super::lights::{LightScene, light_buffers, light_kinds, sharp_emitters};
 use super::mesh::Mesh;
+use super::mesh_scene::MeshScene;
 use super::relief::{Relief, ReliefTarget};
 use super::relief_scene::ReliefScene;
 use super::seen_scene::SeenScene;
 use super::textures::{Bound, Textures};
 use super::{Lighting, Overdraw, Show, View};
 use crate::error::Result;
+use crate::mesh::corners::Corners;
 use crate::passes::pass_parts::PART_TRIANGLES;
-use crate::passes::shade::{self, Shade, Target};
+use crate::passes::shade::{self, Passes, Shade, Target};
 use crate::passes::shadow_rays::LightBuffers;
 use crate::picture::{Light, Picture, Projection, SAMPLES, Tile};
 use crate::scene::Scene;
@@ -65,10 +69,53 @@ struct Fixed<'a> {
     shade: Shade,
     textures: Textures,
     relief: Option<ReliefScene>,
+    mesh: MeshScene,
     light_scene: LightScene,
 }
 
-impl Fixed<'_> {
+impl<'a> Fixed<'a> {
+    fn new(
+        device: &Arc<Device>,
+        scene: &'a Scene,
+        lighting: Lighting<'a>,
+        samples: u32,
+    ) -> Result<Self> {
+        let emitters = sharp_emitters(scene, &lighting);
+        let is_sharp = emitters.is_some();
+        let lights = light_kinds(scene, emitters.as_ref());
+        let passes = Passes::new(device)?;
+        let pipelines = || {
+            let glows = scene.materials.iter().any(|m| m.map_ke.is_some());
+            let shade = Shade::new(device, &passes, glows, lights)?;
+            Ok((shade, Textures::new(device, scene)?))
+        };
+        let surfaces = || {
+            let neighbours = Corners::new(scene);
+            let (of_relief, mesh) = beside(
+                || ReliefScene::new(device, &passes, (scene, &neighbours), &lighting, lights),
+                || MeshScene::new(scene, &lighting, &neighbours, is_sharp),
+            );
+            Ok((of_relief?, mesh))
+        };
+        let (surfaces, others) = beside(surfaces, || {
+            (pipelines(), LightScene::new(scene, &lighting, emitters))
+        });
+        let (relief, mesh) = surfaces?;
+        let (pipelines, light_scene) = others;
+        let (shade, textures) = pipelines?;
+        Ok(Self {
+            device: Arc::clone(device),
+            scene,
+            lighting,
+            samples,
+            shade,
+            textures,
+            relief,
+            mesh,
+            light_scene,
+        })
+    }
+
     /// The sky, if the picture shows it.
     fn sky(&self) -> Option<&Sky> {
         let shows = self.lighting.show == Show::Shaded && self.lighting.part != Light::Direct;
@@ -105,16 +152,23 @@ impl ViewParts {
             cuts: Cuts::default(),
         };
         let (lights, shafts) = light_buffers(device, &seen, &fixed.light_scene)?;
-        let kept = fixed.relief.as_ref();
-        let relief = Relief::new(device, &seen, kept, shafts.as_ref())?;
-        let rest = relief.as_ref().map(|r| &r.mesh.rest);
-        let mesh = Mesh::new(device, &seen, rest, shafts.as_ref())?;
+        let shafts = shafts.as_ref();
+        let sorted = SortedRelief::new(&seen, fixed.relief.as_ref());
+        let flat = sorted.as_ref().map(|relief| &relief.flat);
+        let (relief, mesh) = beside(
+            || {
+                let relief = sorted.as_ref();
+                relief.map(|relief| Relief::new(device, &seen, relief, shafts))
+            },
+            || Mesh::new(device, &seen, &fixed.mesh, flat, shafts),
+        );
+        let mesh = mesh?;
         Ok(Self {
             size: (view.width, view.height),
             bound: fixed.textures.bind(&fixed.shade, &lights, &mesh.lit)?,
             lights,
             mesh,
-            relief,
+            relief: relief.transpose()?,
             projection,
         })
     }
@@ -139,20 +193,7 @@ impl<'a> Renderer<'a> {
             "one irradiance a triangle"
         );
         view.check()?;
-        let glows = scene.materials.iter().any(|m| m.map_ke.is_some());
-        let light_scene = LightScene::new(scene, &lighting);
-        let kinds = light_kinds(scene, &light_scene);
-        let shade = Shade::new(device, glows, kinds)?;
-        let fixed = Fixed {
-            textures: Textures::new(device, scene)?,
-            light_scene,
-            relief: ReliefScene::new(device, &shade, scene, &lighting, kinds)?,
-            device: Arc::clone(device),
-            scene,
-            lighting,
-            samples,
-            shade,
-        };
+        let fixed = Fixed::new(device, scene, lighting, samples)?;
         let view = ViewParts::new(&fixed, view)?;
         Ok(Self {
             fixed,
