@@ -24,6 +24,7 @@ mod mesh;
 mod mesh_scene;
 mod overdraw;
 mod parts;
+mod prepared;
 mod relief;
 mod relief_borders;
 mod relief_light;

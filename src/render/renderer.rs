@@ -3,25 +3,16 @@
 use std::sync::Arc;
 
 use super::background::{BEHIND, draw_sky};
-use super::beside::beside;
-use super::flat_relief::SortedRelief;
 use super::gathered::Gathered;
-use super::lights::{LightScene, light_buffers, light_kinds, sharp_emitters};
-use super::mesh::Mesh;
-use super::mesh_scene::MeshScene;
-use super::relief::{Relief, ReliefTarget};
-use super::relief_scene::ReliefScene;
+use super::prepared::{Fixed, ViewParts};
+use super::relief::ReliefTarget;
 use super::seen_scene::SeenScene;
-use super::textures::{Bound, Textures};
 use super::{Lighting, Overdraw, Show, View};
 use crate::error::Result;
-use crate::mesh::corners::Corners;
 use crate::passes::pass_parts::PART_TRIANGLES;
-use crate::passes::shade::{self, Passes, Shade, Target};
-use crate::passes::shadow_rays::LightBuffers;
-use crate::picture::{Light, Picture, Projection, SAMPLES, Tile};
+use crate::passes::shade::{self, Target};
+use crate::picture::{Picture, SAMPLES, Tile};
 use crate::scene::Scene;
-use crate::scene::sky::Sky;
 use crate::vk::{Commands, Device, Timestamps};
 
 /// Samples along a side of a tile, each a submission: 16 of the squares that lavapipe shares among
@@ -59,119 +50,10 @@ pub struct Renderer<'a> {
     pub cuts: Cuts,
 }
 
-/// What does not depend on the view.
-struct Fixed<'a> {
-    device: Arc<Device>,
-    scene: &'a Scene,
-    lighting: Lighting<'a>,
-    /// Samples along a pixel's side that the view is prepared for.
-    samples: u32,
-    shade: Shade,
-    textures: Textures,
-    relief: Option<ReliefScene>,
-    mesh: MeshScene,
-    light_scene: LightScene,
-}
-
-impl<'a> Fixed<'a> {
-    fn new(
-        device: &Arc<Device>,
-        scene: &'a Scene,
-        lighting: Lighting<'a>,
-        samples: u32,
-    ) -> Result<Self> {
-        let emitters = sharp_emitters(scene, &lighting);
-        let is_sharp = emitters.is_some();
-        let lights = light_kinds(scene, emitters.as_ref());
-        let passes = Passes::new(device)?;
-        let pipelines = || {
-            let glows = scene.materials.iter().any(|m| m.map_ke.is_some());
-            let shade = Shade::new(device, &passes, glows, lights)?;
-            Ok((shade, Textures::new(device, scene)?))
-        };
-        let surfaces = || {
-            let neighbours = Corners::new(scene);
-            let (of_relief, mesh) = beside(
-                || ReliefScene::new(device, &passes, (scene, &neighbours), &lighting, lights),
-                || MeshScene::new(scene, &lighting, &neighbours, is_sharp),
-            );
-            Ok((of_relief?, mesh))
-        };
-        let (surfaces, others) = beside(surfaces, || {
-            (pipelines(), LightScene::new(scene, &lighting, emitters))
-        });
-        let (relief, mesh) = surfaces?;
-        let (pipelines, light_scene) = others;
-        let (shade, textures) = pipelines?;
-        Ok(Self {
-            device: Arc::clone(device),
-            scene,
-            lighting,
-            samples,
-            shade,
-            textures,
-            relief,
-            mesh,
-            light_scene,
-        })
-    }
-
-    /// The sky, if the picture shows it.
-    fn sky(&self) -> Option<&Sky> {
-        let shows = self.lighting.show == Show::Shaded && self.lighting.part != Light::Direct;
-        self.scene.lights.sky.as_ref().filter(|_| shows)
-    }
-}
-
-/// What depends on the view.
-struct ViewParts {
-    /// Pixels across and down.
-    size: (u32, u32),
-    projection: Projection,
-    lights: LightBuffers,
-    bound: Bound,
-    mesh: Mesh,
-    relief: Option<Relief>,
-}
-
 /// Where a tile is drawn.
 struct Canvas {
     target: Target,
     relief: Option<ReliefTarget>,
-}
-
-impl ViewParts {
-    fn new(fixed: &Fixed<'_>, view: &View<'_>) -> Result<Self> {
-        let device = &fixed.device;
-        let projection = Projection::new(fixed.scene, view)?;
-        let seen = SeenScene {
-            scene: fixed.scene,
-            lighting: &fixed.lighting,
-            projection: &projection,
-            samples: fixed.samples,
-            cuts: Cuts::default(),
-        };
-        let (lights, shafts) = light_buffers(device, &seen, &fixed.light_scene)?;
-        let shafts = shafts.as_ref();
-        let sorted = SortedRelief::new(&seen, fixed.relief.as_ref());
-        let flat = sorted.as_ref().map(|relief| &relief.flat);
-        let (relief, mesh) = beside(
-            || {
-                let relief = sorted.as_ref();
-                relief.map(|relief| Relief::new(device, &seen, relief, shafts))
-            },
-            || Mesh::new(device, &seen, &fixed.mesh, flat, shafts),
-        );
-        let mesh = mesh?;
-        Ok(Self {
-            size: (view.width, view.height),
-            bound: fixed.textures.bind(&fixed.shade, &lights, &mesh.lit)?,
-            lights,
-            mesh,
-            relief: relief.transpose()?,
-            projection,
-        })
-    }
 }
 
 impl<'a> Renderer<'a> {
