@@ -350,7 +350,11 @@ fn log_to_stderr(cli: &Cli) {
 /// Starts the CPU's threads before any of them is needed: where there is no room for them, nothing
 /// else has been done.
 fn start_threads(command: &Command) -> Result<()> {
-    let mut pool = rayon::ThreadPoolBuilder::new();
+    let mut pool = rayon::ThreadPoolBuilder::new().thread_name(|i| format!("worker {i}"));
+    #[cfg(feature = "window")]
+    if matches!(command, Command::View(_)) {
+        pool = pool.start_handler(|_| mesolux::view::give_way());
+    }
     if let Command::Bake(bake::Options {
         threads: Some(threads),
         ..

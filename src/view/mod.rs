@@ -139,6 +139,13 @@ impl DeviceChoice {
         }
     }
 
+    /// Opens the device that bakes on a thread of its own. What is wrong with it is said when it is
+    /// first needed.
+    pub fn open_ahead(&self) -> JoinHandle<()> {
+        let choice = self.clone();
+        background("device", move || drop(choice.open_baking()))
+    }
+
     /// A device that draws detailed pictures.
     fn open_drawing(&self) -> Result<Arc<Device>> {
         let instance = Instance::new(self.validation)?;
@@ -151,13 +158,18 @@ impl DeviceChoice {
 #[cfg(target_os = "linux")]
 const NICENESS: i32 = 10;
 
-/// Starts a thread at a lower priority; threads that it starts, and those of drivers that it loads,
-/// inherit it.
+/// Gives this thread a lower priority than frames have; threads that it starts, and those of drivers
+/// that it loads, inherit it. Threads that share work are to call it as they start.
+pub fn give_way() {
+    // On Linux this applies to this thread only; if it is refused, frames are slower.
+    #[cfg(target_os = "linux")]
+    let _ = rustix::process::setpriority_process(None, NICENESS);
+}
+
+/// Starts a thread that gives way.
 fn background(name: &str, work: impl FnOnce() + Send + 'static) -> JoinHandle<()> {
     foreground(name, move || {
-        // On Linux this applies to this thread only; if it is refused, frames are slower.
-        #[cfg(target_os = "linux")]
-        let _ = rustix::process::setpriority_process(None, NICENESS);
+        give_way();
         work();
     })
 }
@@ -168,13 +180,4 @@ fn foreground(name: &str, work: impl FnOnce() + Send + 'static) -> JoinHandle<()
         .name(name.to_owned())
         .spawn(work);
     started.expect("the system has room for another thread")
-}
-
-/// Gives rayon's threads a lower priority; to be called before any of them starts.
-fn calm_workers() {
-    let built = background("workers", || {
-        // Threads that have already started keep their priority.
-        let _ = rayon::ThreadPoolBuilder::new().build_global();
-    });
-    let _ = built.join();
 }

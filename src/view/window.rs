@@ -17,7 +17,7 @@ use super::camera::Eye;
 use super::event::{Event, Key, Modifiers, PointerButton};
 use super::runner::Runner;
 use super::viewer::Viewer;
-use super::{Opened, Options, Session, Wake, background, calm_workers};
+use super::{Opened, Options, Session, Wake, background};
 use crate::error::{Error, Result};
 
 /// Another thread has a new result.
@@ -29,7 +29,6 @@ struct Woken;
 /// # Errors
 /// No display, or one without a Vulkan surface; a device that fails.
 pub fn run(options: Options) -> Result<Vec<String>> {
-    calm_workers();
     let events = EventLoop::<Woken>::with_user_event()
         .build()
         .map_err(|e| Error::Display(format!("no display to open a window on: {}", line(&e))))?;

@@ -9,6 +9,7 @@ mod drop;
 mod harness;
 mod keys;
 mod screens;
+mod threads;
 mod tools;
 
 use std::path::Path;
