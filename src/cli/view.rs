@@ -165,14 +165,8 @@ pub fn run(options: &Options, start: Instant) -> Result<()> {
         bake_scene: options.bake_scene.clone(),
         quality: options.solve.quality(),
     };
-    let device = DeviceChoice::new(options.device.device.clone(), options.device.validate);
-    let opening = device.open_ahead();
-    let opened = reader.open(&options.input).and_then(|opened| {
-        let camera = options.camera.of(&opened.scene)?;
-        Ok(Opened { camera, ..opened })
-    });
-    // The program does not end while a driver is loaded.
-    let opened = opened.inspect_err(|_| drop(opening.join()))?;
+    let mut opened = reader.open(&options.input)?;
+    opened.camera = options.camera.of(&opened.scene)?;
     // Those of the scene that was given.
     let reader = Reader {
         builtin: Builtin {
@@ -188,7 +182,7 @@ pub fn run(options: &Options, start: Instant) -> Result<()> {
         opened,
         session: Session {
             settings,
-            device,
+            device: DeviceChoice::new(options.device.device.clone(), options.device.validate),
             offered: offered(&options.input).into(),
             open: Arc::new(move |name| reader.open(name)),
             save: Arc::new(move |path, name, scene, solution, settings| {

@@ -139,13 +139,6 @@ impl DeviceChoice {
         }
     }
 
-    /// Opens the device that bakes on a thread of its own. What is wrong with it is said when it is
-    /// first needed.
-    pub fn open_ahead(&self) -> JoinHandle<()> {
-        let choice = self.clone();
-        background("device", move || drop(choice.open_baking()))
-    }
-
     /// A device that draws detailed pictures.
     fn open_drawing(&self) -> Result<Arc<Device>> {
         let instance = Instance::new(self.validation)?;
