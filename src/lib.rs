@@ -33,6 +33,7 @@ pub mod atomic_file;
 pub mod bake;
 #[cfg(feature = "cli")]
 pub mod bench;
+pub mod beside;
 mod cache_folder;
 #[cfg(feature = "cli")]
 pub mod console;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// From below. Modules of one line do not use each other; `say` is the macro of `console`.
 const LAYERS: [&[&str]; 10] = [
-    &["console", "constants", "error", "say", "structs"],
+    &["beside", "console", "constants", "error", "say", "structs"],
     &["atomic_file", "input_file", "math", "vk"],
     &["cache_folder", "scene"],
     &["meso", "picture"],

@@ -26,8 +26,8 @@ impl BakeScene {
         Bake::load_with(path, |origin, on_input| self.of(path, origin, on_input))
     }
 
-    /// The scene of a bake in the file `path` that says this of its scene, cut as it was there: from
-    /// the file that is given, or from where it lay as seen from the bake, or from where it was.
+    /// The scene of a bake in the file `path` that says this of it, cut as it was there: from the
+    /// file that is given, or from where it lay as seen from the bake, or from where it was.
     ///
     /// # Errors
     /// A scene that is at none of these places, cannot be read, or is not the one that was baked.

@@ -34,6 +34,7 @@ use std::process::ExitCode;
 
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use mesolux::bake::quality::Quality;
+use mesolux::beside::beside;
 use mesolux::console;
 use mesolux::error::{Error, Result};
 use mesolux::scene::{ImportOptions, LoadOptions, Refinement, Scene};
@@ -260,12 +261,8 @@ impl DeviceOptions {
         read: impl FnOnce() -> Result<T>,
     ) -> Result<(std::sync::Arc<mesolux::vk::Device>, T)> {
         let open = || mesolux::solver::open_device(self.device.as_deref(), watched(self.validate));
-        let (given, device) = std::thread::scope(|scope| {
-            let device = scope.spawn(open);
-            (read(), device.join())
-        });
-        let given = given?;
-        let device = device.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
+        let (given, device) = beside(read, open);
+        let (given, device) = (given?, device?);
         tracing::info!("device: {}", device.name());
         Ok((device, given))
     }

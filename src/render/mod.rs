@@ -9,7 +9,6 @@
 //! ```
 
 mod background;
-mod beside;
 mod blocks;
 mod compare;
 mod convex;

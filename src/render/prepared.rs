@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use super::beside::beside;
 use super::flat_relief::SortedRelief;
 use super::lights::{LightScene, light_buffers, light_kinds, sharp_emitters};
 use super::mesh::Mesh;
@@ -12,6 +11,7 @@ use super::relief_scene::ReliefScene;
 use super::seen_scene::SeenScene;
 use super::textures::{Bound, Textures};
 use super::{Cuts, Lighting, Show, View};
+use crate::beside::beside;
 use crate::error::Result;
 use crate::mesh::corners::Corners;
 use crate::passes::shade::{Passes, Shade};
@@ -59,11 +59,10 @@ impl<'a> Fixed<'a> {
             );
             Ok((of_relief?, mesh))
         };
-        let (surfaces, others) = beside(surfaces, || {
+        let (surfaces, (pipelines, light_scene)) = beside(surfaces, || {
             (pipelines(), LightScene::new(scene, &lighting, emitters))
         });
         let (relief, mesh) = surfaces?;
-        let (pipelines, light_scene) = others;
         let (shade, textures) = pipelines?;
         Ok(Self {
             device: Arc::clone(device),

@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use super::beside::beside;
 use super::relief_borders::{Borders, Relief as OfTriangle};
 use super::relief_surfaces::Surfaces;
 use super::{Light, Lighting, ReliefShading, Show};
 use crate::bake::marcher;
+use crate::beside::beside;
 use crate::error::Result;
 use crate::math::directions::Directions;
 use crate::mesh::corners::Corners;

@@ -151,8 +151,8 @@ impl DeviceChoice {
 #[cfg(target_os = "linux")]
 const NICENESS: i32 = 10;
 
-/// Gives this thread a lower priority than frames have; threads that it starts, and those of drivers
-/// that it loads, inherit it. Threads that share work are to call it as they start.
+/// Gives this thread a lower priority than frames have; threads that it starts, and those of
+/// drivers that it loads, inherit it. Threads that share work are to call it as they start.
 pub fn give_way() {
     // On Linux this applies to this thread only; if it is refused, frames are slower.
     #[cfg(target_os = "linux")]
