@@ -301,3 +301,16 @@ fn errors_are_told_once_and_end_all() {
     let output = run(2, &["no-such.obj", "-o", &out]);
     assert_eq!(told(&output).matches("cannot be read").count(), 1);
 }
+
+/// Processes of the `mpirun` of another MPI would each bake all, into the same file.
+#[test]
+fn processes_that_mpi_does_not_join_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (out, text) = path(folder.path(), "out.safetensors");
+    let mut alone = bake(1, &["cornell", "--patches", "500", "-o", &text]);
+    let output = alone.env("PMI_SIZE", "2").output().expect("it is started");
+    let said = told(&output);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("MPI joins 1 of them"), "{said}");
+    assert!(!out.exists());
+}
