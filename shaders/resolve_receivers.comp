@@ -10,7 +10,8 @@
 
 // RECEIVE_DOUBTFUL: from the eye of the source; RECEIVE_CROSSED: from EYES of the places on it,
 // evenly chosen.
-layout(constant_id = 1) const uint LIST = RECEIVE_DOUBTFUL;
+layout(constant_id = 0) const uint LIST = RECEIVE_DOUBTFUL;
+layout(constant_id = 1) const uint EYES = SOURCE_EYES;
 
 // Those of a source on a surface are EYES or a multiple; a point light has none, and nothing crosses
 // it.
@@ -29,8 +30,10 @@ float weight_of(Eye place, Source s, vec3 p, vec3 n) {
     return max(dot(d, n), 0.0) * max(facing, 0.0) / (square * square);
 }
 
-// Invocations an element, each of which looks from some of the places.
-const uint LANES_EACH = LIST == RECEIVE_CROSSED ? CROSSED_LANES : 1;
+// Invocations an element, each of which looks from some of the places: one alone would go through
+// more turns of loops than a software device allows, and see what it does not come to.
+const uint CROSSED_BY = EYES < CROSSED_LANES ? EYES : CROSSED_LANES;
+const uint LANES_EACH = LIST == RECEIVE_CROSSED ? CROSSED_BY : 1;
 const uint FROM = LIST == RECEIVE_CROSSED ? EYES / LANES_EACH : 1;
 const uint ELEMENTS = GROUP / LANES_EACH;
 
@@ -44,9 +47,8 @@ void main() {
     Source s = load_source(source);
     uint first_eye = eye_starts[source];
     uint stride = (eye_starts[source + 1] - first_eye) / EYES;
-    // Neighbours look at one element: those that follow it in the list may be anywhere.
     uint lane = gl_LocalInvocationIndex % LANES_EACH;
-    uvec2 range = piece_of(count, ELEMENTS, piece, look_bits);
+    uvec2 range = piece_of(count, ELEMENTS, piece, pieces);
     uint end = range.y;
     uint step_size = ELEMENTS * gl_NumWorkGroups.x;
     for (uint at = range.x + ELEMENTS * gl_WorkGroupID.x; at < end; at += step_size) {
@@ -70,18 +72,16 @@ void main() {
             look(eye, ball, n, open);
             sum += vec2(open[0] ? weight : 0.0, weight);
         }
-        vec2 all = sum;
-        if (LANES_EACH > 1) {
-            weights[gl_LocalInvocationIndex] = sum;
-            barrier();
-            for (uint k = 1; k < LANES_EACH && lane == 0; k++) {
-                all += weights[gl_LocalInvocationIndex + k];
-            }
-            barrier();
+        weights[gl_LocalInvocationIndex] = sum;
+        barrier();
+        vec2 all = vec2(0.0);
+        for (uint k = 0; k < LANES_EACH && lane == 0; k++) {
+            all += weights[gl_LocalInvocationIndex + k];
         }
         bool near;
         uint kind = kind_of(s, ball[0], n[0], near);
         float share = all.x / max(all.y, LEAST_WEIGHT);
         append(first_slot, kind, lane == 0 && all.x > 0.0, with_share(i, share));
+        barrier();
     }
 }

@@ -45,8 +45,8 @@ shared! {
     SOURCE_EYES = 128;
     /// The first of those are its ends: where they are seen as its eye is, no silhouette cuts it.
     SOURCE_ENDS = 4;
-    /// From so many of those an invocation looks at an element, at most. A power of two.
-    CROSSED_EYES = 16;
+    /// Invocations that share the places from which one such element is looked at.
+    CROSSED_LANES = 8;
     /// Of the places on a light without a surface: those that an element asks first. Where these
     /// agree, no edge cuts the light.
     FIRST_EYES = 8;

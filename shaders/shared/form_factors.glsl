@@ -268,7 +268,7 @@ FLUX mean_form_factor(uint element, vec4 ball, vec3 n, Source s) {
 
 void main() {
     uint list = first_slot * RECEIVE_LISTS + KIND;
-    uvec2 range = piece_of(lists[list].count, GROUP, piece, kind_bits);
+    uvec2 range = piece_of(lists[list].count, GROUP, piece, pieces);
     if (range.x + GROUP * gl_WorkGroupID.x >= range.y) {
         return;
     }

@@ -10,14 +10,13 @@ void main() {
     uint slot = first_slot;
     uint list = slot * RECEIVE_LISTS + RECEIVE_CROSSED;
     uint count = lists[list].count;
-    // Neighbours look the same way together: what stands on it is much the same.
-    uint lane = gl_LocalInvocationIndex / ELEMENTS;
+    uint lane = gl_LocalInvocationIndex % LIGHT_LANES;
     Light light = load_light(slots[slot].source);
-    uvec2 range = piece_of(count, ELEMENTS, piece, piece_bits);
+    uvec2 range = piece_of(count, ELEMENTS, piece, pieces);
     uint end = range.y;
     uint stride = ELEMENTS * gl_NumWorkGroups.x;
     for (uint at = range.x + ELEMENTS * gl_WorkGroupID.x; at < end; at += stride) {
-        uint of = at + gl_LocalInvocationIndex % ELEMENTS;
+        uint of = at + gl_LocalInvocationIndex / LIGHT_LANES;
         uint i = listed[list * element_count + min(of, end - 1)];
         Receiver receiver = load_receiver(first_element + i);
         vec3 normal[RAYS] = vec3[](receiver.normal);
@@ -35,7 +34,7 @@ void main() {
         if (lane == 0 && of < end) {
             vec3 all = vec3(0.0);
             for (uint k = 0; k < LIGHT_LANES; k++) {
-                all += sums[ELEMENTS * k + gl_LocalInvocationIndex];
+                all += sums[gl_LocalInvocationIndex + k];
             }
             put(slot, i, flux_to(i, all / float(SOURCE_EYES), receiver.normal));
         }

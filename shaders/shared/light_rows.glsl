@@ -52,9 +52,9 @@ layout(push_constant, scalar) uniform Parameters {
     // Elements that are this member's, counted from the first; no form factor is found to others.
     uint own_begin;
     uint own_end;
-    // Which piece of a list the dispatch is for, see shared/pieces.glsl; a survey is of all elements.
+    // Which of these pieces of a list the dispatch is for; a survey is of all elements.
     uint piece;
-    uint piece_bits;
+    uint pieces;
 };
 
 // 1: lights at a finite distance, whose places are the eye alone.

@@ -66,7 +66,7 @@ void main() {
         if (subgroupElect() && lanes != uvec4(0)) {
             first = atomicAdd(lists[list].count, subgroupBallotBitCount(lanes));
             uint count = first + subgroupBallotBitCount(lanes);
-            atomicMax(lists[list].groups_x, groups_of_piece(count, GROUP / LIGHT_LANES, piece_bits));
+            atomicMax(lists[list].groups_x, min((count * LIGHT_LANES + GROUP - 1) / GROUP, 65535));
         }
         first = subgroupBroadcastFirst(first);
         if (mine) {

@@ -1,18 +1,8 @@
-// Lists of elements in pieces, a dispatch each: 1 << piece_bits of them.
+// Lists of elements in pieces, a dispatch each.
 
-// A device has no more workgroups, which go on with the elements that are left.
-const uint MOST_GROUPS = 65535;
-
-// Workgroups of any piece of a list that they take in steps of so many elements.
-uint groups_of_piece(uint count, uint step, uint piece_bits) {
-    uint all = (count + step - 1) / step;
-    return min((all + (1u << piece_bits) - 1) >> piece_bits, MOST_GROUPS);
-}
-
-// Where a piece begins and ends.
-uvec2 piece_of(uint count, uint step, uint piece, uint piece_bits) {
-    uint all = (count + step - 1) / step;
-    uint size = step * ((all + (1u << piece_bits) - 1) >> piece_bits);
+// Where a piece of a list begins and ends, of so many pieces; `step`: elements of a workgroup.
+uvec2 piece_of(uint count, uint step, uint piece, uint pieces) {
+    uint size = step * ((count + step * pieces - 1) / (step * pieces));
     uint begin = min(piece * size, count);
     return uvec2(begin, min(begin + size, count));
 }

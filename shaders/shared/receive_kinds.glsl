@@ -1,16 +1,10 @@
 // How elements receive from a source, and their lists. Including files have shared/receivers.glsl.
 
-// Of places on a source, as many as rays find the share of it from that an element sees. 0: none.
-layout(constant_id = 0) const uint EYES = SOURCE_EYES;
-// Invocations that share them: one alone would go through more turns of loops than a software device
-// allows, and see what it does not come to.
-const uint CROSSED_LANES = EYES > CROSSED_EYES ? EYES / CROSSED_EYES : 1;
-
-// Workgroups for a piece of so many elements that rays look at: those that a silhouette may cut take
-// several invocations each.
+// Workgroups for so many elements of a list: those that a silhouette may cut take several
+// invocations each. A device has no more than 65,535, which go on with those that are left.
 uint groups_of(uint which, uint count) {
     uint each = which == RECEIVE_CROSSED ? CROSSED_LANES : 1;
-    return groups_of_piece(count, GROUP / each, which < RECEIVE_KINDS ? kind_bits : look_bits);
+    return min((count * each + GROUP - 1) / GROUP, 65535);
 }
 
 // Makes room in one list for all lanes.
@@ -48,7 +42,7 @@ void append(uint slot, uint kind, bool mine, uint listed_word) {
     if (count > 0) {
         uint list = slot * RECEIVE_LISTS + gl_SubgroupInvocationID;
         first = atomicAdd(lists[list].count, count);
-        atomicMax(lists[list].groups_x, groups_of_piece(first + count, GROUP, kind_bits));
+        atomicMax(lists[list].groups_x, (first + count + GROUP - 1) / GROUP);
     }
     for (uint k = 0; k < RECEIVE_NEAR; k++) {
         uint first_of_kind = subgroupBroadcast(first, k);

@@ -36,11 +36,9 @@ layout(push_constant, scalar) uniform Parameters {
     // Elements that are this member's, counted from the first; no form factor is found to others.
     uint own_begin;
     uint own_end;
-    // Which piece of a list the dispatch is for; sorting is of all elements.
+    // Which of these pieces of a list the dispatch is for; sorting is of all elements.
     uint piece;
-    // Pieces of a list that rays look at, and of one of a kind: shared/pieces.glsl.
-    uint look_bits;
-    uint kind_bits;
+    uint pieces;
 };
 
 // Whether an element of the dispatch is this member's.

@@ -15,13 +15,13 @@
 #include "shared/receive_kinds.glsl"
 
 // 1: blocks of elements that see nothing of a source are passed over as a whole.
-layout(constant_id = 1) const uint CULL_BLOCKS = 1;
+layout(constant_id = 0) const uint CULL_BLOCKS = 1;
 // 1: where a silhouette may cut a source, rays find the share of it that an element sees.
-layout(constant_id = 2) const uint SILHOUETTES = 1;
+layout(constant_id = 1) const uint SILHOUETTES = 1;
 #ifdef ITEM_BUFFER
-// Where the four pixels about an element do not agree, it sees the share of the source that they
-// show it.
-const bool PIXELS_DECIDE = EYES == 0;
+// 1: where the four pixels about an element do not agree, it sees the share of the source that they
+// show it; no rays.
+layout(constant_id = 2) const uint PIXELS_DECIDE = 0;
 #endif
 
 // Elements that see nothing of a source, whatever stands between: it lies behind them or shows them
@@ -253,9 +253,9 @@ void main() {
                 float share;
                 uint sight = sight_of(ball[j].xyz, n[j], e, slot, s, asks, share);
                 bool crossed = below || wide && sight == DOUBTFUL || around_differs(ball[j].xyz, n[j], slot, s, sight, wide);
-                bool open = sight == SEEN || PIXELS_DECIDE && sight == DOUBTFUL;
+                bool open = sight == SEEN || PIXELS_DECIDE == 1 && sight == DOUBTFUL;
                 append(slot, kind, mine && (near || open) && !crossed, with_share(i, near ? 1.0 : share));
-                if (!PIXELS_DECIDE) {
+                if (PIXELS_DECIDE == 0) {
                     append_one(slot, RECEIVE_DOUBTFUL, sight == DOUBTFUL && !crossed, i);
                 }
                 append_one(slot, RECEIVE_CROSSED, crossed, i);

@@ -76,7 +76,7 @@ struct Slot {
     float scale;       // of all its form factors
 };
 
-// VkDispatchIndirectCommand of any piece of a list of receivers, and how many all are.
+// VkDispatchIndirectCommand of a list of receivers, and how many they are.
 struct ReceiverList {
     uint groups_x;
     uint groups_y;

@@ -16,7 +16,7 @@ use super::shaders::{
     resolve_receivers, sort_receivers, sort_receivers_rays,
 };
 use super::types::ReceiverList;
-use super::{Parts, groups, piece_bits, pieces};
+use super::{Parts, groups, pieces};
 use crate::constants::{
     RECEIVE_CROSSED, RECEIVE_DOUBTFUL, RECEIVE_KINDS, RECEIVE_LISTS, SORT_ELEMENTS, SORT_SLOTS,
 };
@@ -43,7 +43,7 @@ pub struct Care {
 const SORT_RATE: u64 = 4;
 
 /// Elements of a piece of a list whose form factors are found, over those that rays look at.
-const KIND_RATE: u64 = 8;
+const FORM_FACTOR_RATE: u64 = 8;
 
 /// Bound to a batch.
 pub struct FormFactors {
@@ -144,7 +144,12 @@ impl FormFactors {
         }
         // Rays of one slot at a time.
         let (face_size, at_once) = match &batch.sight {
-            Sight::Hemicubes(hemicubes) => (hemicubes.face_size, SORT_SLOTS),
+            Sight::Hemicubes(hemicubes) => {
+                let elements = rows.shape.plain.count + rows.shape.meso.count;
+                let most = (SORT_RATE * rows.part_pairs / u64::from(elements.max(1))) as u32;
+                let most = most.clamp(1, SORT_SLOTS);
+                (hemicubes.face_size, most)
+            }
             Sight::Rays(_) => (0, 1),
         };
         Ok(Self {
@@ -185,8 +190,7 @@ impl FormFactors {
             own_begin: range.span.own[0],
             own_end: range.span.own[1],
             piece: 0,
-            look_bits: piece_bits(range.span.count, rows.part_pairs),
-            kind_bits: piece_bits(range.span.count, KIND_RATE * rows.part_pairs),
+            pieces: 1,
         };
         let mut parts = Parts::of(rows.part_pairs);
         for first in (0..self.slot_count).step_by(self.at_once as usize) {
@@ -212,13 +216,16 @@ impl FormFactors {
         };
         for range in &self.ranges {
             for &(list, ref resolve) in &range.resolve {
-                for slot in 0..self.slot_count {
+                // Each takes a piece of what the list holds, and has invocations for all of it.
+                let work = u64::from(range.span.count);
+                let pieces = pieces(work, rows.part_pairs);
+                let all = (0..self.slot_count).flat_map(|slot| (0..pieces).map(move |p| (slot, p)));
+                for (slot, piece) in all {
+                    parts.step(cmd, work / u64::from(pieces));
                     let mut push = parameters(range, slot..slot + 1);
+                    (push.piece, push.pieces) = (piece, pieces);
                     let at = list_at(slot, list);
-                    parts.pieces(cmd, range.span.count, push.look_bits, |piece| {
-                        push.piece = piece;
-                        cmd.dispatch_indirect(resolve, &push, &range.lists.counts, at);
-                    });
+                    cmd.dispatch_indirect(resolve, &push, &range.lists.counts, at);
                 }
             }
         }
@@ -226,15 +233,17 @@ impl FormFactors {
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
         // Every element is in one list of a slot at most.
         for range in &self.ranges {
-            for slot in 0..self.slot_count {
-                let mut push = parameters(range, slot..slot + 1);
-                parts.pieces(cmd, range.span.count, push.kind_bits, |piece| {
-                    push.piece = piece;
-                    for (kind, form_factors) in (0..).zip(&range.form_factors) {
-                        let at = list_at(slot, kind);
-                        cmd.dispatch_indirect(form_factors, &push, &range.lists.counts, at);
-                    }
-                });
+            let work = u64::from(range.span.count);
+            let pieces = pieces(work, FORM_FACTOR_RATE * rows.part_pairs);
+            let all = (0..self.slot_count).flat_map(|slot| (0..pieces).map(move |p| (slot, p)));
+            for (slot, piece) in all {
+                parts.step(cmd, work / u64::from(pieces));
+                for (kind, form_factors) in (0..).zip(&range.form_factors) {
+                    let mut push = parameters(range, slot..slot + 1);
+                    (push.piece, push.pieces) = (piece, pieces);
+                    let at = list_at(slot, kind);
+                    cmd.dispatch_indirect(form_factors, &push, &range.lists.counts, at);
+                }
             }
         }
     }
@@ -273,8 +282,12 @@ fn sort(
     care: Care,
 ) -> Result<BoundCompute> {
     let pipeline = |shader: &ComputeShader<'_>| {
-        let silhouettes = care.silhouettes && care.places > 0;
-        let constants = [care.places, care.culls.into(), silhouettes.into()];
+        let constants = [
+            care.culls,
+            care.silhouettes && care.places > 0,
+            care.places == 0,
+        ];
+        let constants = constants.map(u32::from);
         ComputePipeline::in_subgroups(device, "sort receivers", shader, &constants)
     };
     let (away_count, blocks) = (&on.rows.facing_away, &on.scene.receiver_blocks);
@@ -329,7 +342,7 @@ fn resolve(device: &Arc<Device>, on: &On<'_>, places: u32) -> Result<Vec<(u32, B
     let bind = |list: u32| {
         let shader = &resolve_receivers::SHADER;
         let pipeline =
-            ComputePipeline::in_subgroups(device, "resolve receivers", shader, &[places, list])?;
+            ComputePipeline::in_subgroups(device, "resolve receivers", shader, &[list, places])?;
         Ok((list, pipeline.bind(&bindings)?))
     };
     [RECEIVE_DOUBTFUL, RECEIVE_CROSSED]

@@ -10,7 +10,7 @@ use super::buffers::SceneBuffers;
 use super::fresh_rows::{FreshRows, ReceiverLists, Span};
 use super::shaders::{light_rows, light_rows_relief, light_survey, light_survey_relief};
 use super::types::ReceiverList;
-use super::{Parts, groups, piece_bits};
+use super::{Parts, groups, pieces};
 use crate::constants::{RECEIVE_CROSSED, RECEIVE_LISTS, SURVEY_ELEMENTS};
 use crate::error::Result;
 use crate::vk::{BoundCompute, Buffer, Commands, ComputePipeline, Device, Stage};
@@ -135,7 +135,6 @@ impl LightRows {
         cmd.fill(&rows.occupied, 0);
         cmd.fill(&rows.facing_away, 0);
         cmd.barrier(&[Stage::Transfer], &[Stage::Compute]);
-        let most = rows.part_pairs / RAYS;
         // All of these shaders have the same.
         let parameters = |range: &Range, first_slot| light_survey::Parameters {
             first_element: range.span.first,
@@ -146,7 +145,7 @@ impl LightRows {
             own_begin: range.span.own[0],
             own_end: range.span.own[1],
             piece: 0,
-            piece_bits: piece_bits(range.span.count, most),
+            pieces: 1,
         };
         for range in &self.ranges {
             let size = [
@@ -157,16 +156,20 @@ impl LightRows {
             cmd.dispatch(&range.survey, &parameters(range, 0), size);
         }
         cmd.barrier(&[Stage::Compute], &[Stage::Compute]);
+        let most = rows.part_pairs / RAYS;
         let mut parts = Parts::of(most);
         for range in &self.ranges {
-            for slot in 0..self.slot_count {
+            // Each takes a piece of what the list holds, and has invocations for all of it.
+            let work = u64::from(range.span.count);
+            let pieces = pieces(work, most);
+            let all = (0..self.slot_count).flat_map(|slot| (0..pieces).map(move |p| (slot, p)));
+            for (slot, piece) in all {
+                parts.step(cmd, work / u64::from(pieces));
                 let list = u64::from(slot * RECEIVE_LISTS + RECEIVE_CROSSED);
                 let at = size_of::<ReceiverList>() as u64 * list;
                 let mut push = parameters(range, slot);
-                parts.pieces(cmd, range.span.count, push.piece_bits, |piece| {
-                    push.piece = piece;
-                    cmd.dispatch_indirect(&range.lit, &push, &range.lists.counts, at);
-                });
+                (push.piece, push.pieces) = (piece, pieces);
+                cmd.dispatch_indirect(&range.lit, &push, &range.lists.counts, at);
             }
         }
     }

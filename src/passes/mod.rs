@@ -72,12 +72,6 @@ fn pieces(work: u64, most: u64) -> u32 {
     work.div_ceil(most).max(1) as u32
 }
 
-/// Into how many pieces a list of elements is cut, as the binary digit of a power of 2: see
-/// `shaders/shared/pieces.glsl`.
-fn piece_bits(elements: u32, most: u64) -> u32 {
-    pieces(elements.into(), most).next_power_of_two().ilog2()
-}
-
 /// Elements times sources that a part keeps or couples, over those whose form factors it finds.
 const KEEP_RATE: u64 = 32;
 
@@ -114,13 +108,5 @@ impl Parts {
             self.recorded = 0;
         }
         self.recorded += work;
-    }
-
-    /// Steps for the pieces of a list, which may hold so many elements.
-    fn pieces(&mut self, cmd: &Commands, elements: u32, bits: u32, mut each: impl FnMut(u32)) {
-        for piece in 0..1 << bits {
-            self.step(cmd, u64::from(elements >> bits));
-            each(piece);
-        }
     }
 }
