@@ -81,7 +81,7 @@ struct Printed<'a> {
 #[cfg(not(feature = "mpi"))]
 pub fn run(options: &Options) -> Result<()> {
     match mesolux::solver::started_together() {
-        1 => options.task()?.bake(options.device.open()?),
+        1 => bake(options, || options.device.open()),
         many => Err(Error::Usage(format!(
             "{many} processes were started together, and this build has no MPI: \
              cargo build --release --features mpi"
@@ -92,22 +92,19 @@ pub fn run(options: &Options) -> Result<()> {
 /// One of the processes of an `mpirun`, or alone.
 #[cfg(feature = "mpi")]
 pub fn run(options: &Options) -> Result<()> {
-    let Some(joining) = mesolux::solver::Ranks::join() else {
-        return options.task()?.bake(options.device.open()?);
+    let Some(ranks) = mesolux::solver::Ranks::join()?.map(Arc::new) else {
+        return bake(options, || options.device.open());
     };
-    let open = |turn| options.device.open_in_turn(turn);
-    // The first reads its scene and opens its device while MPI starts.
-    let begin = || options.task().and_then(|task| Ok((task, open(0)?)));
-    let begun = mesolux::solver::is_told_first().then(begin);
-    let ranks = Arc::new(joining.joined()?);
+    let open = || options.device.open_in_turn(ranks.local_rank());
     let done = match ranks.rank() {
-        0 => begun.unwrap_or_else(begin).and_then(|(task, device)| {
+        0 => bake(options, || {
+            let device = open()?;
             let (name, others) = (device.name(), ranks.count() - 1);
             let of = if others == 1 { "process" } else { "processes" };
             tracing::info!("device: {name}, and one in each of {others} other {of}");
-            task.bake(Crew::with_ranks(&device, Arc::clone(&ranks)))
+            Ok(Crew::with_ranks(&device, Arc::clone(&ranks)))
         }),
-        _ => open(ranks.local_rank()).and_then(|device| ranks.serve(&device)),
+        _ => open().and_then(|device| ranks.serve(&device)),
     };
     // Only the first is waited for by nobody.
     let is_awaited = ranks.is_broken() || ranks.rank() > 0;
@@ -119,126 +116,98 @@ pub fn run(options: &Options) -> Result<()> {
     done
 }
 
-/// What is baked, read and checked.
-struct Task<'a> {
-    options: &'a Options,
-    settings: Settings,
-    scene: Scene,
-    kept: Option<Visibility>,
-    start: Instant,
-    read_seconds: f64,
-}
-
-impl Task<'_> {
-    fn bake(self, crew: Crew) -> Result<()> {
-        let Self {
-            options,
-            mut settings,
-            scene,
-            kept,
-            start,
-            read_seconds,
-        } = self;
-        let budget = settings.budget;
-        settings.budget = budget.map(|budget| budget.saturating_sub(start.elapsed()));
-        let solver = solve_visibly(&crew, &scene, &settings, kept.as_ref())?;
-        let solution = mesolux::bake::solution(&scene, &solver)?;
-        refuse_darkness(&scene, &solution)?;
-        options.device.check()?;
-        let origin = origin(&options.scene, &options.builtin, scene.input_hash());
-        let report = &solution.report;
-        let output = match report.stop {
-            StopReason::Interrupted => unfinished(&options.output),
-            _ => options.output.clone(),
-        };
-        let filled = options.solve.filled()?;
-        save_somewhere(&output, |path| solution.save(path, &origin, &filled))?;
-        match (report.stop, &settings.checkpoints) {
-            (_, None) => {}
-            (StopReason::Interrupted, Some(checkpoints)) => {
-                if checkpoints.exist() {
-                    let folder = checkpoints.folder.display();
-                    tracing::info!("the same command goes on from {folder}");
-                }
-            }
-            (_, Some(checkpoints)) => checkpoints.remove(),
-        }
-        if options.keep_visibility {
-            let path = beside(&output);
-            match solver.visibility(&scene)? {
-                Some(visibility) => visibility.save(&path)?,
-                None => {
-                    tracing::warn!("no form factors are kept: --keep-visibility writes nothing")
-                }
-            }
-        }
-        tracing::info!(
-            "{}: {} elements, {} sources, {} hemicubes in {:.1} s; unshot {:.3} %, stopped by {:?}",
-            output.display(),
-            report.elements,
-            report.sources,
-            report.hemicubes,
-            report.seconds.solve_wall,
-            100.0 * report.unshot_share,
-            report.stop
-        );
-        if let Some(found) = &report.discretisation {
-            tracing::info!("estimated error of cutting into elements: {found}");
-        }
-        if let Some(relief) = &report.relief {
-            tracing::info!(
-                "{} elements with relief in {} directions, {} kinds of relief",
-                relief.elements,
-                relief.directions,
-                relief.classes.len()
-            );
-        }
-        if options.json {
-            let printed = Printed {
-                scene: &options.scene,
-                scene_hash: &origin.hash,
-                output: output.display().to_string(),
-                read_seconds,
-                wall_seconds: start.elapsed().as_secs_f64(),
-                peak_resident_bytes: peak_resident_bytes(),
-                report,
-            };
-            let text = serde_json::to_string(&printed).map_err(|e| Error::Usage(e.to_string()))?;
-            mesolux::say!("{text}");
-        }
-        Ok(())
+fn bake(options: &Options, open: impl FnOnce() -> Result<Crew>) -> Result<()> {
+    let start = Instant::now();
+    let mut settings = Settings {
+        checkpoints: options.checkpoints()?,
+        ..options.solve.settings()?
+    };
+    settings.check()?;
+    if (options.output.extension()).is_some_and(|e| !e.eq_ignore_ascii_case("safetensors")) {
+        return Err(Error::file(
+            &options.output,
+            "a bake is a .safetensors file; `render` draws pictures",
+        ));
     }
+    writable(&options.output)?;
+    let quality = options.solve.quality();
+    let scene = options.builtin.load_for(quality, &options.scene)?;
+    let read_seconds = start.elapsed().as_secs_f64();
+    let kept = options
+        .relight
+        .as_ref()
+        .map(|bake| kept_with(bake))
+        .transpose()?;
+    let crew = open()?;
+    let budget = settings.budget;
+    settings.budget = budget.map(|budget| budget.saturating_sub(start.elapsed()));
+    let solver = solve_visibly(&crew, &scene, &settings, kept.as_ref())?;
+    let solution = mesolux::bake::solution(&scene, &solver)?;
+    refuse_darkness(&scene, &solution)?;
+    options.device.check()?;
+    let origin = origin(&options.scene, &options.builtin, scene.input_hash());
+    let report = &solution.report;
+    let output = match report.stop {
+        StopReason::Interrupted => unfinished(&options.output),
+        _ => options.output.clone(),
+    };
+    let filled = options.solve.filled()?;
+    save_somewhere(&output, |path| solution.save(path, &origin, &filled))?;
+    match (report.stop, &settings.checkpoints) {
+        (_, None) => {}
+        (StopReason::Interrupted, Some(checkpoints)) => {
+            if checkpoints.exist() {
+                let folder = checkpoints.folder.display();
+                tracing::info!("the same command goes on from {folder}");
+            }
+        }
+        (_, Some(checkpoints)) => checkpoints.remove(),
+    }
+    if options.keep_visibility {
+        let path = beside(&output);
+        match solver.visibility(&scene)? {
+            Some(visibility) => visibility.save(&path)?,
+            None => tracing::warn!("no form factors are kept: --keep-visibility writes nothing"),
+        }
+    }
+    tracing::info!(
+        "{}: {} elements, {} sources, {} hemicubes in {:.1} s; unshot {:.3} %, stopped by {:?}",
+        output.display(),
+        report.elements,
+        report.sources,
+        report.hemicubes,
+        report.seconds.solve_wall,
+        100.0 * report.unshot_share,
+        report.stop
+    );
+    if let Some(found) = &report.discretisation {
+        tracing::info!("estimated error of cutting into elements: {found}");
+    }
+    if let Some(relief) = &report.relief {
+        tracing::info!(
+            "{} elements with relief in {} directions, {} kinds of relief",
+            relief.elements,
+            relief.directions,
+            relief.classes.len()
+        );
+    }
+    if options.json {
+        let printed = Printed {
+            scene: &options.scene,
+            scene_hash: &origin.hash,
+            output: output.display().to_string(),
+            read_seconds,
+            wall_seconds: start.elapsed().as_secs_f64(),
+            peak_resident_bytes: peak_resident_bytes(),
+            report,
+        };
+        let text = serde_json::to_string(&printed).map_err(|e| Error::Usage(e.to_string()))?;
+        mesolux::say!("{text}");
+    }
+    Ok(())
 }
 
 impl Options {
-    fn task(&self) -> Result<Task<'_>> {
-        let start = Instant::now();
-        let settings = Settings {
-            checkpoints: self.checkpoints()?,
-            ..self.solve.settings()?
-        };
-        settings.check()?;
-        if (self.output.extension()).is_some_and(|e| !e.eq_ignore_ascii_case("safetensors")) {
-            return Err(Error::file(
-                &self.output,
-                "a bake is a .safetensors file; `render` draws pictures",
-            ));
-        }
-        writable(&self.output)?;
-        let quality = self.solve.quality();
-        let scene = self.builtin.load_for(quality, &self.scene)?;
-        let read_seconds = start.elapsed().as_secs_f64();
-        let kept = self.relight.as_deref().map(kept_with).transpose()?;
-        Ok(Task {
-            options: self,
-            settings,
-            scene,
-            kept,
-            start,
-            read_seconds,
-        })
-    }
-
     fn checkpoints(&self) -> Result<Option<Checkpoints>> {
         let seconds = self.checkpoint;
         if !(0.0..=1e9).contains(&seconds) {

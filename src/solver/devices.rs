@@ -63,20 +63,6 @@ pub fn started_together() -> usize {
     SIZES.into_iter().find_map(size).unwrap_or(1)
 }
 
-/// Where it says which of them this one is.
-#[cfg(feature = "mpi")]
-const RANKS: [&str; 3] = ["OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK"];
-
-/// Whether this process is told that it is the first, before MPI has started.
-#[cfg(feature = "mpi")]
-pub fn is_told_first() -> bool {
-    let rank = |name| std::env::var(name).ok();
-    RANKS
-        .into_iter()
-        .find_map(rank)
-        .is_some_and(|rank| rank == "0")
-}
-
 /// Opens the device of one of the processes of a machine, by its number among them: of a list the
 /// one in its turn, without one the next of those that are like the best.
 ///

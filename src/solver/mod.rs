@@ -62,8 +62,6 @@ use crate::scene::{Lights, Scene};
 use crate::vk::Device;
 
 pub use ambient::Ambient;
-#[cfg(feature = "mpi")]
-pub use devices::is_told_first;
 pub use devices::{Crew, open_devices, open_in_turn, started_together};
 pub use journal::Checkpoints;
 pub use look::ItemPicture;

@@ -8,7 +8,7 @@ mod wire;
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 
@@ -31,58 +31,27 @@ use wire::{ASKED, LEAST_GIVEN, MOST_GIVEN, Request, answer};
 pub struct Ranks {
     requests: Mutex<Sender<Request>>,
     thread: Mutex<Option<JoinHandle<()>>>,
-    place: Place,
-    /// One has failed while others may wait for it: they are ended.
-    broken: AtomicBool,
-}
-
-/// A process among all of them.
-struct Place {
     rank: usize,
     count: usize,
     local: usize,
-}
-
-/// MPI on its way.
-pub struct Joining {
-    requests: Sender<Request>,
-    thread: JoinHandle<()>,
-    place: Receiver<Place>,
+    /// One has failed while others may wait for it: they are ended.
+    broken: AtomicBool,
 }
 
 /// What a process is to begin; nothing where it is to end.
 const SEARCH: u8 = 1;
 const BAKE: u8 = 2;
 
-impl Joining {
-    /// Waits for the other processes.
+impl Ranks {
+    /// Joins the other processes; none where this one was started alone. Before anything else runs:
+    /// MPI sets variables of the environment, which others may not read meanwhile.
     ///
     /// # Errors
     /// An MPI that does not start, or is another than that of `mpirun`.
-    pub fn joined(self) -> Result<Ranks> {
-        let place = (self.place.recv()).map_err(|_| Error::Device("MPI does not start".into()))?;
+    pub fn join() -> Result<Option<Self>> {
         let started = started_together();
-        if place.count != started {
-            return Err(Error::Usage(format!(
-                "{started} processes were started together, and MPI joins {} of them: start them by \
-                 the mpirun of the MPI that this program was built with",
-                place.count
-            )));
-        }
-        Ok(Ranks {
-            requests: Mutex::new(self.requests),
-            thread: Mutex::new(Some(self.thread)),
-            place,
-            broken: AtomicBool::new(false),
-        })
-    }
-}
-
-impl Ranks {
-    /// Begins to join the other processes; none where this one was started alone.
-    pub fn join() -> Option<Joining> {
-        if started_together() < 2 {
-            return None;
+        if started < 2 {
+            return Ok(None);
         }
         let (requests, asked) = channel();
         let (joined, place) = channel();
@@ -92,34 +61,44 @@ impl Ranks {
                 return;
             };
             let world = universe.world();
-            let place = Place {
-                rank: world.rank() as usize,
-                count: world.size() as usize,
-                local: world.split_shared(world.rank()).rank() as usize,
-            };
+            let local = world.split_shared(world.rank()).rank();
+            let place = [world.rank(), world.size(), local].map(|number| number as usize);
             if joined.send(place).is_ok() {
                 answer(&mut universe, &asked);
             }
         });
-        Some(Joining {
-            requests,
-            thread,
-            place,
-        })
+        let Ok([rank, count, local]) = place.recv() else {
+            return Err(Error::Device("MPI does not start".into()));
+        };
+        if count != started {
+            return Err(Error::Usage(format!(
+                "{started} processes were started together, and MPI joins {count} of them: use \
+                 the mpirun of the MPI that this program was built with"
+            )));
+        }
+        let ranks = Self {
+            requests: Mutex::new(requests),
+            thread: Mutex::new(Some(thread)),
+            rank,
+            count,
+            local,
+            broken: AtomicBool::new(false),
+        };
+        Ok(Some(ranks))
     }
 
     /// Its number among all processes, of which 0 solves.
     pub fn rank(&self) -> usize {
-        self.place.rank
+        self.rank
     }
 
     pub fn count(&self) -> usize {
-        self.place.count
+        self.count
     }
 
     /// Its number among the processes of its machine.
     pub fn local_rank(&self) -> usize {
-        self.place.local
+        self.local
     }
 
     /// Does on `device` what the first process asks, until that has ended.
@@ -173,7 +152,7 @@ impl Ranks {
     /// Finds the near pairs of its own sources.
     fn search_own(&self) -> Result<()> {
         let search: NearSearch = read(&self.broadcast(Vec::new())?)?;
-        self.send(0, written(&search.find([self.rank(), self.count()]))?)
+        self.send(0, written(&search.find([self.rank, self.count]))?)
     }
 
     /// Lets the other processes search, and collects what they have found when this one has found
@@ -186,21 +165,21 @@ impl Ranks {
         search: NearSearch,
         own: impl FnOnce() -> T,
     ) -> Result<(T, Vec<Found>)> {
-        for rank in 1..self.count() {
+        for rank in 1..self.count {
             self.send(rank, vec![SEARCH])?;
         }
         let message = written(&search)?;
         drop(search);
         self.broadcast(message)?;
         let own = own();
-        let found = (1..self.count()).map(|rank| read(&self.receive(rank)?));
+        let found = (1..self.count).map(|rank| read(&self.receive(rank)?));
         Ok((own, found.collect::<Result<_>>()?))
     }
 
     /// What has been done; or all processes end, after a line that says why.
     fn or_all_end<T>(&self, done: Result<T>) -> T {
         done.unwrap_or_else(|error| {
-            tracing::error!("rank {}: {error}", self.rank());
+            tracing::error!("rank {}: {error}", self.rank);
             self.abort()
         })
     }
@@ -211,7 +190,7 @@ impl Ranks {
     }
 
     fn answer(&self, answer: Result<Reply>) -> Result<()> {
-        let rank = self.rank();
+        let rank = self.rank;
         let answer = answer.map_err(|error| format!("rank {rank}: {error}"));
         self.send(0, written(&answer)?)
     }
@@ -221,8 +200,8 @@ impl Ranks {
         if self.is_broken() {
             self.abort();
         }
-        for rank in 1..self.count() {
-            if self.rank() == 0 {
+        for rank in 1..self.count {
+            if self.rank == 0 {
                 let _ = self.send(rank, Vec::new());
             }
         }
@@ -303,11 +282,11 @@ fn tag_of(gift: Gift) -> Tag {
 
 impl Exchange for RankExchange {
     fn place(&self) -> [usize; 2] {
-        [self.ranks.rank(), self.ranks.count()]
+        [self.ranks.rank, self.ranks.count]
     }
 
     fn give(&mut self, gift: Gift, given: Vec<u8>) -> Result<()> {
-        if (given.len() + LEAST_GIVEN) * (self.ranks.count() - 1) > MOST_GIVEN {
+        if (given.len() + LEAST_GIVEN) * (self.ranks.count - 1) > MOST_GIVEN {
             let what = "item buffers are too large to be sent: fewer pixels by --hemicube";
             return Err(Error::Usage(what.into()));
         }
@@ -317,11 +296,11 @@ impl Exchange for RankExchange {
 
     fn collect(&mut self, gift: Gift) -> Result<Gifts> {
         let own = self.own[gift as usize].pop_front().unwrap_or_default();
-        let of = |rank| match rank == self.ranks.rank() {
+        let of = |rank| match rank == self.ranks.rank {
             true => Ok(own.clone()),
             false => self.ranks.receive_with(rank, tag_of(gift)),
         };
-        (0..self.ranks.count()).map(of).collect()
+        (0..self.ranks.count).map(of).collect()
     }
 }
 
@@ -338,7 +317,7 @@ impl OnRanks {
         data: &MemberData,
         own: Vec<MemberShare>,
     ) -> Result<(Self, Box<dyn Exchange>)> {
-        for rank in 1..ranks.count() {
+        for rank in 1..ranks.count {
             ranks.send(rank, vec![BAKE])?;
         }
         ranks.broadcast(written(data)?)?;
@@ -360,7 +339,7 @@ impl Others for OnRanks {
 
     fn ask_all(&mut self, command: &Command) -> Result<()> {
         let message = written(command)?;
-        for rank in 1..self.0.count() {
+        for rank in 1..self.0.count {
             self.0.send(rank, message.clone())?;
         }
         Ok(())
@@ -369,12 +348,12 @@ impl Others for OnRanks {
     fn answers(&mut self) -> Vec<Result<Reply>> {
         let ranks = &self.0;
         // Those that wait for one that has failed do not answer.
-        let from = if ranks.is_broken() { ranks.count() } else { 1 };
+        let from = if ranks.is_broken() { ranks.count } else { 1 };
         let answer = |rank| {
             let answer: std::result::Result<Reply, String> = read(&ranks.receive(rank)?)?;
             answer.map_err(Error::Device)
         };
-        (from..ranks.count()).map(answer).collect()
+        (from..ranks.count).map(answer).collect()
     }
 
     fn close(&mut self) {
@@ -385,7 +364,7 @@ impl Others for OnRanks {
 impl Drop for OnRanks {
     fn drop(&mut self) {
         if !self.0.is_broken() {
-            for rank in 1..self.0.count() {
+            for rank in 1..self.0.count {
                 let _ = self.0.send(rank, Vec::new());
             }
         }
